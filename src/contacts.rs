@@ -1,0 +1,31 @@
+//! Contact manifolds and the impulses they carry from step to step.
+
+use glam::Vec2;
+
+/// One point of a manifold.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ManifoldPoint {
+    /// From the centre of mass of body a to the contact point, world axes (m).
+    pub anchor_a: Vec2,
+    /// From the centre of mass of body b to the same point, world axes (m).
+    pub anchor_b: Vec2,
+    /// Signed gap along the normal (m); negative is overlap.
+    pub separation: f32,
+    /// Accumulated normal impulse, ≥ 0 (N·s).
+    pub normal_impulse: f32,
+    /// Accumulated tangential impulse (N·s).
+    pub tangent_impulse: f32,
+    /// Names the pair of features that touch; the same from step to step while they do.
+    pub feature_id: u32,
+}
+
+/// Up to two contact points that share a normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Manifold {
+    /// Unit normal from a to b, world axes.
+    pub normal: Vec2,
+    /// Number of points in use: 0, 1 or 2.
+    pub count: u32,
+    /// The first `count` are used.
+    pub points: [ManifoldPoint; 2],
+}
