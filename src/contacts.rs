@@ -29,3 +29,25 @@ pub struct Manifold {
     /// The first `count` are used.
     pub points: [ManifoldPoint; 2],
 }
+
+/// Two shapes close enough to touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// Shape a: the static or kinematic one if there is one, else the lower index.
+    pub shape_a: u32,
+    /// Shape b, always of a dynamic body.
+    pub shape_b: u32,
+    /// Body of shape a.
+    pub body_a: u32,
+    /// Body of shape b.
+    pub body_b: u32,
+    /// Mixed Coulomb coefficient √(µa µb).
+    pub friction: f32,
+    /// Mixed restitution max(ea, eb).
+    pub restitution: f32,
+    /// Geometry at the start of the step; impulses of its last substep.
+    pub manifold: Manifold,
+    /// Per point, normal and tangential impulse summed over the step (N·s);
+    /// only kept while `Settings::record_impulses` is on.
+    pub step_impulse: [[f32; 2]; 2],
+}

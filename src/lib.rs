@@ -1,6 +1,10 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory for contact solvers.
 
+pub mod bodies;
 pub mod contacts;
 pub mod error;
+pub mod lanes;
 pub mod params;
 pub mod shapes;
+pub mod solvers;
+pub mod world;

@@ -1,0 +1,137 @@
+//! Body state as structure-of-arrays, castable to lanes.
+
+use crate::lanes::LaneVec;
+use crate::shapes::{Pose, Shape};
+use glam::Vec2;
+
+/// How a body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BodyKind {
+    /// Never moves.
+    Static,
+    /// Moves with its given velocity, whatever it meets.
+    Kinematic,
+    /// Moves as forces and contacts say.
+    Dynamic,
+}
+
+/// A shape with its surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeDef {
+    /// Geometry in the frame of the body's origin (m).
+    pub shape: Shape,
+    /// kg/m², > 0
+    pub density: f64,
+    /// Coulomb coefficient, ≥ 0; two surfaces mix as √(µa µb).
+    pub friction: f64,
+    /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
+    pub restitution: f64,
+}
+
+/// What a body is made of, and how it starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyDef {
+    /// How it moves.
+    pub kind: BodyKind,
+    /// Origin of the body's frame (m).
+    pub position: [f64; 2],
+    /// rad
+    pub angle: f64,
+    /// Velocity of the centre of mass (m/s).
+    pub velocity: [f64; 2],
+    /// rad/s
+    pub angular_velocity: f64,
+    /// Factor on gravity (1).
+    pub gravity_scale: f64,
+    /// 1/s
+    pub linear_damping: f64,
+    /// 1/s
+    pub angular_damping: f64,
+    /// Bodies of the same non-zero group do not collide.
+    pub group: i32,
+    /// Shapes that move as one.
+    pub shapes: Vec<ShapeDef>,
+}
+
+/// State of all bodies, one array per quantity, `[len]` each.
+#[derive(Clone, Debug, Default)]
+pub struct Bodies {
+    /// Centre of mass (m).
+    pub position_x: LaneVec,
+    /// Centre of mass (m).
+    pub position_y: LaneVec,
+    /// cos θ
+    pub rotation_cos: LaneVec,
+    /// sin θ
+    pub rotation_sin: LaneVec,
+    /// m/s
+    pub velocity_x: LaneVec,
+    /// m/s
+    pub velocity_y: LaneVec,
+    /// rad/s
+    pub angular_velocity: LaneVec,
+    /// 1/kg, zero for static and kinematic bodies
+    pub inv_mass: LaneVec,
+    /// 1/(kg·m²), zero for static and kinematic bodies
+    pub inv_inertia: LaneVec,
+    /// Force applied over the next step (N).
+    pub force_x: LaneVec,
+    /// Force applied over the next step (N).
+    pub force_y: LaneVec,
+    /// Torque applied over the next step (N·m).
+    pub torque: LaneVec,
+    /// Factor on gravity (1).
+    pub gravity_scale: LaneVec,
+    /// 1/s
+    pub linear_damping: LaneVec,
+    /// 1/s
+    pub angular_damping: LaneVec,
+    /// From the body's origin to its centre of mass, body axes (m).
+    pub local_center: Vec<Vec2>,
+    /// How each body moves.
+    pub kind: Vec<BodyKind>,
+    /// Collision group of each body; 0 is none.
+    pub group: Vec<i32>,
+}
+
+impl Bodies {
+    /// Number of bodies.
+    pub fn len(&self) -> usize {
+        self.kind.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.kind.is_empty()
+    }
+
+    /// Pose of the centre of mass of body `i`.
+    pub fn pose(&self, i: usize) -> Pose {
+        Pose {
+            position: Vec2::new(self.position_x[i], self.position_y[i]),
+            rotation: Vec2::new(self.rotation_cos[i], self.rotation_sin[i]),
+        }
+    }
+
+    /// Velocity of the centre of mass of body `i` (m/s).
+    pub fn velocity(&self, i: usize) -> Vec2 {
+        Vec2::new(self.velocity_x[i], self.velocity_y[i])
+    }
+
+    /// Position of the origin of body `i`'s frame (m), as scenes give it.
+    pub fn origin(&self, i: usize) -> Vec2 {
+        let pose = self.pose(i);
+        pose.position - pose.rotation.rotate(self.local_center[i])
+    }
+
+    /// Angle of body `i` in (−π, π] (rad).
+    pub fn angle(&self, i: usize) -> f32 {
+        self.rotation_sin[i].atan2(self.rotation_cos[i])
+    }
+
+    /// Whether body `i` answers to impulses.
+    pub fn is_dynamic(&self, i: usize) -> bool {
+        self.kind[i] == BodyKind::Dynamic
+    }
+}

@@ -1,0 +1,73 @@
+//! A growable array of `f32` that is 64-byte aligned and castable to lanes of any width.
+
+use bytemuck::{Pod, Zeroable};
+use std::ops::{Deref, DerefMut};
+
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Block([f32; 16]);
+
+/// `len` floats in 64-byte blocks; what lies past `len` in the last block is zero.
+#[derive(Clone, Debug, Default)]
+pub struct LaneVec {
+    blocks: Vec<Block>,
+    len: usize,
+}
+
+impl LaneVec {
+    /// Number of floats.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Appends one float.
+    pub fn push(&mut self, value: f32) {
+        if self.len == self.blocks.len() * 16 {
+            self.blocks.push(Block::default());
+        }
+        self.blocks[self.len / 16].0[self.len % 16] = value;
+        self.len += 1;
+    }
+
+    /// Sets the length; new floats are zero, capacity is kept.
+    pub fn resize(&mut self, len: usize) {
+        if len < self.len {
+            self[len..].fill(0.0);
+        }
+        self.blocks.resize(len.div_ceil(16), Block::default());
+        self.len = len;
+    }
+
+    /// The floats as lanes, the last vector filled up with zeros.
+    pub fn lanes<L: Pod>(&self) -> &[L] {
+        bytemuck::cast_slice(&self.blocks)
+    }
+
+    /// The floats as lanes; the tail past `len` must stay zero.
+    pub fn lanes_mut<L: Pod>(&mut self) -> &mut [L] {
+        bytemuck::cast_slice_mut(&mut self.blocks)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.blocks.capacity() * 64
+    }
+}
+
+impl Deref for LaneVec {
+    type Target = [f32];
+    fn deref(&self) -> &[f32] {
+        &bytemuck::cast_slice(&self.blocks)[..self.len]
+    }
+}
+
+impl DerefMut for LaneVec {
+    fn deref_mut(&mut self) -> &mut [f32] {
+        &mut bytemuck::cast_slice_mut(&mut self.blocks)[..self.len]
+    }
+}
