@@ -1,7 +1,7 @@
 //! Body state as structure-of-arrays, castable to lanes.
 
 use crate::lanes::LaneVec;
-use crate::shapes::{Pose, Shape};
+use crate::shapes::{MassProperties, Pose, Shape};
 use glam::Vec2;
 
 /// How a body moves.
@@ -104,6 +104,34 @@ impl Bodies {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.kind.is_empty()
+    }
+
+    /// Adds a body with the mass properties of its shapes about its origin; returns its index.
+    pub fn push(&mut self, def: &BodyDef, mass: &MassProperties) -> usize {
+        let (sin, cos) = def.angle.sin_cos();
+        let [cx, cy] = mass.center;
+        self.position_x.push((def.position[0] + cos * cx - sin * cy) as f32);
+        self.position_y.push((def.position[1] + sin * cx + cos * cy) as f32);
+        self.rotation_cos.push(cos as f32);
+        self.rotation_sin.push(sin as f32);
+        // A static body has no velocity, whatever its definition says.
+        let moves = if def.kind == BodyKind::Static { 0.0 } else { 1.0 };
+        self.velocity_x.push((moves * def.velocity[0]) as f32);
+        self.velocity_y.push((moves * def.velocity[1]) as f32);
+        self.angular_velocity.push((moves * def.angular_velocity) as f32);
+        let inverse = |x: f64| if def.kind == BodyKind::Dynamic && x > 0.0 { (1.0 / x) as f32 } else { 0.0 };
+        self.inv_mass.push(inverse(mass.mass));
+        self.inv_inertia.push(inverse(mass.inertia));
+        self.force_x.push(0.0);
+        self.force_y.push(0.0);
+        self.torque.push(0.0);
+        self.gravity_scale.push(def.gravity_scale as f32);
+        self.linear_damping.push(def.linear_damping as f32);
+        self.angular_damping.push(def.angular_damping as f32);
+        self.local_center.push(Vec2::new(cx as f32, cy as f32));
+        self.kind.push(def.kind);
+        self.group.push(def.group);
+        self.kind.len() - 1
     }
 
     /// Pose of the centre of mass of body `i`.

@@ -51,3 +51,28 @@ pub struct Contact {
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
 }
+
+impl Contact {
+    /// The shape pair as a sortable number, the lower shape index first.
+    pub fn key(&self) -> u64 {
+        let (low, high) = (self.shape_a.min(self.shape_b), self.shape_a.max(self.shape_b));
+        (low as u64) << 32 | high as u64
+    }
+}
+
+impl Manifold {
+    /// The points in use.
+    pub fn points(&self) -> &[ManifoldPoint] {
+        &self.points[..self.count as usize]
+    }
+
+    /// Takes over the impulses of `old` at points that name the same features.
+    pub fn take_impulses(&mut self, old: &Manifold) {
+        for point in &mut self.points[..self.count as usize] {
+            if let Some(same) = old.points().iter().find(|p| p.feature_id == point.feature_id) {
+                point.normal_impulse = same.normal_impulse;
+                point.tangent_impulse = same.tangent_impulse;
+            }
+        }
+    }
+}

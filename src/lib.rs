@@ -1,9 +1,14 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory for contact solvers.
 
 pub mod bodies;
+pub mod broadphase;
+pub mod clock;
+pub mod coloring;
+pub mod constraints;
 pub mod contacts;
 pub mod error;
 pub mod lanes;
+pub mod narrowphase;
 pub mod params;
 pub mod shapes;
 pub mod solvers;

@@ -8,6 +8,10 @@ pub const LINEAR_SLOP: f32 = 0.005;
 /// step ends at the surface instead of behind it. Four slops.
 pub const SPECULATIVE_DISTANCE: f32 = 4.0 * LINEAR_SLOP;
 
+/// A shape's bounds are grown by this (m), so that pairs are looked for only when a body
+/// has moved that far. Larger: more candidates. Smaller: more searches.
+pub const AABB_MARGIN: f32 = 0.1;
+
 /// Fraction of the overlap that Baumgarte stabilisation removes per step (1).
 pub const BAUMGARTE: f32 = 0.3;
 

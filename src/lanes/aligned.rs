@@ -3,9 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use std::ops::{Deref, DerefMut};
 
+/// Sixteen floats on a cache line.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
-struct Block([f32; 16]);
+pub struct Block(pub [f32; 16]);
 
 /// `len` floats in 64-byte blocks; what lies past `len` in the last block is zero.
 #[derive(Clone, Debug, Default)]

@@ -1,8 +1,33 @@
 //! Lanes: the vector operations that kernels need, at widths 1, 4, 8 and 16.
+//!
+//! One private-looking trait, [`Lanes`], holds only what the kernels use, so
+//! that a kernel is written once and compiled at every width. Its promise:
+//! every operation gives, lane by lane, the same bits at every width.
+//!
+//! * `+ − × ÷` are IEEE operations and agree by themselves.
+//! * [`Lanes::mul_add`] is fused at every width or at none ([`FUSED`]).
+//! * [`Lanes::max`] and [`Lanes::min`] return the *second* operand when the two
+//!   compare equal (so for ±0) or are unordered: the rule of the x86 instructions.
+//! * No reciprocal estimates.
+//!
+//! Which instructions a width becomes is decided at build time by the target
+//! CPU; [`native_width`] tells the widest that is not emulated.
 
 mod aligned;
+mod rows;
 
-pub use aligned::LaneVec;
+pub use aligned::{Block, LaneVec};
+pub use rows::BodyRow;
+
+use bytemuck::Pod;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use wide::{f32x4, f32x8, f32x16};
+
+/// Whether [`Lanes::mul_add`] rounds once (a fused instruction) or twice.
+pub const FUSED: bool = cfg!(any(
+    all(target_arch = "x86_64", target_feature = "fma"),
+    all(target_arch = "aarch64", target_feature = "neon")
+));
 
 /// How many contacts one instruction processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -36,3 +61,196 @@ impl LaneWidth {
         Self::ALL.into_iter().find(|w| w.lanes() == lanes)
     }
 }
+
+/// The widest lanes that this build has instructions for; wider ones are emulated.
+pub const fn native_width() -> LaneWidth {
+    if cfg!(target_feature = "avx512f") {
+        LaneWidth::W16
+    } else if cfg!(target_feature = "avx") {
+        LaneWidth::W8
+    } else if cfg!(any(target_feature = "sse2", target_feature = "neon", target_feature = "simd128")) {
+        LaneWidth::W4
+    } else {
+        LaneWidth::W1
+    }
+}
+
+/// The vector extensions that this build uses, for records.
+pub fn target_features() -> &'static str {
+    if cfg!(target_feature = "avx512f") {
+        "avx512f+fma"
+    } else if cfg!(all(target_feature = "avx2", target_feature = "fma")) {
+        "avx2+fma"
+    } else if cfg!(target_feature = "avx") {
+        "avx"
+    } else if cfg!(target_feature = "sse2") {
+        "sse2"
+    } else if cfg!(target_feature = "neon") {
+        "neon"
+    } else {
+        "scalar"
+    }
+}
+
+/// `WIDTH` floats that are worked on together.
+pub trait Lanes:
+    Pod + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// The number of lanes.
+    const WIDTH: usize;
+
+    /// The same value in every lane.
+    fn splat(value: f32) -> Self;
+
+    /// `self · factor + term`.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// `term − self · factor`.
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// `self > other ? self : other`.
+    fn max(self, other: Self) -> Self;
+
+    /// `self < other ? self : other`.
+    fn min(self, other: Self) -> Self;
+
+    /// `self > 0 ? positive : otherwise`.
+    fn select_positive(self, positive: Self, otherwise: Self) -> Self;
+
+    /// The rows of `WIDTH` bodies, transposed: `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8];
+
+    /// Writes back the first half `[vx, vy, ω, m⁻¹]` of `WIDTH` rows, in lane order.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]);
+
+    /// Writes back the second half `[Δx, Δy, Δθ, I⁻¹]` of `WIDTH` rows, in lane order.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]);
+
+    /// Zero in every lane.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl Lanes for f32 {
+    const WIDTH: usize = 1;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        if FUSED { f32::mul_add(self, factor, term) } else { self * factor + term }
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        if FUSED { f32::mul_add(-self, factor, term) } else { term - self * factor }
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn select_positive(self, positive: Self, otherwise: Self) -> Self {
+        if self > 0.0 { positive } else { otherwise }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::gather_1(rows, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::scatter_1::<0>(rows, index, velocity) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::scatter_1::<1>(rows, index, delta) }
+    }
+}
+
+macro_rules! wide_lanes {
+    ($type:ty, $width:literal, $gather:path, $scatter:ident) => {
+        impl Lanes for $type {
+            const WIDTH: usize = $width;
+
+            #[inline(always)]
+            fn splat(value: f32) -> Self {
+                <$type>::splat(value)
+            }
+
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                <$type>::mul_add(self, factor, term)
+            }
+
+            #[inline(always)]
+            fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+                <$type>::mul_neg_add(self, factor, term)
+            }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.fast_max(other)
+            }
+
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                self.fast_min(other)
+            }
+
+            #[inline(always)]
+            fn select_positive(self, positive: Self, otherwise: Self) -> Self {
+                wide::Select::select(self.simd_gt(Self::zeroed()), positive, otherwise)
+            }
+
+            #[inline(always)]
+            unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { $gather(rows, index) }
+            }
+
+            #[inline(always)]
+            unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$scatter::<0>(rows, index, velocity) }
+            }
+
+            #[inline(always)]
+            unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$scatter::<1>(rows, index, delta) }
+            }
+        }
+    };
+}
+
+use bytemuck::Zeroable;
+wide_lanes!(f32x4, 4, rows::gather_4, scatter_4);
+wide_lanes!(f32x8, 8, rows::gather_8, scatter_8);
+wide_lanes!(f32x16, 16, rows::gather_16, scatter_16);

@@ -1,0 +1,122 @@
+//! Phases of a step and the time each takes.
+
+use std::time::Instant;
+
+/// Phases of a step; [`Timings`] has one time for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+pub enum Phase {
+    /// Bounds and broad phase.
+    Pairs,
+    /// Narrow phase and impulse matching.
+    Collide,
+    /// Colouring and lane assignment.
+    Color,
+    /// Constraint preparation.
+    Prepare,
+    /// Warm starting.
+    WarmStart,
+    /// Velocity sweeps with position feedback.
+    Solve,
+    /// Velocity sweeps without.
+    Relax,
+    /// Position sweeps.
+    Position,
+    /// Restitution.
+    Restitution,
+    /// Body integration.
+    Integrate,
+    /// Impulses and poses written back.
+    Store,
+}
+
+impl Phase {
+    /// Every phase, in the order of a step.
+    pub const ALL: [Phase; 11] = [
+        Phase::Pairs,
+        Phase::Collide,
+        Phase::Color,
+        Phase::Prepare,
+        Phase::WarmStart,
+        Phase::Solve,
+        Phase::Relax,
+        Phase::Position,
+        Phase::Restitution,
+        Phase::Integrate,
+        Phase::Store,
+    ];
+
+    /// Name for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Phase::Pairs => "pairs",
+            Phase::Collide => "collide",
+            Phase::Color => "color",
+            Phase::Prepare => "prepare",
+            Phase::WarmStart => "warm start",
+            Phase::Solve => "solve",
+            Phase::Relax => "relax",
+            Phase::Position => "position",
+            Phase::Restitution => "restitution",
+            Phase::Integrate => "integrate",
+            Phase::Store => "store",
+        }
+    }
+
+    /// Whether the phase is a pass over constraint rows.
+    pub fn is_sweep(self) -> bool {
+        use Phase::*;
+        matches!(self, WarmStart | Solve | Relax | Position | Restitution)
+    }
+}
+
+/// Time of each phase of the last step, and of the whole step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Timings {
+    /// Nanoseconds per phase, indexed by `Phase as usize`.
+    pub phase_ns: [u64; Phase::ALL.len()],
+    /// Nanoseconds of the whole step.
+    pub step_ns: u64,
+}
+
+impl Timings {
+    /// Nanoseconds of all passes over constraint rows.
+    pub fn sweep_ns(&self) -> u64 {
+        Phase::ALL.iter().filter(|p| p.is_sweep()).map(|&p| self.phase_ns[p as usize]).sum()
+    }
+}
+
+/// Adds the time since the last lap to a phase; costs nothing while it is off.
+#[derive(Debug)]
+pub struct Clock {
+    timings: Timings,
+    start: Option<(Instant, Instant)>,
+}
+
+impl Clock {
+    /// Starts a step.
+    pub fn start(on: bool) -> Self {
+        let start = on.then(|| {
+            let now = Instant::now();
+            (now, now)
+        });
+        Clock { timings: Timings::default(), start }
+    }
+
+    /// Books the time since the last lap on `phase`.
+    #[inline]
+    pub fn lap(&mut self, phase: Phase) {
+        if let Some((_, last)) = &mut self.start {
+            let now = Instant::now();
+            self.timings.phase_ns[phase as usize] += (now - *last).as_nanos() as u64;
+            *last = now;
+        }
+    }
+
+    /// Ends the step.
+    pub fn stop(mut self) -> Timings {
+        if let Some((begin, _)) = self.start {
+            self.timings.step_ns = begin.elapsed().as_nanos() as u64;
+        }
+        self.timings
+    }
+}

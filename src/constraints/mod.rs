@@ -1,0 +1,19 @@
+//! Constraints: contacts as lane batches, and the row arithmetic that solvers share.
+//!
+//! Reading order: [`needs`] (what is compiled in, where a record keeps what),
+//! [`batches`] (which contact stands in which lane), [`sweep`] (the kernel),
+//! [`prepare`], [`restitution`], [`motion`], and [`problem`], which is all that a
+//! solver sees.
+
+pub mod batches;
+pub mod motion;
+pub mod needs;
+pub mod prepare;
+pub mod problem;
+pub mod restitution;
+pub mod sweep;
+
+pub use batches::Batches;
+pub use needs::{Kernel, KernelNeeds, Layout, Needs, OppositeKind};
+pub use problem::{Problem, StepInput, Workspace};
+pub use sweep::NormalRule;

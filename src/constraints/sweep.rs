@@ -1,0 +1,369 @@
+//! The contact sweep: one text for every width, every need, every solver.
+//!
+//! # Contact frame
+//!
+//! A contact has the unit normal n (from a to b) and the tangent t = (n_y, −n_x). With
+//! the velocities v, ω of the two bodies and the arms r from their centres of mass to
+//! the contact point, the relative velocity of the point along an axis u is
+//!
+//! ```text
+//! u·(v_b + ω_b × r_b − v_a − ω_a × r_a) = u·(v_b − v_a) + ω_b (r_b × u) − ω_a (r_a × u)
+//! ```
+//!
+//! because u·(ω × r) = ω (r × u) in the plane. So a row needs no arm, only the scalar
+//! r × u. All rows of one contact share n and t; a sweep therefore gathers the bodies
+//! once, turns v_b − v_a into the contact frame (two numbers, `along_n` and `along_t`),
+//! and keeps those and ω_a, ω_b in registers through all rows. An impulse λ along n changes
+//!
+//! ```text
+//! along_n += (m_a⁻¹ + m_b⁻¹) λ,   ω_b += I_b⁻¹ (r_b × n) λ,   ω_a −= I_a⁻¹ (r_a × n) λ
+//! ```
+//!
+//! and leaves `along_t` alone, since n ⊥ t; likewise along t. The sums of the impulses
+//! are turned back and applied to the bodies once.
+//!
+//! # Separation
+//!
+//! With the bodies moved by Δx and turned by Δθ since the step began, an anchor r
+//! becomes R(Δθ) r, and n·(R(Δθ) r − r) = sin Δθ (r × n) − (1 − cos Δθ)(n·r). Since
+//! r × t = −(r·n), the rotated separation needs the two arms and nothing else:
+//!
+//! ```text
+//! s = s₀ + n·(Δx_b − Δx_a) + σ_b (r_b × n) + κ_b (r_b × t) − σ_a (r_a × n) − κ_a (r_a × t)
+//! ```
+//!
+//! with σ = sin Δθ and κ = 1 − cos Δθ (see [`turn`]).
+//!
+//! # Effective mass
+//!
+//! The velocity along u answers to a unit impulse along u with
+//! k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)²; the effective mass is 1/k.
+//!
+//! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
+//! (gather, solve, scatter by colour); the contact frame is this crate's own.
+
+use super::batches::{Batches, Segment};
+use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use crate::lanes::{BodyRow, Lanes};
+
+/// How a solver turns the state of a normal row into its new accumulated impulse.
+///
+/// A rule is the whole difference between sequential-impulse solvers; the sweep around
+/// it is shared. `stiff` tells that body a is static or kinematic.
+pub trait NormalRule: Copy {
+    /// Whether the sweep solves the friction rows as well.
+    const FRICTION: bool;
+    /// Whether the rule reads the separation.
+    const SEPARATION: bool = true;
+
+    /// New accumulated impulse (N·s), ≥ 0, from the normal velocity `vn` (m/s), the
+    /// separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
+    fn normal_impulse<L: Lanes>(&self, stiff: bool, vn: L, separation: L, mass: L, old: L) -> L;
+}
+
+/// sin θ and 1 − cos θ of the turn within one step.
+///
+/// The first two Taylor terms of each: the error is below θ⁵/120 and θ⁶/720, so below
+/// 3e-8 for a turn of 0.05 rad (3 rad/s at 60 Hz) and 2.6e-4 at half a radian.
+#[inline(always)]
+fn turn<L: Lanes>(angle: L) -> (L, L) {
+    let square = angle * angle;
+    let sine = angle * square.neg_mul_add(L::splat(1.0 / 6.0), L::splat(1.0));
+    let versine = square * square.neg_mul_add(L::splat(1.0 / 24.0), L::splat(0.5));
+    (sine, versine)
+}
+
+/// The two bodies of a batch, in registers.
+struct Pair<L> {
+    a: [L; 8],
+    b: [L; 8],
+}
+
+impl<L: Lanes> Pair<L> {
+    /// # Safety
+    /// Both index slices hold `L::WIDTH` entries below `rows.len()`.
+    #[inline(always)]
+    unsafe fn gather<O: Opposite>(rows: &[BodyRow], row_a: &[u32], row_b: &[u32]) -> Self {
+        // SAFETY: the caller keeps the indices in bounds.
+        let a = if O::HAS_ROW { unsafe { L::gather(rows, row_a) } } else { [L::zero(); 8] };
+        // SAFETY: the caller keeps the indices in bounds.
+        Pair { a, b: unsafe { L::gather(rows, row_b) } }
+    }
+}
+
+const VX: usize = 0;
+const VY: usize = 1;
+const W: usize = 2;
+const INV_MASS: usize = 3;
+const DX: usize = 4;
+const DY: usize = 5;
+const TURN: usize = 6;
+const INV_INERTIA: usize = 7;
+
+/// Components of b − a along n and t.
+#[inline(always)]
+fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
+    let x = if O::HAS_ROW { b[0] - a[0] } else { b[0] };
+    let y = if O::HAS_ROW { b[1] - a[1] } else { b[1] };
+    [n[0].mul_add(x, n[1] * y), n[1].mul_add(x, -(n[0] * y))]
+}
+
+/// `base + ω_b arm_b − ω_a arm_a`, where the needs have arms.
+#[inline(always)]
+fn with_arms<L: Lanes, N: KernelNeeds, O: Opposite>(base: L, w: [L; 2], arm: [L; 2]) -> L {
+    let mut v = base;
+    if N::ROTATION {
+        v = w[1].mul_add(arm[1], v);
+        if O::HAS_ROW {
+            v = w[0].neg_mul_add(arm[0], v);
+        }
+    }
+    v
+}
+
+/// `ω_b += I_b⁻¹ arm_b λ`, `ω_a −= I_a⁻¹ arm_a λ`, where the needs have arms.
+#[inline(always)]
+fn spin<L: Lanes, N: KernelNeeds, O: Opposite>(w: &mut [L; 2], inertia: [L; 2], arm: [L; 2], impulse: L) {
+    if N::ROTATION {
+        w[1] = (inertia[1] * arm[1]).mul_add(impulse, w[1]);
+        if O::MOVES {
+            w[0] = (inertia[0] * arm[0]).neg_mul_add(impulse, w[0]);
+        }
+    }
+}
+
+/// One sweep over a segment: Gauss–Seidel within a contact, all contacts of a batch at once.
+#[inline(always)]
+fn sweep_segment<L: Lanes, N: KernelNeeds, O: Opposite, R: NormalRule>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: R,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O>(rows, batches, segment, |rows, record, row_a, row_b| {
+        // SAFETY: `Problem::new` checked every row index against the rows.
+        let Pair { mut a, mut b } = unsafe { Pair::<L>::gather::<O>(rows, row_a, row_b) };
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+
+        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
+        let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+
+        let mut sum_n = L::zero();
+        for p in 0..N::POINTS {
+            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let mut separation = L::zero();
+            if R::SEPARATION {
+                separation = record[layout.at(p, layout.separation)] + moved;
+                let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+                separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+                separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            }
+            let vn = with_arms::<L, N, O>(along_n, w, arm_n);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let old = record[layout.at(p, layout.normal_impulse)];
+            let new = rule.normal_impulse(!O::MOVES, vn, separation, mass, old);
+            record[layout.at(p, layout.normal_impulse)] = new;
+            let delta = new - old;
+            sum_n = sum_n + delta;
+            along_n = mass_sum.mul_add(delta, along_n);
+            spin::<L, N, O>(&mut w, inertia, arm_n, delta);
+        }
+
+        let mut sum_t = L::zero();
+        if N::FRICTION && R::FRICTION {
+            let friction = record[layout.friction];
+            for p in 0..N::POINTS {
+                let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, w, arm_t);
+                let mass = record[layout.at(p, layout.tangent_mass)];
+                let old = record[layout.at(p, layout.tangent_impulse)];
+                let bound = friction * record[layout.at(p, layout.normal_impulse)];
+                let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
+                record[layout.at(p, layout.tangent_impulse)] = new;
+                let delta = new - old;
+                sum_t = sum_t + delta;
+                along_t = mass_sum.mul_add(delta, along_t);
+                spin::<L, N, O>(&mut w, inertia, arm_t, delta);
+            }
+        }
+
+        apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
+        // SAFETY: as above.
+        unsafe {
+            L::scatter_velocity(rows, row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+            if O::MOVES {
+                L::scatter_velocity(rows, row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+            }
+        }
+    });
+}
+
+/// Turns the impulses along n and t back into world axes and applies them; `w` are the new spins.
+#[inline(always)]
+fn apply<L: Lanes, O: Opposite>(a: &mut [L; 8], b: &mut [L; 8], n: [L; 2], sum: [L; 2], w: [L; 2]) {
+    let x = n[0].mul_add(sum[0], n[1] * sum[1]);
+    let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
+    b[VX] = b[INV_MASS].mul_add(x, b[VX]);
+    b[VY] = b[INV_MASS].mul_add(y, b[VY]);
+    b[W] = w[1];
+    if O::MOVES {
+        a[VX] = a[INV_MASS].neg_mul_add(x, a[VX]);
+        a[VY] = a[INV_MASS].neg_mul_add(y, a[VY]);
+        a[W] = w[0];
+    }
+}
+
+/// Arms of bodies a and b at point `p`: `axis` 0 is r × n, 1 is r × t.
+#[inline(always)]
+fn arms<L: Lanes, N: KernelNeeds, O: Opposite>(
+    record: &[L],
+    layout: &Layout,
+    p: usize,
+    axis: usize,
+) -> [L; 2] {
+    if !N::ROTATION {
+        return [L::zero(); 2];
+    }
+    let b = record[layout.at(p, layout.arm_b) + axis];
+    let a = if O::HAS_ROW { record[layout.at(p, layout.arm_a) + axis] } else { L::zero() };
+    [a, b]
+}
+
+/// Applies the accumulated impulses of a segment, as the first guess of a step.
+#[inline(always)]
+fn warm_start_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O>(rows, batches, segment, |rows, record, row_a, row_b| {
+        // SAFETY: `Problem::new` checked every row index against the rows.
+        let Pair { mut a, mut b } = unsafe { Pair::<L>::gather::<O>(rows, row_a, row_b) };
+        let n = [record[0], record[1]];
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let mut w = [a[W], b[W]];
+        let (mut sum_n, mut sum_t) = (L::zero(), L::zero());
+        for p in 0..N::POINTS {
+            let normal = record[layout.at(p, layout.normal_impulse)];
+            sum_n = sum_n + normal;
+            spin::<L, N, O>(&mut w, inertia, arms::<L, N, O>(record, &layout, p, 0), normal);
+            if N::FRICTION {
+                let tangent = record[layout.at(p, layout.tangent_impulse)];
+                sum_t = sum_t + tangent;
+                spin::<L, N, O>(&mut w, inertia, arms::<L, N, O>(record, &layout, p, 1), tangent);
+            }
+        }
+        apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
+        // SAFETY: as above.
+        unsafe {
+            L::scatter_velocity(rows, row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+            if O::MOVES {
+                L::scatter_velocity(rows, row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+            }
+        }
+    });
+}
+
+/// One Gauss–Seidel sweep on positions: every overlapping point is pushed apart by the
+/// impulse-like λ = −fraction · s / k, which moves the bodies and leaves velocities alone.
+#[inline(always)]
+fn position_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    fraction: f32,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O>(rows, batches, segment, |rows, record, row_a, row_b| {
+        // SAFETY: `Problem::new` checked every row index against the rows.
+        let Pair { mut a, mut b } = unsafe { Pair::<L>::gather::<O>(rows, row_a, row_b) };
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let mut moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
+        let mut angle = [a[TURN], b[TURN]];
+        let mut sum = L::zero();
+        for p in 0..N::POINTS {
+            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+            let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
+            let mut separation = record[layout.at(p, layout.separation)] + moved;
+            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let push = (-(mass * separation) * L::splat(fraction)).max(L::zero());
+            sum = sum + push;
+            moved = mass_sum.mul_add(push, moved);
+            spin::<L, N, O>(&mut angle, inertia, arm_n, push);
+        }
+        let (x, y) = (n[0] * sum, n[1] * sum);
+        b[DX] = b[INV_MASS].mul_add(x, b[DX]);
+        b[DY] = b[INV_MASS].mul_add(y, b[DY]);
+        // SAFETY: as above.
+        unsafe { L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]) };
+        if O::MOVES {
+            a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
+            a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
+            // SAFETY: as above.
+            unsafe { L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]) };
+        }
+    });
+}
+
+/// Walks the batches of a segment: `visit(rows, record, row_a, row_b)`.
+#[inline(always)]
+pub(super) fn for_each_batch<L: Lanes, N: KernelNeeds, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    mut visit: impl FnMut(&mut [BodyRow], &mut [L], &[u32], &[u32]),
+) {
+    let stride = const { Layout::of::<N, O>().stride };
+    let slab: &mut [L] = bytemuck::cast_slice_mut(&mut batches.slab);
+    let records = &mut slab[segment.first_vector..][..segment.batches * stride];
+    let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
+    let row_a = batches.row_a[lanes.clone()].chunks_exact(L::WIDTH);
+    let row_b = batches.row_b[lanes].chunks_exact(L::WIDTH);
+    for ((record, row_a), row_b) in records.chunks_exact_mut(stride).zip(row_a).zip(row_b) {
+        visit(rows, record, row_a, row_b);
+    }
+}
+
+/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
+macro_rules! over_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)?; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.segments.len() {
+            let segment = $batches.segments[i];
+            match segment.opposite {
+                OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)?>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)?>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)?>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(super) use over_segments;
+
+/// One velocity sweep over all segments, in order.
+#[inline(never)]
+pub fn sweep<L: Lanes, N: KernelNeeds, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
+    over_segments!(sweep_segment, L, N, R; rows, batches, rule);
+}
+
+/// Applies all accumulated impulses.
+#[inline(never)]
+pub fn warm_start<L: Lanes, N: KernelNeeds>(rows: &mut [BodyRow], batches: &mut Batches) {
+    over_segments!(warm_start_segment, L, N; rows, batches);
+}
+
+/// One position sweep over all segments, in order.
+#[inline(never)]
+pub fn position_sweep<L: Lanes, N: KernelNeeds>(rows: &mut [BodyRow], batches: &mut Batches, fraction: f32) {
+    over_segments!(position_segment, L, N; rows, batches, fraction);
+}
