@@ -28,6 +28,10 @@ pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
 /// Fastest speed at which overlap is pushed apart (m/s).
 pub const MAX_PUSH_SPEED: f32 = 3.0;
 
+/// Most overlap that one position sweep removes at a point (m): more would turn bodies
+/// further than a linearised contact can follow.
+pub const MAX_POSITION_CORRECTION: f32 = 0.2;
+
 /// Approach speeds below this do not bounce (m/s).
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 

@@ -45,6 +45,7 @@
 use super::batches::{Batches, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use crate::lanes::{BodyRow, Lanes};
+use crate::params::MAX_POSITION_CORRECTION;
 
 /// How a solver turns the state of a normal row into its new accumulated impulse.
 ///
@@ -297,7 +298,8 @@ fn position_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             let mass = record[layout.at(p, layout.normal_mass)];
-            let push = (-(mass * separation) * L::splat(fraction)).max(L::zero());
+            let overlap = (-separation).max(L::zero()).min(L::splat(MAX_POSITION_CORRECTION));
+            let push = mass * overlap * L::splat(fraction);
             sum = sum + push;
             moved = mass_sum.mul_add(push, moved);
             spin::<L, N, O>(&mut angle, inertia, arm_n, push);

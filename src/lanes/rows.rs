@@ -60,15 +60,24 @@ pub unsafe fn scatter_1<const HALF: usize>(rows: &mut [BodyRow], index: &[u32], 
 /// # Safety
 /// `index` holds at least 4 entries, each less than `rows.len()`.
 #[inline(always)]
-pub unsafe fn gather_4(rows: &[BodyRow], index: &[u32]) -> [f32x4; 8] {
+unsafe fn load_transposed_4<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [f32x4; 4] {
     // SAFETY: the caller keeps `index` in bounds; half rows are 16-byte aligned as `f32x4` is.
-    let (low, high) = unsafe {
-        (
-            [0, 1, 2, 3].map(|k| *half::<0>(rows, index, k).cast::<f32x4>()),
-            [0, 1, 2, 3].map(|k| *half::<1>(rows, index, k).cast::<f32x4>()),
-        )
-    };
-    let (l, h) = (f32x4::transpose(low), f32x4::transpose(high));
+    f32x4::transpose(unsafe {
+        [
+            *half::<HALF>(rows, index, 0).cast::<f32x4>(),
+            *half::<HALF>(rows, index, 1).cast::<f32x4>(),
+            *half::<HALF>(rows, index, 2).cast::<f32x4>(),
+            *half::<HALF>(rows, index, 3).cast::<f32x4>(),
+        ]
+    })
+}
+
+/// # Safety
+/// `index` holds at least 4 entries, each less than `rows.len()`.
+#[inline(always)]
+pub unsafe fn gather_4(rows: &[BodyRow], index: &[u32]) -> [f32x4; 8] {
+    // SAFETY: the caller keeps `index` in bounds.
+    let (l, h) = unsafe { (load_transposed_4::<0>(rows, index), load_transposed_4::<1>(rows, index)) };
     [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]]
 }
 
@@ -114,14 +123,35 @@ mod avx {
         }
     }
 
+    /// Half rows of bodies `k` and `4 + k`, one per 128-bit lane.
+    ///
+    /// # Safety
+    /// `index` holds at least 8 entries, each less than `rows.len()`.
     #[inline(always)]
-    unsafe fn load<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [__m256; 4] {
+    unsafe fn load<const HALF: usize>(rows: &[BodyRow], index: &[u32], k: usize) -> __m256 {
         // SAFETY: the caller keeps the 8 indices in bounds; half a row is four floats.
-        transpose([0, 1, 2, 3].map(|k| unsafe {
+        unsafe {
             let low = _mm_load_ps(half::<HALF>(rows, index, k));
             let high = _mm_load_ps(half::<HALF>(rows, index, 4 + k));
             _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high)
-        }))
+        }
+    }
+
+    /// # Safety
+    /// `index` holds at least 8 entries, each less than `rows.len()`.
+    #[inline(always)]
+    unsafe fn load_transposed<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [f32x8; 4] {
+        // SAFETY: the caller keeps the indices in bounds. Calls written out, because a
+        // closure under `map` is not always inlined.
+        let t = transpose(unsafe {
+            [
+                load::<HALF>(rows, index, 0),
+                load::<HALF>(rows, index, 1),
+                load::<HALF>(rows, index, 2),
+                load::<HALF>(rows, index, 3),
+            ]
+        });
+        [from_m256(t[0]), from_m256(t[1]), from_m256(t[2]), from_m256(t[3])]
     }
 
     /// # Safety
@@ -129,18 +159,19 @@ mod avx {
     #[inline(always)]
     pub unsafe fn gather_8(rows: &[BodyRow], index: &[u32]) -> [f32x8; 8] {
         // SAFETY: the caller keeps `index` in bounds.
-        let (l, h) = unsafe { (load::<0>(rows, index), load::<1>(rows, index)) };
-        [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]].map(f32x8::from_m256)
+        let (l, h) = unsafe { (load_transposed::<0>(rows, index), load_transposed::<1>(rows, index)) };
+        [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]]
     }
 
     /// # Safety
     /// `index` holds at least 8 entries, each less than `rows.len()`.
     #[inline(always)]
     pub unsafe fn scatter_8<const HALF: usize>(rows: &mut [BodyRow], index: &[u32], v: [f32x8; 4]) {
-        for (k, row) in transpose(v.map(f32x8::into_m256)).into_iter().enumerate() {
+        let t = transpose([into_m256(v[0]), into_m256(v[1]), into_m256(v[2]), into_m256(v[3])]);
+        for (k, row) in t.into_iter().enumerate() {
+            let row = wide_barrier(row);
             // SAFETY: the caller keeps the 8 indices in bounds; half rows are 16-byte aligned.
             unsafe {
-                let row = wide_barrier(row);
                 _mm_store_ps(half_mut::<HALF>(rows, index, k), _mm256_castps256_ps128(row));
                 _mm_store_ps(half_mut::<HALF>(rows, index, 4 + k), _mm256_extractf128_ps::<1>(row));
             }
@@ -156,22 +187,16 @@ mod avx {
         v
     }
 
-    trait Convert {
-        fn from_m256(v: __m256) -> Self;
-        fn into_m256(self) -> __m256;
+    #[inline(always)]
+    fn from_m256(v: __m256) -> f32x8 {
+        // SAFETY: both are 32 bytes of plain floats.
+        unsafe { std::mem::transmute(v) }
     }
 
-    impl Convert for f32x8 {
-        #[inline(always)]
-        fn from_m256(v: __m256) -> Self {
-            // SAFETY: both are 32 bytes of plain floats.
-            unsafe { std::mem::transmute(v) }
-        }
-        #[inline(always)]
-        fn into_m256(self) -> __m256 {
-            // SAFETY: both are 32 bytes of plain floats.
-            unsafe { std::mem::transmute(self) }
-        }
+    #[inline(always)]
+    fn into_m256(v: f32x8) -> __m256 {
+        // SAFETY: both are 32 bytes of plain floats.
+        unsafe { std::mem::transmute(v) }
     }
 }
 
@@ -198,17 +223,36 @@ mod avx512 {
         }
     }
 
+    /// Half rows of bodies `k`, `4 + k`, `8 + k` and `12 + k`, one per 128-bit lane.
+    ///
+    /// # Safety
+    /// `index` holds at least 16 entries, each less than `rows.len()`.
     #[inline(always)]
-    unsafe fn load<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [__m512; 4] {
-        // A masked broadcast load drops half a row into one 128-bit lane without a shuffle.
+    unsafe fn load<const HALF: usize>(rows: &[BodyRow], index: &[u32], k: usize) -> __m512 {
         // SAFETY: the caller keeps the 16 indices in bounds; half a row is four floats.
-        transpose([0, 1, 2, 3].map(|k| unsafe {
-            let at = |q: usize| _mm_load_ps(half::<HALF>(rows, index, 4 * q + k));
-            let v = _mm512_castps128_ps512(at(0));
-            let v = _mm512_mask_broadcast_f32x4(v, 0x00f0, at(1));
-            let v = _mm512_mask_broadcast_f32x4(v, 0x0f00, at(2));
-            _mm512_mask_broadcast_f32x4(v, 0xf000, at(3))
-        }))
+        unsafe {
+            let v = _mm512_castps128_ps512(_mm_load_ps(half::<HALF>(rows, index, k)));
+            let v = _mm512_insertf32x4::<1>(v, _mm_load_ps(half::<HALF>(rows, index, 4 + k)));
+            let v = _mm512_insertf32x4::<2>(v, _mm_load_ps(half::<HALF>(rows, index, 8 + k)));
+            _mm512_insertf32x4::<3>(v, _mm_load_ps(half::<HALF>(rows, index, 12 + k)))
+        }
+    }
+
+    /// # Safety
+    /// `index` holds at least 16 entries, each less than `rows.len()`.
+    #[inline(always)]
+    unsafe fn load_transposed<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [f32x16; 4] {
+        // SAFETY: the caller keeps the indices in bounds. Calls written out, because a
+        // closure under `map` is not always inlined.
+        let t = transpose(unsafe {
+            [
+                load::<HALF>(rows, index, 0),
+                load::<HALF>(rows, index, 1),
+                load::<HALF>(rows, index, 2),
+                load::<HALF>(rows, index, 3),
+            ]
+        });
+        [from_m512(t[0]), from_m512(t[1]), from_m512(t[2]), from_m512(t[3])]
     }
 
     /// # Safety
@@ -216,15 +260,16 @@ mod avx512 {
     #[inline(always)]
     pub unsafe fn gather_16(rows: &[BodyRow], index: &[u32]) -> [f32x16; 8] {
         // SAFETY: the caller keeps `index` in bounds.
-        let (l, h) = unsafe { (load::<0>(rows, index), load::<1>(rows, index)) };
-        [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]].map(from_m512)
+        let (l, h) = unsafe { (load_transposed::<0>(rows, index), load_transposed::<1>(rows, index)) };
+        [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]]
     }
 
     /// # Safety
     /// `index` holds at least 16 entries, each less than `rows.len()`.
     #[inline(always)]
     pub unsafe fn scatter_16<const HALF: usize>(rows: &mut [BodyRow], index: &[u32], v: [f32x16; 4]) {
-        for (k, row) in transpose(v.map(into_m512)).into_iter().enumerate() {
+        let t = transpose([into_m512(v[0]), into_m512(v[1]), into_m512(v[2]), into_m512(v[3])]);
+        for (k, row) in t.into_iter().enumerate() {
             let row = wide_barrier(row);
             // SAFETY: the caller keeps the 16 indices in bounds; half rows are 16-byte aligned.
             unsafe {
