@@ -1,6 +1,8 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory for contact solvers.
 
 pub mod bodies;
+pub mod broadphase;
+pub mod coloring;
 pub mod contacts;
 pub mod error;
 pub mod lanes;
