@@ -1,0 +1,17 @@
+//! Every pair tested: the definition that the other kinds are held to.
+
+use super::Proxy;
+
+/// Writes every `[i, j]`, i < j, with `proxies[i].may_touch(&proxies[j])` to `out`, ascending.
+///
+/// n(n − 1)/2 tests and no memory of its own.
+pub fn all_pairs(proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
+    out.clear();
+    for (i, a) in proxies.iter().enumerate() {
+        for (j, b) in proxies.iter().enumerate().skip(i + 1) {
+            if a.may_touch(b) {
+                out.push([i as u32, j as u32]);
+            }
+        }
+    }
+}
