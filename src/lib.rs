@@ -4,6 +4,7 @@ pub mod bodies;
 pub mod contacts;
 pub mod error;
 pub mod lanes;
+pub mod narrowphase;
 pub mod params;
 pub mod shapes;
 pub mod solvers;
