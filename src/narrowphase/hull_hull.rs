@@ -123,24 +123,26 @@ fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32
     let (mut h_left, mut h_right) = (height(left), height(right));
     let (mut s_left, mut s_right) = (along(left), along(right));
 
-    let (s, h) = if h_left < h_right { (s_left, h_left) } else { (s_right, h_right) };
-    if h > 0.0 && (s < 0.0 || s > length) {
-        // The deepest vertex q stands past an end p of the face. Of its two edges take the
-        // one that leads back over the face: unless it comes closer, p and q are closest.
-        // A flush edge over the face counts as coming closer, so that aligned boxes keep
-        // both points however they tremble; the distance is then off by 1 in 10⁴ at most.
-        let q = if h_left < h_right { left } else { right };
+    // The deepest vertex q. A flush edge has no deepest end but by rounding: there, q is
+    // the end nearer to the face, and an edge over the face needs no q, so that aligned
+    // boxes keep both points however they tremble. The distance is off by 1 in 10⁴ at most.
+    let flush = normal.dot(i.normal(left)) < FLUSH;
+    let q_is_left = if flush { s_left < 0.0 } else { h_left < h_right };
+    let (q, s, h) = if q_is_left { (left, s_left, h_left) } else { (right, s_right, h_right) };
+    let over = flush && s_left >= 0.0 && s_right <= length;
+    if h > 0.0 && (s < 0.0 || s > length) && !over {
+        // It stands past an end p of the face. Of its two edges take the one that leads
+        // back over the face: unless that comes closer to p, p and q are closest.
         let end = if s < 0.0 { first } else { second };
-        (left, right) = if s < 0.0 { (i.previous(q), q) } else { (q, i.next(q)) };
-        (h_left, h_right) = (height(left), height(right));
-        (s_left, s_right) = (along(left), along(right));
         let apart = i.vertex(q) - r.vertex(end);
-        let back = (i.vertex(left) - i.vertex(right)) * if s < 0.0 { 1.0 } else { -1.0 };
-        let flush = i.normal(left).dot(normal) < FLUSH && s_left > 0.0 && s_right < length;
+        (left, right) = if s < 0.0 { (i.previous(q), q) } else { (q, i.next(q)) };
+        let back = if s < 0.0 { i.vertex(left) - i.vertex(q) } else { i.vertex(right) - i.vertex(q) };
         let distinct = apart.length_squared() > VERTEX_TOLERANCE * VERTEX_TOLERANCE;
-        if apart.dot(back) >= 0.0 && !flush && distinct {
+        if apart.dot(back) >= 0.0 && distinct {
             return vertex_pair(r, end, i, q, speculative);
         }
+        (h_left, h_right) = (height(left), height(right));
+        (s_left, s_right) = (along(left), along(right));
     }
 
     // Cut the edge to 0 ≤ s ≤ length. Fractions are clamped, so an edge that misses the
