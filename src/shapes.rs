@@ -246,8 +246,7 @@ impl Shape {
 
         // Twice the signed area; clockwise input is negative and read backwards.
         let given: Vec<DVec2> = vertices.iter().map(|v| v.as_dvec2()).collect();
-        let area2: f64 =
-            (1..n - 1).map(|i| (given[i] - given[0]).perp_dot(given[i + 1] - given[0])).sum();
+        let area2: f64 = (1..n - 1).map(|i| (given[i] - given[0]).perp_dot(given[i + 1] - given[0])).sum();
         let index = |i: usize| if area2 < 0.0 { n - 1 - i % n } else { i % n };
         let at = |i: usize| given[index(i)];
         let fail = |i: usize, what: &str| {
