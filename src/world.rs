@@ -414,10 +414,11 @@ impl World {
                     let Group { contacts, edges, coloring } = group;
                     coloring.assign(edges, self.bodies.kind.len());
                     let contact = |&edge: &u32| contacts[edge as usize];
-                    for color in coloring.colors() {
-                        lanes.push_segment(kind, &layout, color.iter().map(contact), inert, bodies);
-                        colors += 1;
+                    for color in 0..coloring.colors() {
+                        let edges = coloring.color(color).iter();
+                        lanes.push_segment(kind, &layout, edges.map(contact), inert, bodies);
                     }
+                    colors += coloring.colors();
                     let rest = coloring.overflow();
                     serial.push_segment(kind, &layout, rest.iter().map(contact), inert, bodies);
                     overflow += rest.len();

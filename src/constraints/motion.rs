@@ -80,12 +80,7 @@ impl Motion {
             // Where nothing can turn a body, it is to be seen that nothing does.
             let inv_inertia = if needs.rotation { bodies.inv_inertia[i] } else { 0.0 };
             rows.push(BodyRow {
-                velocity: [
-                    bodies.velocity_x[i],
-                    bodies.velocity_y[i],
-                    bodies.angular_velocity[i],
-                    inv_mass,
-                ],
+                velocity: [bodies.velocity_x[i], bodies.velocity_y[i], bodies.angular_velocity[i], inv_mass],
                 delta: [0.0, 0.0, 0.0, inv_inertia],
             });
             self.kick.push(if bodies.kind[i] == BodyKind::Dynamic {

@@ -3,9 +3,9 @@
 use super::batches::Batches;
 use super::motion::Motion;
 use super::needs::{KernelNeeds, Needs};
+use super::prepare;
 use super::restitution::{self, Bounces};
 use super::sweep::{self, NormalRule};
-use super::prepare;
 use crate::clock::{Clock, Phase};
 use crate::contacts::Contact;
 use crate::lanes::{BodyRow, Lanes};

@@ -183,7 +183,9 @@ mod avx {
     #[inline(always)]
     fn wide_barrier(mut v: __m256) -> __m256 {
         // SAFETY: an empty instruction that claims to read and write one register.
-        unsafe { std::arch::asm!("/* {0} */", inout(ymm_reg) v, options(pure, nomem, nostack, preserves_flags)) };
+        unsafe {
+            std::arch::asm!("/* {0} */", inout(ymm_reg) v, options(pure, nomem, nostack, preserves_flags))
+        };
         v
     }
 
@@ -286,7 +288,9 @@ mod avx512 {
     #[inline(always)]
     fn wide_barrier(mut v: __m512) -> __m512 {
         // SAFETY: an empty instruction that claims to read and write one register.
-        unsafe { std::arch::asm!("/* {0} */", inout(zmm_reg) v, options(pure, nomem, nostack, preserves_flags)) };
+        unsafe {
+            std::arch::asm!("/* {0} */", inout(zmm_reg) v, options(pure, nomem, nostack, preserves_flags))
+        };
         v
     }
 

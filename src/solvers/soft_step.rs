@@ -82,11 +82,7 @@ impl Softness {
         let omega = std::f32::consts::TAU * hertz;
         let denominator = 2.0 * damping_ratio + h * omega;
         let a = h * omega * denominator;
-        Softness {
-            bias_rate: omega / denominator,
-            mass_scale: a / (1.0 + a),
-            impulse_scale: 1.0 / (1.0 + a),
-        }
+        Softness { bias_rate: omega / denominator, mass_scale: a / (1.0 + a), impulse_scale: 1.0 / (1.0 + a) }
     }
 }
 
@@ -105,8 +101,7 @@ impl NormalRule for SoftRule {
     fn normal_impulse<L: Lanes>(&self, stiff: bool, vn: L, separation: L, mass: L, old: L) -> L {
         let soft = if stiff { self.stiff } else { self.dynamic };
         let gap = separation * L::splat(self.inv_h);
-        let push =
-            (separation * L::splat(soft.mass_scale * soft.bias_rate)).max(L::splat(-MAX_PUSH_SPEED));
+        let push = (separation * L::splat(soft.mass_scale * soft.bias_rate)).max(L::splat(-MAX_PUSH_SPEED));
         let bias = separation.select_positive(gap, push);
         let scale = separation.select_positive(L::splat(1.0), L::splat(soft.mass_scale));
         let keep = separation.select_positive(L::splat(1.0), L::splat(1.0 - soft.impulse_scale));
