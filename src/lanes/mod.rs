@@ -254,3 +254,117 @@ use bytemuck::Zeroable;
 wide_lanes!(f32x4, 4, rows::gather_4, scatter_4);
 wide_lanes!(f32x8, 8, rows::gather_8, scatter_8);
 wide_lanes!(f32x16, 16, rows::gather_16, scatter_16);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Awkward values are drawn as often as ordinary ones.
+    fn awkward() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, f32::MIN_POSITIVE, 1e-40, 3e38, -3e38, 1e-7]),
+            -1e3_f32..1e3,
+            any::<f32>().prop_filter("not NaN", |x| !x.is_nan()),
+        ]
+    }
+
+    fn floats<L: Lanes>(v: L) -> Vec<f32> {
+        bytemuck::cast_slice(&[v]).to_vec()
+    }
+
+    fn load<L: Lanes>(values: &[f32]) -> L {
+        let mut v = L::zero();
+        bytemuck::cast_slice_mut(std::slice::from_mut(&mut v)).copy_from_slice(&values[..L::WIDTH]);
+        v
+    }
+
+    fn same_bits(a: f32, b: f32) -> bool {
+        a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+    }
+
+    /// Every operation of one width against the same operation on scalars.
+    fn agrees_with_scalar<L: Lanes>(x: &[f32], y: &[f32], z: &[f32]) -> Result<(), TestCaseError> {
+        let (a, b, c) = (load::<L>(x), load::<L>(y), load::<L>(z));
+        type Scalar = fn(f32, f32, f32) -> f32;
+        let cases: [(&str, L, Scalar); 9] = [
+            ("add", a + b, |a, b, _| a + b),
+            ("sub", a - b, |a, b, _| a - b),
+            ("mul", a * b, |a, b, _| a * b),
+            ("div", a / b, |a, b, _| a / b),
+            ("mul_add", a.mul_add(b, c), |a, b, c| Lanes::mul_add(a, b, c)),
+            ("neg_mul_add", a.neg_mul_add(b, c), |a, b, c| Lanes::neg_mul_add(a, b, c)),
+            ("max", Lanes::max(a, b), |a, b, _| Lanes::max(a, b)),
+            ("min", Lanes::min(a, b), |a, b, _| Lanes::min(a, b)),
+            ("select", a.select_positive(b, c), |a, b, c| Lanes::select_positive(a, b, c)),
+        ];
+        for (name, wide, scalar) in cases {
+            for (lane, got) in floats(wide).into_iter().enumerate() {
+                let want = scalar(x[lane], y[lane], z[lane]);
+                prop_assert!(
+                    same_bits(got, want),
+                    "{name} width {} lane {lane}: {got} for {want}; {} {} {}",
+                    L::WIDTH,
+                    x[lane],
+                    y[lane],
+                    z[lane]
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Gather, then scatter changed halves, against plain indexing.
+    fn moves_rows<L: Lanes>(index: &[u32]) -> Result<(), TestCaseError> {
+        let row = |i: usize| BodyRow {
+            velocity: std::array::from_fn(|k| (10 * i + k) as f32),
+            delta: std::array::from_fn(|k| (10 * i + 4 + k) as f32),
+        };
+        let rows: Vec<BodyRow> = (0..40).map(row).collect();
+        // SAFETY: the indices are distinct, below 40, and at least `WIDTH` of them.
+        let v = unsafe { L::gather(&rows, index) };
+        for (c, v) in v.iter().enumerate() {
+            for (lane, got) in floats(*v).into_iter().enumerate() {
+                prop_assert_eq!(got, (10 * index[lane] as usize + c) as f32);
+            }
+        }
+        let plus = |v: L| v + L::splat(0.5);
+        let (mut velocities, mut deltas) = (rows.clone(), rows.clone());
+        // SAFETY: as above.
+        unsafe {
+            L::scatter_velocity(&mut velocities, index, [plus(v[0]), plus(v[1]), plus(v[2]), plus(v[3])]);
+            L::scatter_delta(&mut deltas, index, [plus(v[4]), plus(v[5]), plus(v[6]), plus(v[7])]);
+        }
+        for i in 0..rows.len() {
+            let hit = index[..L::WIDTH].contains(&(i as u32));
+            let add = if hit { 0.5 } else { 0.0 };
+            prop_assert_eq!(velocities[i].velocity, rows[i].velocity.map(|x| x + add));
+            prop_assert_eq!(velocities[i].delta, rows[i].delta);
+            prop_assert_eq!(deltas[i].delta, rows[i].delta.map(|x| x + add));
+            prop_assert_eq!(deltas[i].velocity, rows[i].velocity);
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn every_width_computes_what_scalars_do(
+            x in prop::collection::vec(awkward(), 16),
+            y in prop::collection::vec(awkward(), 16),
+            z in prop::collection::vec(awkward(), 16),
+        ) {
+            agrees_with_scalar::<f32>(&x, &y, &z)?;
+            agrees_with_scalar::<f32x4>(&x, &y, &z)?;
+            agrees_with_scalar::<f32x8>(&x, &y, &z)?;
+            agrees_with_scalar::<f32x16>(&x, &y, &z)?;
+        }
+
+        #[test]
+        fn every_width_gathers_and_scatters(index in Just((0..40_u32).collect::<Vec<_>>()).prop_shuffle()) {
+            moves_rows::<f32>(&index)?;
+            moves_rows::<f32x4>(&index)?;
+            moves_rows::<f32x8>(&index)?;
+            moves_rows::<f32x16>(&index)?;
+        }
+    }
+}
