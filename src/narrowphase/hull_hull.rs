@@ -109,7 +109,7 @@ impl Local {
 #[inline(always)]
 fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32) -> Local {
     let normal = r.normal(face);
-    // Along the face; counter-clockwise, so the face is to the left of its normal.
+    // Along the face, from its first to its second vertex: counter-clockwise is left of the normal.
     let tangent = normal.perp();
     let (first, second) = (face, r.next(face));
     let v1 = r.vertex(first);
@@ -142,9 +142,10 @@ fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32
     // Cut the edge to 0 ≤ s ≤ length. Fractions are clamped, so an edge that misses the
     // range leaves its nearer end, and one without extent leaves both of its (equal) ends.
     let extent = s_left - s_right;
-    let per_extent = if extent > 0.0 { extent.recip() } else { 0.0 };
+    let wide = extent > f32::MIN_POSITIVE;
+    let per_extent = if wide { extent.recip() } else { 0.0 };
     let from = ((s_left - length) * per_extent).clamp(0.0, 1.0);
-    let to = if extent > 0.0 { (s_left * per_extent).clamp(0.0, 1.0) } else { 1.0 };
+    let to = if wide { (s_left * per_extent).clamp(0.0, 1.0) } else { 1.0 };
 
     let radii = r.radius + i.radius;
     let edge = i.vertex(right) - i.vertex(left);
