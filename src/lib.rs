@@ -7,4 +7,5 @@ pub mod lanes;
 pub mod params;
 pub mod shapes;
 pub mod solvers;
+pub mod truth;
 pub mod world;
