@@ -12,14 +12,14 @@
 //TMP pub mod frozen;
 pub mod gallery;
 pub mod lcp;
-//TMP pub mod newton;
-//TMP pub mod nncg;
+pub mod newton;
+pub mod nncg;
 pub mod problem;
-//TMP pub mod rates;
+pub mod rates;
 //TMP pub mod reference;
 pub mod residual;
 //TMP pub mod statics;
 pub mod stewart_trinkle;
-//TMP pub mod sweeps;
+pub mod sweeps;
 
 pub use problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};

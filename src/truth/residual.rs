@@ -133,12 +133,12 @@ pub fn project_cone(mu: f64, [ln, lt]: Pair) -> Pair {
 }
 
 /// max(x, 0) that hands NaN on, so that a blown-up solver cannot look exact.
-fn positive(x: f64) -> f64 {
+pub(super) fn positive(x: f64) -> f64 {
     if x <= 0.0 { 0.0 } else { x }
 }
 
 /// x clamped to [−radius, radius]; NaN stays NaN.
-fn clamp(x: f64, radius: f64) -> f64 {
+pub(super) fn clamp(x: f64, radius: f64) -> f64 {
     if x > radius {
         radius
     } else if x < -radius {

@@ -15,7 +15,7 @@
 //! converges.
 
 use super::problem::{ContactProblem, Pair, Velocity};
-use super::residual::{OwnRow, Target, natural_map};
+use super::residual::{OwnRow, Target, clamp, natural_map, positive};
 
 /// When an iteration ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,15 +70,15 @@ impl Rows {
         Rows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
     }
 
-    /// What contact `i` alone would have, given velocities that include its present impulse; the
-    /// tangential part sees `velocities` as they are after `between` was told the normal change.
+    /// Normal impulse that would satisfy row `i` alone; NaN stays NaN, so that divergence shows.
     fn normal(&self, i: usize, vn: f64, ln: f64) -> f64 {
         let un = vn + self.law[i].bias + self.law[i].compliance * ln;
-        (ln - un * self.inverse[i][0]).max(0.0)
+        positive(ln - un * self.inverse[i][0])
     }
 
+    /// Tangential impulse that would satisfy row `i` alone, within ±`radius`.
     fn tangent(&self, i: usize, ut: f64, lt: f64, radius: f64) -> f64 {
-        (lt - ut * self.inverse[i][1]).clamp(-radius, radius)
+        clamp(lt - ut * self.inverse[i][1], radius)
     }
 }
 
@@ -246,12 +246,12 @@ mod tests {
             for (p, exact) in [(heavy_on_light(r), r / (1.0 + r)), (light_on_heavy(r), 1.0 / (1.0 + r))] {
                 let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Forward, DEEP);
                 assert_eq!(run.status, Status::Converged);
-                // Light on heavy is done in a few sweeps at r = 100 and more: no decade to fit.
-                if exact > 0.05 {
+                // Light on heavy gains more than a decade per sweep or two: nothing to fit.
+                if exact > 0.2 {
                     let measured = rate(&run.history).unwrap();
                     assert!((measured - exact).abs() < 1e-6, "{}: {measured} is not {exact}", p.name);
                 } else {
-                    assert!(run.history.len() < 10);
+                    assert!(run.history.len() < 15);
                     assert!((run.history[2] / run.history[1] - exact).abs() < 1e-6);
                 }
             }
