@@ -16,9 +16,9 @@ pub mod newton;
 pub mod nncg;
 pub mod problem;
 pub mod rates;
-//TMP pub mod reference;
+pub mod reference;
 pub mod residual;
-//TMP pub mod statics;
+pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
 

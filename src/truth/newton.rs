@@ -18,7 +18,9 @@
 //! point method, which converges to the solution nearest to where it starts, by ε/(σ + ε) along
 //! each singular value σ. Where no fraction of the step lowers the merit, Gauss–Seidel sweeps (a
 //! number that doubles each time) take over.
-//! **Fails when** no sweeps come near a solution, as in some problems of large friction.
+//! **Fails when** no sweeps come near a solution, and slowly on large hyperstatic piles near
+//! slipping: a pyramid of 4760 points at µ = 0.1 still changes states after 60 steps, where
+//! [`super::nncg`] converges.
 
 use super::problem::{Block, ContactProblem, Pair};
 use super::residual::{Target, contact_residuals};
@@ -31,9 +33,10 @@ use faer::Col;
 const SWEEPS: usize = 20;
 /// Most sweeps between two Newton steps.
 const MOST_SWEEPS: usize = 1280;
-/// Shift ε of the unit diagonal: small against the least nonzero eigenvalue of a pile (10⁻⁵), large
-/// against rounding.
-const SHIFT: f64 = 1e-9;
+/// Shift ε of the unit diagonal: small against the least nonzero eigenvalues of a pile. LU leaves
+/// noise of 10⁻¹⁶/ε in undetermined impulses; at ε = 10⁻⁹ that noise kept switching the states of
+/// contacts on an edge, and a pyramid of 40 rows stalled at a residual of 10⁻⁶.
+const SHIFT: f64 = 1e-6;
 /// Proximal steps per linear solve.
 const PROXIMAL_STEPS: usize = 8;
 /// Halvings of a step before it counts as failed.
@@ -251,22 +254,6 @@ mod tests {
         solve(&painleve_rod(1e-3));
         solve(&wedge(0.25, 0.5));
         solve(&plank(&[-1.5, -0.5, 0.5, 1.5], 0.5));
-    }
-
-    #[test]
-    #[ignore]
-    fn probe() {
-        for (base, mu) in [(20, 0.6), (40, 0.6), (60, 0.6), (40, 0.0), (40, 0.1), (100, 0.6)] {
-            let p = box_pyramid(base, mu);
-            let t = std::time::Instant::now();
-            let run = newton(&p, Target::Rigid, &vec![[0.0; 2]; p.contacts.len()], TIGHT);
-            println!("{base} {mu} nc {} {:?} {:?} {:?} norm {:e}", p.contacts.len(), t.elapsed(), run.status, run.history, p.mass_norm(&run.velocities));
-            if base <= 40 {
-            let t = std::time::Instant::now();
-            let run = super::super::nncg::nncg(&p, Target::Rigid, &vec![[0.0; 2]; p.contacts.len()], Stop{tolerance:1e-13, iterations: 5000});
-            println!("  nncg {:?} {:?} {} {:e} norm {:e}",  t.elapsed(), run.status, run.history.len(), run.history.last().unwrap(), p.mass_norm(&run.velocities));
-            }
-        }
     }
 
     #[test]
