@@ -155,9 +155,8 @@ pub fn box_pyramid(base: usize, friction: f64) -> ContactProblem {
     let mut below: Vec<u32> = Vec::new();
     for row in 0..base {
         let (y, x0) = (row as f64, 0.5 * row as f64);
-        let boxes: Vec<u32> = (0..base - row)
-            .map(|i| p.body([x0 + i as f64, y + 0.5], 1.0, 1.0 / 6.0, [0.0; 3]))
-            .collect();
+        let boxes: Vec<u32> =
+            (0..base - row).map(|i| p.body([x0 + i as f64, y + 0.5], 1.0, 1.0 / 6.0, [0.0; 3])).collect();
         for (i, &b) in boxes.iter().enumerate() {
             let x = x0 + i as f64;
             if i > 0 {

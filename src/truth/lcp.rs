@@ -162,8 +162,8 @@ impl Tableau {
         let (ti, tk) = (self.row(i)[column], self.row(k)[column]);
         let mut place = vec![None; 2 * self.n + 1];
         self.nonbasic.iter().enumerate().for_each(|(j, &v)| place[v] = Some(j));
-        for w in 0..self.n {
-            let inverse_entry = |row: usize| match place[w] {
+        for (w, &place) in place.iter().enumerate().take(self.n) {
+            let inverse_entry = |row: usize| match place {
                 Some(j) => self.row(row)[j],
                 None => f64::from(u8::from(self.basic[row] == w)),
             };

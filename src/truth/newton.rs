@@ -25,9 +25,9 @@
 use super::problem::{Block, ContactProblem, Pair};
 use super::residual::{Target, contact_residuals};
 use super::sweeps::{Run, Status, Stop, Sweep, pgs};
+use faer::Col;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
-use faer::Col;
 
 /// Symmetric sweeps before the first Newton step; doubled every time that a step fails.
 const SWEEPS: usize = 20;
@@ -136,8 +136,8 @@ fn solve_states(
             State::Slip(_) => 1,
             State::Stick => 2,
         };
-        for direction in 0..directions {
-            index[i][direction] = unknowns.len();
+        for (direction, index) in index[i].iter_mut().enumerate().take(directions) {
+            *index = unknowns.len();
             unknowns.push((i, direction));
         }
     }

@@ -55,7 +55,12 @@ mod tests {
             let slow = pgs(&p, Target::Rigid, &cold, Sweep::Symmetric, stop);
             assert_eq!(fast.status, Status::Converged);
             let sweeps = |history: &[f64]| iterations_to(history, 1e-4).unwrap();
-            assert!(3 * sweeps(&fast.history) < sweeps(&slow.history), "n {n}: {} {}", sweeps(&fast.history), sweeps(&slow.history));
+            assert!(
+                3 * sweeps(&fast.history) < sweeps(&slow.history),
+                "n {n}: {} {}",
+                sweeps(&fast.history),
+                sweeps(&slow.history)
+            );
             for (i, l) in fast.impulses.iter().enumerate() {
                 let load = (n - i) as f64 / 24.0;
                 // The residual 1e-12 times the condition number, some n².

@@ -90,8 +90,7 @@ impl ProblemContact {
     /// Write r = α n + β t. Since t × n = 1, r × n = β and r × t = −α.
     pub fn anchors(&self) -> [[f64; 2]; 2] {
         let (n, t) = (self.normal, self.tangent());
-        [self.arm_a, self.arm_b]
-            .map(|[rn, rt]| [-rt * n[0] + rn * t[0], -rt * n[1] + rn * t[1]])
+        [self.arm_a, self.arm_b].map(|[rn, rt]| [-rt * n[0] + rn * t[0], -rt * n[1] + rn * t[1]])
     }
 
     /// (un, ut) = J v of this contact (m/s).
@@ -320,5 +319,131 @@ fn finite(place: impl Into<String>, values: &[f64]) -> Result<(), Error> {
     match values.iter().find(|x| !x.is_finite()) {
         Some(x) => Err(Error::invalid(place, format!("{x} is not a finite number"))),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::truth::gallery::{box_pyramid, sliding_box};
+
+    /// Two bodies, one contact at an oblique normal; b of 2 kg and 0.5 kg·m², a of 1 kg, 0.25 kg·m².
+    fn oblique() -> ContactProblem {
+        let body = |inv_mass, inv_inertia, v: Velocity| ProblemBody {
+            inv_mass,
+            inv_inertia,
+            velocity: v,
+            free_velocity: [v[0], v[1] - 1.0, v[2]],
+        };
+        let contact = ProblemContact {
+            body_a: Some(0),
+            body_b: Some(1),
+            manifold: 0,
+            normal: [0.6, 0.8],
+            // r_a = (1, 2): r × n = 0.8 − 1.2 = −0.4, t = (0.8, −0.6), r × t = −0.6 − 1.6 = −2.2.
+            arm_a: [-0.4, -2.2],
+            // r_b = (−1, 1): −0.8 − 0.6 = −1.4, 0.6 − 0.8 = −0.2.
+            arm_b: [-1.4, -0.2],
+            gap: 0.0,
+            friction: 0.5,
+            rebound: 0.0,
+            warm_impulse: [0.0; 2],
+        };
+        let bodies = vec![body(1.0, 4.0, [1.0, 0.0, 2.0]), body(0.5, 2.0, [0.0, 3.0, -1.0])];
+        ContactProblem { name: "oblique".into(), h: 0.1, bodies, contacts: vec![contact] }
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-14, "{a} is not {b}");
+    }
+
+    #[test]
+    fn relative_velocity_by_hand() {
+        let p = oblique();
+        let v: Vec<Velocity> = p.bodies.iter().map(|b| b.velocity).collect();
+        // v at the point: a (1, 0) + 2 (−2, 1) = (−3, 2); b (0, 3) − (−1, −1) = (1, 4); b − a = (4, 2).
+        let [un, ut] = p.contacts[0].velocity(&v);
+        close(un, 0.6 * 4.0 + 0.8 * 2.0);
+        close(ut, 0.8 * 4.0 - 0.6 * 2.0);
+        let [a, b] = p.contacts[0].anchors();
+        [(a, [1.0, 2.0]), (b, [-1.0, 1.0])].iter().for_each(|(x, y)| {
+            close(x[0], y[0]);
+            close(x[1], y[1]);
+        });
+    }
+
+    #[test]
+    fn impulses_and_delassus_by_hand() {
+        let p = oblique();
+        // λ = (1, 0): b gains (0.3, 0.4, −2.8), a loses (0.6, 0.8, −1.6).
+        let v = p.velocities(&[[1.0, 0.0]]);
+        let expected = [[1.0 - 0.6, -1.0 - 0.8, 2.0 + 1.6], [0.3, 2.0 + 0.4, -1.0 - 2.8]];
+        v.iter().flatten().zip(expected.iter().flatten()).for_each(|(a, b)| close(*a, *b));
+        // G_nn = 1 + 4·0.16 + 0.5 + 2·1.96, G_tt = 1 + 4·4.84 + 0.5 + 2·0.04, G_nt = 4·0.88 + 2·0.28.
+        let g = p.delassus();
+        close(g[(0, 0)], 6.06);
+        close(g[(1, 1)], 20.94);
+        close(g[(0, 1)], 4.08);
+        close(g[(1, 0)], 4.08);
+        assert_eq!(p.delassus_diagonal(), [[g[(0, 0)], g[(1, 1)]]]);
+        let impulse = p.body_impulses(&[[1.0, 1.0]]);
+        close(impulse[1][0], 1.4);
+        close(impulse[1][2], -1.6);
+        close(impulse[0][2], 2.6);
+    }
+
+    #[test]
+    fn dense_delassus_equals_its_product() {
+        let p = box_pyramid(3, 0.5);
+        let l: Vec<Pair> =
+            (0..p.contacts.len()).map(|i| [(i as f64).sin(), (2.0 * i as f64).cos()]).collect();
+        let g = p.delassus();
+        for (i, u) in p.delassus_product(&l).iter().enumerate() {
+            for d in 0..2 {
+                let sum: f64 = (0..l.len())
+                    .map(|j| g[(2 * i + d, 2 * j)] * l[j][0] + g[(2 * i + d, 2 * j + 1)] * l[j][1])
+                    .sum();
+                // Sums of some 50 terms of order 1.
+                assert!((sum - u[d]).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn norms_and_scales_by_hand() {
+        let p = oblique();
+        // m = 1, I = 0.25 and m = 2, I = 0.5: 1 + 4·0.25 + 2·9 + 1·0.5 = 20.5.
+        close(p.mass_norm(&[[1.0, 0.0, 2.0], [0.0, 3.0, -1.0]]), 20.5f64.sqrt());
+        assert_eq!(p.loads(), [[0.0, -1.0, 0.0], [0.0, -2.0, 0.0]]);
+        assert_eq!((p.total_load(), p.impulse_unit()), (3.0, 2.0));
+        // ‖v* − v‖ = √3; a reference at rest, an answer off by 1 m/s on the 1 kg body.
+        let rest = [[0.0; 3]; 2];
+        close(p.velocity_error(&[[1.0, 0.0, 0.0], [0.0; 3]], &rest), 1.0 / 3.0f64.sqrt());
+        assert_eq!(p.velocity_error(&rest, &rest), 0.0);
+        let mut floating = p.clone();
+        floating.bodies.iter_mut().for_each(|b| b.free_velocity = b.velocity);
+        assert_eq!((floating.total_load(), floating.impulse_unit()), (0.0, 6.0));
+    }
+
+    #[test]
+    fn bad_problems_are_named() {
+        type Spoil = fn(&mut ContactProblem);
+        let spoils: [(Spoil, &str); 8] = [
+            (|p| p.h = 0.0, "h: the step is 0 s"),
+            (|p| p.bodies[0].velocity[2] = f64::NAN, "bodies[0]: NaN"),
+            (|p| p.bodies[0].inv_mass = -1.0, "bodies[0]: inv_mass is -1"),
+            (|p| p.contacts[1].body_b = Some(3), "contacts[1]: names body 3 of 1"),
+            (|p| p.contacts[1].normal = [0.0, 1.1], "contacts[1]: the normal has length 1.1"),
+            (|p| p.contacts[0].friction = -0.1, "contacts[0]: friction is -0.1"),
+            (|p| p.contacts[0].body_b = None, "contacts[0]: both sides"),
+            (|p| (p.bodies[0].inv_mass, p.bodies[0].inv_inertia) = (0.0, 0.0), "contacts[0]: no side"),
+        ];
+        sliding_box().validate().unwrap();
+        for (spoil, message) in spoils {
+            let mut p = sliding_box();
+            spoil(&mut p);
+            let error = p.validate().unwrap_err().to_string();
+            assert!(error.starts_with(message), "{error}");
+        }
     }
 }

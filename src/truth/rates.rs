@@ -98,7 +98,10 @@ mod tests {
     #[test]
     fn richardson_recovers_order_and_limit() {
         let x = |h: f64| 2.0 - 0.25 * h * h;
-        assert_eq!(richardson([x(1.0), x(0.5), x(0.25)]).unwrap(), Richardson { order: 2.0, limit: 2.0, error: x(0.25) - 2.0 });
+        assert_eq!(
+            richardson([x(1.0), x(0.5), x(0.25)]).unwrap(),
+            Richardson { order: 2.0, limit: 2.0, error: x(0.25) - 2.0 }
+        );
         assert_eq!(richardson([1.0, 1.0, 1.0]), None);
         assert_eq!(richardson([1.0, 1.1, 1.0]), None);
     }

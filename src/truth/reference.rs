@@ -125,7 +125,12 @@ pub struct Comparison {
 
 impl Reference {
     /// Distance of an answer from this reference.
-    pub fn compare(&self, problem: &ContactProblem, velocities: &[Velocity], impulses: &[Pair]) -> Comparison {
+    pub fn compare(
+        &self,
+        problem: &ContactProblem,
+        velocities: &[Velocity],
+        impulses: &[Pair],
+    ) -> Comparison {
         Comparison {
             velocity: problem.velocity_error(velocities, &self.velocities),
             body_impulse: problem.velocity_error(&problem.velocities(impulses), &self.velocities),
@@ -286,8 +291,6 @@ mod tests {
         let squeezed: Vec<Pair> = r.impulses.iter().map(|l| [l[0] + 1.0, l[1]]).collect();
         let c = r.compare(&p, &p.velocities(&squeezed), &squeezed);
         assert!(c.velocity < 1e-14 && c.body_impulse < 1e-14, "{c:?}");
-        let lifted: Vec<Pair> = r.impulses.iter().map(|l| [l[0], l[1] + 1.0]).collect();
-        let _ = lifted;
         let mut pushed = r.velocities.clone();
         pushed[0][1] += 0.5;
         // 0.5 m/s relative to g h = 1/24 m/s, or to a reference that falls that fast: 12.

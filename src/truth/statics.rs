@@ -176,7 +176,10 @@ mod tests {
             assert!((at - truth).abs() < 1e-9, "{at} is not {truth}");
         }
         assert_eq!(collapse(&p, &p.loads(), &push(0.0, -1.0), 0.0).unwrap(), Collapse::Never);
-        assert_eq!(collapse(&plank(&[1.0], 0.5), &p.loads(), &push(1.0, 0.0), 0.0).unwrap(), Collapse::NoRest);
+        assert_eq!(
+            collapse(&plank(&[1.0], 0.5), &p.loads(), &push(1.0, 0.0), 0.0).unwrap(),
+            Collapse::NoRest
+        );
         assert!(collapse(&p, &p.loads(), &[], 0.0).is_err());
     }
 
@@ -184,14 +187,26 @@ mod tests {
     /// ground of friction `base`, with a load of `extra` kg on each at the top.
     fn a_frame(angle: f64, base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
         let (sin, cos) = angle.sin_cos();
-        let body = ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
+        let body =
+            ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
         let contact = |a, b, normal: [f64; 2], ra: [f64; 2], rb: [f64; 2], friction, manifold| {
             let arm = |r: [f64; 2]| {
                 let t = [normal[1], -normal[0]];
                 [r[0] * normal[1] - r[1] * normal[0], r[0] * t[1] - r[1] * t[0]]
             };
             let (arm_a, arm_b) = (arm(ra), arm(rb));
-            ProblemContact { body_a: a, body_b: b, manifold, normal, arm_a, arm_b, gap: 0.0, friction, rebound: 0.0, warm_impulse: [0.0; 2] }
+            ProblemContact {
+                body_a: a,
+                body_b: b,
+                manifold,
+                normal,
+                arm_a,
+                arm_b,
+                gap: 0.0,
+                friction,
+                rebound: 0.0,
+                warm_impulse: [0.0; 2],
+            }
         };
         // Centres at ∓sin/2; feet outwards below, tops meeting at x = 0.
         let (left_foot, left_top) = ([-0.5 * sin, -0.5 * cos], [0.5 * sin, 0.5 * cos]);

@@ -47,7 +47,7 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<P
             Some((row, 0, 1.0))
         } else if row < nc + 2 * nf {
             let k = row - nc;
-            Some((rubbing[k / 2], 1, if k % 2 == 0 { 1.0 } else { -1.0 }))
+            Some((rubbing[k / 2], 1, if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
         } else {
             None
         }
@@ -141,7 +141,11 @@ mod tests {
     #[test]
     fn disc_rolls_above_a_third_of_the_tangent() {
         let slope: f64 = 0.25;
-        for (mu, rolls) in [(slope.tan() / 3.0 * (1.0 + 1e-9), true), (slope.tan() / 3.0 * (1.0 - 1e-6), false), (0.05, false)] {
+        for (mu, rolls) in [
+            (slope.tan() / 3.0 * (1.0 + 1e-9), true),
+            (slope.tan() / 3.0 * (1.0 - 1e-6), false),
+            (0.05, false),
+        ] {
             let p = disc_on_incline(slope, mu);
             let v = p.velocities(&solve(&p))[0];
             let gain = if rolls { 2.0 / 3.0 * slope.sin() } else { slope.sin() - mu * slope.cos() };

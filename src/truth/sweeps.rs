@@ -193,7 +193,8 @@ fn split_diagonal(problem: &ContactProblem) -> Vec<Pair> {
         for (body, block) in c.sides() {
             let b = &problem.bodies[body];
             for (d, row) in d.iter_mut().zip(&block) {
-                let whole = b.inv_mass * (row[0] * row[0] + row[1] * row[1]) + b.inv_inertia * row[2] * row[2];
+                let whole =
+                    b.inv_mass * (row[0] * row[0] + row[1] * row[1]) + b.inv_inertia * row[2] * row[2];
                 *d += count[body] * whole;
             }
         }
@@ -262,7 +263,13 @@ mod tests {
     fn mass_splitting_cures_jacobi_on_a_plank() {
         // Three supports close together: λ_max(D⁻¹G) is nearly 3.
         let p = plank(&[-0.1, 0.0, 0.1], 0.5);
-        let whole = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, Stop { tolerance: 1e-6, iterations: 1000 });
+        let whole = jacobi(
+            &p,
+            Target::Rigid,
+            &cold(&p),
+            Splitting::Whole,
+            Stop { tolerance: 1e-6, iterations: 1000 },
+        );
         assert_ne!(whole.status, Status::Converged);
         let split = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Mass, DEEP);
         assert_eq!(split.status, Status::Converged);
@@ -274,7 +281,8 @@ mod tests {
     #[test]
     fn symmetric_sweeps_solve_friction() {
         let p = sliding_box();
-        let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Symmetric, Stop { tolerance: 1e-14, iterations: 1000 });
+        let run =
+            pgs(&p, Target::Rigid, &cold(&p), Sweep::Symmetric, Stop { tolerance: 1e-14, iterations: 1000 });
         assert_eq!(run.status, Status::Converged);
         // 7 N and 13 N times h; the residual bounds the error up to the condition number, some 10.
         assert!((run.impulses[0][0] - 7.0 * p.h).abs() < 1e-12);
@@ -284,7 +292,8 @@ mod tests {
     #[test]
     fn divergence_is_a_status() {
         let p = plank(&[0.0; 10], 0.0);
-        let run = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, Stop { tolerance: 1e-6, iterations: 50 });
+        let run =
+            jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, Stop { tolerance: 1e-6, iterations: 50 });
         assert!(matches!(run.status, Status::Limit | Status::Diverged), "{:?}", run.status);
     }
 }
