@@ -1,7 +1,7 @@
 //! Lemke's method for a dense linear complementarity problem.
 //!
 //! Given A and q, find w = A z + q with 0 ≤ w ⊥ z ≥ 0. Lemke adds an artificial variable z₀,
-//! w = A z + q + d z₀ with d = (1, …, 1), starts at the smallest z₀ that makes z = 0 feasible, and
+//! w = A z + q + d z₀ with a covering vector d > 0, starts at the smallest z₀ that makes z = 0 feasible, and
 //! then walks along edges: whenever a variable leaves the basis, its complement enters. The walk
 //! ends when z₀ leaves (a solution) or when no row blocks (a ray).
 //!
@@ -19,7 +19,7 @@ use faer::linalg::solvers::Solve;
 use std::cmp::Ordering;
 
 /// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
-pub const REBUILD: usize = 100;
+pub const REBUILD: usize = 50;
 
 /// How Lemke's method ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,32 +45,39 @@ pub struct Lemke {
 }
 
 /// Entries of the entering column below this, relative to its largest, do not block.
-const PIVOT_TOLERANCE: f64 = 1e-10;
+const PIVOT_TOLERANCE: f64 = 1e-9;
 /// Ratios this close, relative to the larger, are ties.
 const TIE_TOLERANCE: f64 = 1e-11;
+/// Basic values below this are zero, for q of order 1. A z₀ this small has left: waiting for it to
+/// block in exact arithmetic's sense ends on spurious rays where rows are degenerate.
+const ZERO: f64 = 1e-13;
 
 /// Solves w = A z + q, 0 ≤ w ⊥ z ≥ 0 by at most `limit` pivots.
 ///
-/// A should be scaled so that its entries are of order 1. `a` must be square, as long as `q`.
-pub fn lemke(a: &Mat<f64>, q: &[f64], limit: usize) -> Lemke {
+/// A, q and the covering vector d > 0 should be scaled so that their largest entries are of order 1.
+/// In exact arithmetic any d does; where rounding spoils one path, another d takes a different one.
+/// `a` must be square, as long as `q` and `d`.
+pub fn lemke(a: &Mat<f64>, q: &[f64], d: &[f64], limit: usize) -> Lemke {
     let n = q.len();
     let end = |outcome, pivots| Lemke { outcome, pivots };
     if q.iter().all(|&x| x >= 0.0) {
         return end(Outcome::Solution(vec![0.0; n]), 0);
     }
-    let mut t = Tableau::new(a, q);
-    // z₀ enters at the row of the lexicographically smallest (q_i, e_i): the last of the smallest q.
-    let first = (0..n).min_by(|&i, &k| q[i].total_cmp(&q[k]).then(k.cmp(&i))).expect("q is not empty");
+    let mut t = Tableau::new(a, q, d);
+    // z₀ enters at the row of the lexicographically smallest (q_i, e_i)/d_i: the last of equals.
+    let ratio = |i: usize| q[i] / d[i];
+    let first =
+        (0..n).min_by(|&i, &k| ratio(i).total_cmp(&ratio(k)).then(k.cmp(&i))).expect("q is not empty");
     let mut entering = complement(t.pivot(first, n), n);
     for pivots in 1..=limit {
-        if pivots % REBUILD == 0 && !t.rebuild(a, q) {
+        if pivots % REBUILD == 0 && !t.rebuild(a, q, d) {
             return end(Outcome::Singular, pivots);
         }
         let column = t.nonbasic.iter().position(|&v| v == entering).expect("complements are nonbasic");
         let Some(row) = t.blocking_row(column) else { return end(Outcome::Ray, pivots) };
         let leaving = t.pivot(row, column);
-        if leaving == artificial(n) {
-            return match t.rebuild(a, q) {
+        if leaving == artificial(n) || t.value(artificial(n)) <= ZERO {
+            return match t.rebuild(a, q, d) {
                 true => end(Outcome::Solution(t.solution()), pivots + 1),
                 false => end(Outcome::Singular, pivots + 1),
             };
@@ -101,7 +108,7 @@ struct Tableau {
 
 impl Tableau {
     /// w basic, z and z₀ not: T = (−A | −d), q̄ = q.
-    fn new(a: &Mat<f64>, q: &[f64]) -> Self {
+    fn new(a: &Mat<f64>, q: &[f64], d: &[f64]) -> Self {
         let n = q.len();
         let mut t = Tableau {
             n,
@@ -111,7 +118,7 @@ impl Tableau {
         };
         for (i, &qi) in q.iter().enumerate() {
             t.cells.extend((0..n).map(|j| -a[(i, j)]));
-            t.cells.extend([-1.0, qi]);
+            t.cells.extend([-d[i], qi]);
         }
         t
     }
@@ -151,7 +158,7 @@ impl Tableau {
         let smallest = candidates.iter().map(|&i| ratio(i)).min_by(f64::total_cmp)?;
         let ties: Vec<usize> = candidates
             .into_iter()
-            .filter(|&i| ratio(i) - smallest <= TIE_TOLERANCE * ratio(i).max(TIE_TOLERANCE))
+            .filter(|&i| ratio(i) - smallest <= (TIE_TOLERANCE * ratio(i)).max(ZERO))
             .collect();
         let artificial_row = ties.iter().copied().find(|&i| self.basic[i] == artificial(self.n));
         artificial_row.or_else(|| ties.into_iter().reduce(|i, k| self.lexicographic_min(i, k, column)))
@@ -176,7 +183,7 @@ impl Tableau {
     }
 
     /// Recomputes T and q̄ from the data for the present basis; false if it is singular.
-    fn rebuild(&mut self, a: &Mat<f64>, q: &[f64]) -> bool {
+    fn rebuild(&mut self, a: &Mat<f64>, q: &[f64], d: &[f64]) -> bool {
         let n = self.n;
         // Columns of (I | −A | −d), the coefficients of (w, z, z₀).
         let coefficient = |i: usize, variable: usize| {
@@ -185,7 +192,7 @@ impl Tableau {
             } else if variable < 2 * n {
                 -a[(i, variable - n)]
             } else {
-                -1.0
+                -d[i]
             }
         };
         let basis = Mat::from_fn(n, n, |i, j| coefficient(i, self.basic[j]));
@@ -207,6 +214,11 @@ impl Tableau {
         true
     }
 
+    /// Present value of a variable.
+    fn value(&self, variable: usize) -> f64 {
+        self.basic.iter().position(|&v| v == variable).map_or(0.0, |i| self.row(i)[self.n + 1])
+    }
+
     /// z of the basic solution; negatives of rounding size become zero.
     fn solution(&self) -> Vec<f64> {
         let mut z = vec![0.0; self.n];
@@ -225,7 +237,7 @@ mod tests {
 
     fn solve(a: &[&[f64]], q: &[f64]) -> Outcome {
         let a = Mat::from_fn(q.len(), q.len(), |i, j| a[i][j]);
-        lemke(&a, q, 100).outcome
+        lemke(&a, q, &vec![1.0; q.len()], 100).outcome
     }
 
     fn solution(a: &[&[f64]], q: &[f64]) -> Vec<f64> {
@@ -255,7 +267,7 @@ mod tests {
     #[test]
     fn the_limit_is_a_status() {
         let a = Mat::from_fn(3, 3, |i, j| if i == j { 2.0 } else { 1.0 });
-        assert_eq!(lemke(&a, &[-1.0, -2.0, -3.0], 0).outcome, Outcome::IterationLimit);
+        assert_eq!(lemke(&a, &[-1.0, -2.0, -3.0], &[1.0; 3], 0).outcome, Outcome::IterationLimit);
     }
 
     #[test]
@@ -263,7 +275,9 @@ mod tests {
         // All right-hand sides equal and A of rank one plus nothing: every ratio is a tie.
         let n = 30;
         let a = Mat::from_fn(n, n, |_, _| 1.0);
-        let Outcome::Solution(z) = lemke(&a, &vec![-1.0; n], 1000).outcome else { panic!("no solution") };
+        let Outcome::Solution(z) = lemke(&a, &vec![-1.0; n], &vec![1.0; n], 1000).outcome else {
+            panic!("no solution")
+        };
         assert!((z.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{z:?}");
     }
 
@@ -279,7 +293,7 @@ mod tests {
             let b = Mat::from_fn(n, n, |_, _| next());
             let a = &b * b.transpose() + Mat::<f64>::identity(n, n);
             let q: Vec<f64> = (0..n).map(|_| next()).collect();
-            let run = lemke(&a, &q, 20 * n);
+            let run = lemke(&a, &q, &vec![1.0; n], 20 * n);
             let Outcome::Solution(z) = run.outcome else { panic!("{n}: no solution") };
             if n == 260 {
                 assert!(run.pivots > REBUILD, "{}", run.pivots);

@@ -24,13 +24,21 @@
 
 use super::lcp::{Outcome, lemke};
 use super::problem::{ContactProblem, Pair};
-use super::residual::Target;
+use super::residual::{Target, natural_map};
 use faer::Mat;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
+/// Covering vectors that are tried until one path ends at an exact solution.
+const PATHS: usize = 6;
+/// Relative natural-map residual that counts as exact.
+const EXACT: f64 = 1e-13;
 
 /// Impulses of a solution, or why there is none. `target` may be compliant.
+///
+/// On ill-conditioned problems (jammed piles whose G has eigenvalues down to 10⁻⁶) rounding can end
+/// one of Lemke's paths on a spurious ray or at an inaccurate basis; then other covering vectors are
+/// tried and the answer with the least residual returned.
 pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<Pair>, Outcome> {
     let contacts = &problem.contacts;
     let rubbing: Vec<usize> = (0..contacts.len()).filter(|&i| contacts[i].friction > 0.0).collect();
@@ -79,16 +87,37 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<P
     if unit > 0.0 {
         q.iter_mut().for_each(|x| *x /= unit);
     }
-    match lemke(&a, &q, PIVOTS_PER_ROW * n + 100).outcome {
-        Outcome::Solution(z) => {
-            let mut impulses: Vec<Pair> = (0..nc).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
-            for (k, &i) in rubbing.iter().enumerate() {
-                impulses[i][1] = unit * scale[i][1] * (z[nc + 2 * k] - z[nc + 2 * k + 1]);
-            }
-            Ok(impulses)
+    let impulses = |z: &[f64]| -> Vec<Pair> {
+        let mut impulses: Vec<Pair> = (0..nc).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
+        for (k, &i) in rubbing.iter().enumerate() {
+            impulses[i][1] = unit * scale[i][1] * (z[nc + 2 * k] - z[nc + 2 * k + 1]);
         }
-        other => Err(other),
+        impulses
+    };
+    let mut best: Result<(f64, Vec<Pair>), Outcome> = Err(Outcome::Ray);
+    for path in 0..PATHS {
+        match lemke(&a, &q, &covering_vector(n, path), PIVOTS_PER_ROW * n + 100).outcome {
+            Outcome::Solution(z) => {
+                let l = impulses(&z);
+                let residual =
+                    natural_map(problem, target, &problem.velocities(&l), &l) / problem.impulse_unit();
+                if best.as_ref().map_or(true, |(least, _)| residual < *least) {
+                    best = Ok((residual, l));
+                }
+                if residual <= EXACT {
+                    break;
+                }
+            }
+            other => best = best.or(Err(other)),
+        }
     }
+    best.map(|(_, impulses)| impulses)
+}
+
+/// All ones, then ones shifted by up to one half by multiples of the golden ratio.
+fn covering_vector(n: usize, path: usize) -> Vec<f64> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    (1..=n).map(|i| if path == 0 { 1.0 } else { 0.5 + 0.5 * (GOLDEN * (i * path) as f64).fract() }).collect()
 }
 
 #[cfg(test)]
