@@ -12,4 +12,5 @@ pub mod narrowphase;
 pub mod params;
 pub mod shapes;
 pub mod solvers;
+pub mod truth;
 pub mod world;
