@@ -18,8 +18,7 @@ fn bench(c: &mut Criterion) {
                 assert_eq!(world.state_hash(), truth, "{} {scene} {width:?}", variant.name);
                 world.settings.timed = false;
                 let budget = world.settings.budget;
-                let id =
-                    format!("{}/{}x{}", width.lanes(), budget.substeps, budget.velocity_iterations);
+                let id = format!("{}/{}x{}", width.lanes(), budget.substeps, budget.velocity_iterations);
                 group.bench_function(BenchmarkId::new(scene, id), |b| {
                     b.iter(|| world.step());
                 });

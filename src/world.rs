@@ -99,6 +99,8 @@ pub struct StepCounts {
     pub rows: usize,
     /// Sweeps over the constraints, of every kind.
     pub sweeps: usize,
+    /// Rows solved in all sweeps of the step.
+    pub row_updates: usize,
     /// Colours in use.
     pub colors: usize,
     /// Contacts solved serially because colours ran out.
@@ -310,7 +312,8 @@ impl World {
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
         };
-        self.counts.sweeps = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
+        let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
+        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
     }
 
     /// The scene's needs and the extra ones, completed to a set that has a kernel:

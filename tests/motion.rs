@@ -81,7 +81,10 @@ fn free_spin_turns_by_the_angle_of_its_update() {
             }
             let truth = spin * 2.0 * ratio(spin * h);
             // 120 products of unit numbers, each rounding by an ulp.
-            assert!((turned - truth).abs() < 1e-4 * truth.max(1.0), "{update:?} {spin}: {turned} for {truth}");
+            assert!(
+                (turned - truth).abs() < 1e-4 * truth.max(1.0),
+                "{update:?} {spin}: {turned} for {truth}"
+            );
         }
     }
 }
