@@ -119,6 +119,9 @@ fn the_ends_of_the_float_range() {
         let max = Vec2::new(if body % 3 == 0 { f32::INFINITY } else { 3e38 }, y + 1.0);
         proxies.push(Proxy { aabb: Aabb { min, max }, body, group: 0, dynamic: true });
     }
+    // One with no place at all but "beyond".
+    let beyond = Vec2::new(f32::INFINITY, 0.0);
+    proxies.push(Proxy { aabb: Aabb { min: beyond, max: beyond }, body: 99, group: 0, dynamic: true });
     check(&proxies);
 }
 
