@@ -6,6 +6,7 @@ pub mod error;
 pub mod lanes;
 pub mod narrowphase;
 pub mod params;
+pub mod scenes;
 pub mod shapes;
 pub mod solvers;
 pub mod world;
