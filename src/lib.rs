@@ -8,6 +8,7 @@ pub mod constraints;
 pub mod contacts;
 pub mod error;
 pub mod lanes;
+pub mod metrics;
 pub mod narrowphase;
 pub mod params;
 pub mod shapes;

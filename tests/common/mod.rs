@@ -31,8 +31,7 @@ pub fn scene(name: &str) -> Scene {
     for i in 0..90 {
         let shape = if i % 3 == 0 { r#"{"circle":{"radius":0.4}}"# } else { r#"{"box":{"half":[0.4,0.4]}}"# };
         let x = i as f64 - 44.5;
-        bodies +=
-            &format!(r#",{{"type":"dynamic","position":[{x},1.41],"shapes":[{shape}]}}"#);
+        bodies += &format!(r#",{{"type":"dynamic","position":[{x},1.41],"shapes":[{shape}]}}"#);
     }
     let text = format!(r#"{{"name":"crowded_plate","bodies":[{bodies}]}}"#);
     Scene::from_json(&text, "crowded_plate.json".as_ref()).unwrap()
