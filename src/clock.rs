@@ -62,10 +62,9 @@ impl Phase {
         }
     }
 
-    /// Whether the phase is a pass over constraint rows.
+    /// Whether the phase is a sweep that solves constraint rows.
     pub fn is_sweep(self) -> bool {
-        use Phase::*;
-        matches!(self, WarmStart | Solve | Relax | Position | Restitution)
+        matches!(self, Phase::Solve | Phase::Relax | Phase::Position | Phase::Restitution)
     }
 }
 
@@ -79,7 +78,7 @@ pub struct Timings {
 }
 
 impl Timings {
-    /// Nanoseconds of all passes over constraint rows.
+    /// Nanoseconds of all sweeps.
     pub fn sweep_ns(&self) -> u64 {
         Phase::ALL.iter().filter(|p| p.is_sweep()).map(|&p| self.phase_ns[p as usize]).sum()
     }

@@ -99,6 +99,8 @@ pub struct StepCounts {
     pub rows: usize,
     /// Sweeps over the constraints, of every kind.
     pub sweeps: usize,
+    /// Rows solved in all sweeps of the step.
+    pub row_updates: usize,
     /// Colours in use.
     pub colors: usize,
     /// Contacts solved serially because colours ran out.
@@ -262,6 +264,30 @@ impl World {
     /// Advances by `settings.dt`.
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
+        self.solve(&mut clock);
+        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
+        clock.lap(Phase::Store);
+        self.step_index += 1;
+        self.timings = clock.stop();
+        self.check()
+    }
+
+    /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that
+    /// one phase can be measured again and again on the same state. Impulses are kept.
+    pub fn frozen_step(&mut self) {
+        let mut clock = Clock::start(self.settings.timed);
+        self.pairs_are_stale = true;
+        self.solve(&mut clock);
+        self.timings = clock.stop();
+    }
+
+    /// The constraint records and body rows of the last step, for benches of single kernels.
+    pub fn workspace(&mut self) -> &mut Workspace {
+        &mut self.work
+    }
+
+    /// Everything of a step up to the new velocities and motions in the rows.
+    fn solve(&mut self, clock: &mut Clock) {
         self.update_pairs();
         clock.lap(Phase::Pairs);
         self.update_contacts();
@@ -269,7 +295,6 @@ impl World {
         let needs = self.kernel_needs();
         self.assign_lanes(&needs);
         clock.lap(Phase::Color);
-
         let s = &self.settings;
         let motion = MotionInput {
             gravity: s.gravity,
@@ -279,6 +304,7 @@ impl World {
             rotation: s.rotation,
         };
         self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
+        clock.lap(Phase::Prepare);
         let input = StepInput {
             needs,
             budget: s.budget,
@@ -286,13 +312,8 @@ impl World {
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
         };
-        self.counts.sweeps = s.solver.run(&mut self.work, &mut self.contacts, &mut clock, &input, s.width);
-
-        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
-        clock.lap(Phase::Store);
-        self.step_index += 1;
-        self.timings = clock.stop();
-        self.check()
+        let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
+        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
     }
 
     /// The scene's needs and the extra ones, completed to a set that has a kernel:

@@ -112,6 +112,16 @@ fn the_ends_of_the_float_range() {
     for (body, &x) in [1e5f32, 1e6, 1e6, 1e30, -1e30, 1e38, 1e6 + 0.0625].iter().enumerate() {
         proxies.push(boxed([x, 0.0], [0.01, 0.01], 5 + body as u32));
     }
+    // More unbounded strips than a level may have before its grid is used.
+    for body in 12..30 {
+        let y = (body % 5) as f32 * 1e7;
+        let min = Vec2::new(if body % 2 == 0 { f32::NEG_INFINITY } else { -1e3 }, y);
+        let max = Vec2::new(if body % 3 == 0 { f32::INFINITY } else { 3e38 }, y + 1.0);
+        proxies.push(Proxy { aabb: Aabb { min, max }, body, group: 0, dynamic: true });
+    }
+    // One with no place at all but "beyond".
+    let beyond = Vec2::new(f32::INFINITY, 0.0);
+    proxies.push(Proxy { aabb: Aabb { min: beyond, max: beyond }, body: 99, group: 0, dynamic: true });
     check(&proxies);
 }
 

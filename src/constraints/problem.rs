@@ -42,8 +42,19 @@ pub struct Problem<'a, L, N> {
     h: f32,
     contact_hertz: f32,
     record_impulses: bool,
-    sweeps: usize,
+    points: usize,
+    effort: Effort,
     kernel: PhantomData<(L, N)>,
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Passes over all constraints that solve something; warm starts are not counted.
+    pub sweeps: usize,
+    /// Rows solved in all sweeps: a normal row per point, and a tangential one where the
+    /// sweep has friction.
+    pub row_updates: usize,
 }
 
 /// What a step is given besides the workspace.
@@ -86,6 +97,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts);
         }
         clock.lap(Phase::Prepare);
+        let contacts_points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         Problem {
             work,
             contacts,
@@ -95,7 +107,8 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             h: input.h,
             contact_hertz: input.contact_hertz,
             record_impulses: input.record_impulses,
-            sweeps: 0,
+            points: contacts_points,
+            effort: Effort::default(),
             kernel: PhantomData,
         }
     }
@@ -158,10 +171,10 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
     }
 
     /// Constraint pass: one velocity sweep under `rule`, booked on `phase`.
-    pub fn sweep(&mut self, phase: Phase, rule: impl NormalRule) {
+    pub fn sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         sweep::sweep::<L, N, _>(&mut self.work.rows, &mut self.work.lanes, rule);
         sweep::sweep::<f32, N, _>(&mut self.work.rows, &mut self.work.serial, rule);
-        self.sweeps += 1;
+        self.count_sweep(if N::FRICTION && R::FRICTION { 2 } else { 1 });
         self.clock.lap(phase);
     }
 
@@ -169,8 +182,13 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
     pub fn position_sweep(&mut self, fraction: f32) {
         sweep::position_sweep::<L, N>(&mut self.work.rows, &mut self.work.lanes, fraction);
         sweep::position_sweep::<f32, N>(&mut self.work.rows, &mut self.work.serial, fraction);
-        self.sweeps += 1;
+        self.count_sweep(1);
         self.clock.lap(Phase::Position);
+    }
+
+    fn count_sweep(&mut self, rows_per_point: usize) {
+        self.effort.sweeps += 1;
+        self.effort.row_updates += rows_per_point * self.points;
     }
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
@@ -182,7 +200,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             if substep + 1 == self.budget.substeps {
                 restitution::apply::<L, N>(rows, lanes, lane_bounces);
                 restitution::apply::<f32, N>(rows, serial, serial_bounces);
-                self.sweeps += 1;
+                self.count_sweep(1);
             }
             self.clock.lap(Phase::Restitution);
         }
@@ -205,8 +223,8 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         }
     }
 
-    /// Writes accumulated impulses back to the contacts; returns the sweeps made.
-    pub fn finish(self) -> usize {
+    /// Writes accumulated impulses back to the contacts; returns what was done.
+    pub fn finish(self) -> Effort {
         let Workspace { rows, lanes, serial, lane_bounces, serial_bounces, .. } = self.work;
         if self.needs.restitution {
             restitution::forget::<L, N>(rows, lanes, lane_bounces);
@@ -225,6 +243,6 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             });
         }
         self.clock.lap(Phase::Store);
-        self.sweeps
+        self.effort
     }
 }

@@ -119,7 +119,8 @@ impl Simplex {
     fn segment(p: Support, q: Support) -> Simplex {
         let edge = q.position - p.position;
         let t = -p.position.dot(edge) / edge.length_squared();
-        if !(t > 0.0) {
+        // Not a number where p = q.
+        if t.is_nan() || t <= 0.0 {
             Simplex { support: [p, q], weight: [1.0, 0.0] }
         } else if t >= 1.0 {
             Simplex { support: [q, p], weight: [1.0, 0.0] }

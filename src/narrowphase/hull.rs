@@ -122,27 +122,20 @@ impl<const N: usize> Hull<N> {
     #[inline(always)]
     pub fn best_face(&self, other: &Self) -> (usize, f32) {
         let mut nearest = [f32::INFINITY; N];
-        for j in 0..N {
-            let (x, y) = (other.x[j], other.y[j]);
-            for i in 0..N {
+        for (&x, &y) in other.x.iter().zip(&other.y) {
+            nearest = std::array::from_fn(|i| {
                 let height = self.nx[i] * x + self.ny[i] * y;
-                nearest[i] = if height < nearest[i] { height } else { nearest[i] };
-            }
+                if height < nearest[i] { height } else { nearest[i] }
+            });
         }
-        for i in 0..N {
-            nearest[i] -= self.nx[i] * self.x[i] + self.ny[i] * self.y[i];
-        }
+        nearest = std::array::from_fn(|i| nearest[i] - (self.nx[i] * self.x[i] + self.ny[i] * self.y[i]));
         self.first_max(nearest)
     }
 
     /// The face whose normal is most opposed to `direction`.
     #[inline(always)]
     pub fn opposing_face(&self, direction: Vec2) -> usize {
-        let mut against = [0.0; N];
-        for i in 0..N {
-            against[i] = -(self.nx[i] * direction.x + self.ny[i] * direction.y);
-        }
-        self.first_max(against).0
+        self.first_max(std::array::from_fn(|i| -(self.nx[i] * direction.x + self.ny[i] * direction.y))).0
     }
 
     /// Largest value and its slot, by halving: a chain of log₂ N comparisons.

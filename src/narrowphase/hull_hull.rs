@@ -109,7 +109,7 @@ impl Local {
 #[inline(always)]
 fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32) -> Local {
     let normal = r.normal(face);
-    // Along the face; counter-clockwise, so the face is to the left of its normal.
+    // Along the face, from its first to its second vertex: counter-clockwise is left of the normal.
     let tangent = normal.perp();
     let (first, second) = (face, r.next(face));
     let v1 = r.vertex(first);
@@ -131,15 +131,9 @@ fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32
     let (q, s, h) = if q_is_left { (left, s_left, h_left) } else { (right, s_right, h_right) };
     let over = flush && s_left >= 0.0 && s_right <= length;
     if h > 0.0 && (s < 0.0 || s > length) && !over {
-        // It stands past an end p of the face. Of its two edges take the one that leads
-        // back over the face: unless that comes closer to p, p and q are closest.
-        let end = if s < 0.0 { first } else { second };
-        let apart = i.vertex(q) - r.vertex(end);
-        (left, right) = if s < 0.0 { (i.previous(q), q) } else { (q, i.next(q)) };
-        let back = if s < 0.0 { i.vertex(left) - i.vertex(q) } else { i.vertex(right) - i.vertex(q) };
-        let distinct = apart.length_squared() > VERTEX_TOLERANCE * VERTEX_TOLERANCE;
-        if apart.dot(back) >= 0.0 && distinct {
-            return vertex_pair(r, end, i, q, speculative);
+        match past_end(r, face, s < 0.0, i, q, speculative) {
+            Past::Apart(local) => return local,
+            Past::Over(edge) => (left, right) = edge,
         }
         (h_left, h_right) = (height(left), height(right));
         (s_left, s_right) = (along(left), along(right));
@@ -148,9 +142,10 @@ fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32
     // Cut the edge to 0 ≤ s ≤ length. Fractions are clamped, so an edge that misses the
     // range leaves its nearer end, and one without extent leaves both of its (equal) ends.
     let extent = s_left - s_right;
-    let per_extent = if extent > 0.0 { extent.recip() } else { 0.0 };
+    let wide = extent > f32::MIN_POSITIVE;
+    let per_extent = if wide { extent.recip() } else { 0.0 };
     let from = ((s_left - length) * per_extent).clamp(0.0, 1.0);
-    let to = if extent > 0.0 { (s_left * per_extent).clamp(0.0, 1.0) } else { 1.0 };
+    let to = if wide { (s_left * per_extent).clamp(0.0, 1.0) } else { 1.0 };
 
     let radii = r.radius + i.radius;
     let edge = i.vertex(right) - i.vertex(left);
@@ -185,14 +180,53 @@ fn touch<const N: usize>(r: &Hull<N>, face: usize, i: &Hull<N>, speculative: f32
     Local { normal, count, points }
 }
 
-/// The contact of vertex `end` of the reference hull with vertex `q` of the incident one.
+/// What is closest to an end of the reference face when the deepest vertex is past it.
+enum Past {
+    /// A point past the end, too: the whole contact.
+    Apart(Local),
+    /// An incident edge that leads back over the face.
+    Over((usize, usize)),
+}
+
+/// Walks from vertex `q` of the incident hull, which is past the first or else the second
+/// end of the face, back over the face, for as long as that comes closer to the end.
+///
+/// In exact arithmetic the first look decides. Rounding, where one hull is 10⁵ times as
+/// large as the other, may start the walk at a neighbour of the closest vertex.
 #[cold]
 #[inline(never)]
-fn vertex_pair<const N: usize>(r: &Hull<N>, end: usize, i: &Hull<N>, q: usize, speculative: f32) -> Local {
-    let (p, q_position) = (r.vertex(end), i.vertex(q));
-    let apart = q_position - p;
+fn past_end<const N: usize>(
+    r: &Hull<N>,
+    face: usize,
+    past_first: bool,
+    i: &Hull<N>,
+    mut q: usize,
+    speculative: f32,
+) -> Past {
+    let tangent = r.normal(face).perp();
+    let (end, inward) = if past_first { (face, tangent) } else { (r.next(face), -tangent) };
+    let p = r.vertex(end);
+    let mut nearest = i.vertex(q);
+    for _ in 0..N {
+        let neighbor = if past_first { i.previous(q) } else { i.next(q) };
+        let edge = i.vertex(neighbor) - i.vertex(q);
+        let approach = edge.dot(p - i.vertex(q));
+        nearest = i.vertex(q);
+        if approach <= 0.0 && edge != Vec2::ZERO {
+            break;
+        }
+        if inward.dot(i.vertex(neighbor) - p) > 0.0 {
+            return Past::Over(if past_first { (neighbor, q) } else { (q, neighbor) });
+        }
+        if approach < edge.length_squared() {
+            nearest += approach / edge.length_squared() * edge;
+            break;
+        }
+        q = neighbor;
+    }
+    let apart = nearest - p;
     let distance = apart.length();
-    let normal = apart / distance;
+    let normal = if distance > VERTEX_TOLERANCE { apart / distance } else { r.normal(face) };
     let separation = distance - r.radius - i.radius;
     let point = LocalPoint {
         position: p + (r.radius + 0.5 * separation) * normal,
@@ -201,5 +235,5 @@ fn vertex_pair<const N: usize>(r: &Hull<N>, end: usize, i: &Hull<N>, q: usize, s
         incident: i.name(q),
     };
     let count = usize::from(separation <= speculative);
-    Local { normal, count, points: [point, LocalPoint::default()] }
+    Past::Apart(Local { normal, count, points: [point, LocalPoint::default()] })
 }

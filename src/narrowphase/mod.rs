@@ -3,7 +3,7 @@
 //! Every shape is a convex core grown by a radius, so a signed distance is that
 //! of the cores less both radii. Two circles need one square root; a circle
 //! against anything needs the closest point of a core; all other pairs are two
-//! [hulls](hull) under the separating axis test.
+//! hulls (polygon, capsule, segment) under the separating axis test.
 //!
 //! Only the difference of the positions enters, so a scene loses nothing far
 //! from the origin beyond the rounding of that difference. Coordinates are then

@@ -5,7 +5,7 @@
 //! method, the others only what differs.
 
 use crate::clock::Clock;
-use crate::constraints::{Kernel, KernelNeeds, Problem, StepInput, Workspace};
+use crate::constraints::{Effort, Kernel, KernelNeeds, Problem, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::error::Error;
 use crate::lanes::{LaneWidth, Lanes};
@@ -48,7 +48,7 @@ pub struct Variant {
     run: Run,
 }
 
-type Run = fn(&mut Workspace, &mut [Contact], &mut Clock, &StepInput, LaneWidth) -> usize;
+type Run = fn(&mut Workspace, &mut [Contact], &mut Clock, &StepInput, LaneWidth) -> Effort;
 
 /// Every solver of the crate.
 pub static VARIANTS: [Variant; 3] = [
@@ -88,7 +88,7 @@ pub fn find(name: &str) -> Result<&'static Variant, Error> {
 }
 
 impl Variant {
-    /// Prepares and solves one step; returns the constraint sweeps made.
+    /// Prepares and solves one step; returns what was done.
     pub fn run(
         &self,
         work: &mut Workspace,
@@ -96,7 +96,7 @@ impl Variant {
         clock: &mut Clock,
         input: &StepInput,
         width: LaneWidth,
-    ) -> usize {
+    ) -> Effort {
         (self.run)(work, contacts, clock, input, width)
     }
 }
@@ -108,7 +108,7 @@ fn dispatch<S: Solver>(
     clock: &mut Clock,
     input: &StepInput,
     width: LaneWidth,
-) -> usize {
+) -> Effort {
     match width {
         LaneWidth::W1 => with_width::<S, f32>(work, contacts, clock, input),
         LaneWidth::W4 => with_width::<S, wide::f32x4>(work, contacts, clock, input),
@@ -122,7 +122,7 @@ fn with_width<S: Solver, L: Lanes>(
     contacts: &mut [Contact],
     clock: &mut Clock,
     input: &StepInput,
-) -> usize {
+) -> Effort {
     let needs = &input.needs;
     let run = match (needs.rotation, needs.friction, needs.two_points) {
         (false, false, false) => with_needs::<S, L, Kernel<false, false, 1>>,
@@ -141,7 +141,7 @@ fn with_needs<S: Solver, L: Lanes, N: KernelNeeds>(
     contacts: &mut [Contact],
     clock: &mut Clock,
     input: &StepInput,
-) -> usize {
+) -> Effort {
     let mut problem = Problem::<L, N>::new(work, contacts, clock, input);
     S::step(&mut problem);
     problem.finish()

@@ -40,12 +40,7 @@ pub struct SoftStep;
 impl Solver for SoftStep {
     fn step<L: Lanes, N: KernelNeeds>(problem: &mut Problem<'_, L, N>) {
         let (budget, h) = (problem.budget(), problem.h());
-        let hertz = problem.contact_hertz().min(CONTACT_HERTZ_FRACTION / h);
-        let soft = SoftRule {
-            inv_h: 1.0 / h,
-            dynamic: Softness::new(hertz, CONTACT_DAMPING_RATIO, h),
-            stiff: Softness::new(2.0 * hertz, CONTACT_DAMPING_RATIO, h),
-        };
+        let soft = SoftRule::new(problem.contact_hertz(), h);
         let rigid = RigidRule { inv_h: 1.0 / h };
         for substep in 0..budget.substeps {
             if substep == 0 {
@@ -88,10 +83,23 @@ impl Softness {
 
 /// The soft row for overlap; for a gap the rigid row that closes it, no more.
 #[derive(Clone, Copy)]
-struct SoftRule {
+pub struct SoftRule {
     inv_h: f32,
     dynamic: Softness,
     stiff: Softness,
+}
+
+impl SoftRule {
+    /// Contacts of `hertz` (Hz) between dynamic bodies, in substeps of `h` (s). The frequency is
+    /// capped by the substep rate; contacts with other bodies have twice as much.
+    pub fn new(hertz: f32, h: f32) -> Self {
+        let hertz = hertz.min(CONTACT_HERTZ_FRACTION / h);
+        SoftRule {
+            inv_h: 1.0 / h,
+            dynamic: Softness::new(hertz, CONTACT_DAMPING_RATIO, h),
+            stiff: Softness::new(2.0 * hertz, CONTACT_DAMPING_RATIO, h),
+        }
+    }
 }
 
 impl NormalRule for SoftRule {
@@ -111,8 +119,9 @@ impl NormalRule for SoftRule {
 
 /// λ ← max(0, λ − m_eff (v_n + max(s, 0)/h)): no position feedback.
 #[derive(Clone, Copy)]
-struct RigidRule {
-    inv_h: f32,
+pub struct RigidRule {
+    /// 1/h (1/s)
+    pub inv_h: f32,
 }
 
 impl NormalRule for RigidRule {

@@ -1,0 +1,26 @@
+//! Scenes that the benches share.
+#![allow(dead_code)]
+
+use simpulse::lanes::LaneWidth;
+use simpulse::scenes;
+use simpulse::solvers;
+use simpulse::world::{Settings, World};
+
+/// Contacts in second-level cache, and in third-level cache.
+pub const KERNEL_SCENES: [&str; 2] = ["pyramid:30", "large_pyramid"];
+
+/// Small, middling, and without boxes.
+pub const STEP_SCENES: [&str; 3] = ["stack:20", "pyramid:30", "circle_pile:500"];
+
+/// A scene after 30 steps of `solver` at `width`, with the clock on.
+pub fn settled(scene: &str, solver: &str, width: LaneWidth) -> World {
+    let mut settings = Settings::new(solvers::find(solver).expect("a solver of the table"));
+    settings.width = width;
+    settings.timed = true;
+    let scene = scenes::load(scene).expect("a scene of the catalogue").scene;
+    let mut world = scene.build(settings).expect("a valid scene");
+    for _ in 0..30 {
+        world.step().expect("a stable start");
+    }
+    world
+}

@@ -1,0 +1,273 @@
+//! How far velocities and impulses are from the contact law.
+//!
+//! The law at a contact with relative velocity (un, ut), un including the right-hand side b of
+//! the chosen [`Target`], and impulse (λn, λt):
+//!
+//! ```text
+//! Signorini   0 ≤ λn ⊥ un ≥ 0
+//! Coulomb     |λt| ≤ µ λn;  λt = −µ λn sign(ut) where ut ≠ 0
+//! ```
+//!
+//! The main measure is the natural map (Alart & Curnier
+//! 1991), zero exactly where the law holds, for every ρ > 0:
+//!
+//! ```text
+//! r_n = λn − max(0, λn − ρn un)
+//! r_t = λt − clamp(λt − ρt ut, −µ max(0, λn), µ max(0, λn))
+//! ```
+//!
+//! With ρ = 1/G_ii it is an impulse: how much one exact sweep over this row alone would change it.
+
+use super::problem::{ContactProblem, Pair, Velocity};
+
+/// The right-hand side b of un = Jn v + b that a residual is measured against.
+///
+/// "Is this the contact law?" and "did the solver solve what it set out to solve?" are different
+/// questions; the type keeps their answers apart.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'a> {
+    /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step,
+    /// overlapping ones may not deepen.
+    Rigid,
+    /// The solver's own law: one row for every contact of the problem.
+    Own(&'a [OwnRow]),
+}
+
+/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OwnRow {
+    /// m/s; negative pushes apart.
+    pub bias: f64,
+    /// 1/kg, ≥ 0: velocity that the contact yields per impulse.
+    pub compliance: f64,
+}
+
+impl Target<'_> {
+    /// Bias (m/s) and compliance (1/kg) at contact `i`.
+    pub fn row(&self, problem: &ContactProblem, i: usize) -> OwnRow {
+        match self {
+            Target::Own(rows) => rows[i],
+            Target::Rigid => {
+                let c = &problem.contacts[i];
+                OwnRow { bias: c.gap.max(0.0) / problem.h - c.rebound, compliance: 0.0 }
+            }
+        }
+    }
+}
+
+/// Residuals of one contact; all zero exactly where the law holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactResidual {
+    /// Natural map, normal part (N·s).
+    pub normal: f64,
+    /// Natural map, tangential part (N·s).
+    pub tangent: f64,
+    /// max(0, −un): speed of approach left over (m/s).
+    pub approach: f64,
+    /// max(0, −λn): pull (N·s).
+    pub pull: f64,
+    /// max(0, |λt| − µ max(0, λn)): friction beyond the cone (N·s).
+    pub cone: f64,
+    /// |λn un|: force at a distance (J).
+    pub complementarity: f64,
+    /// |ut| | µ max(0, λn) − |λt| | + max(0, λt ut): sliding off the cone's edge, or friction
+    /// that drives (J).
+    pub dissipation: f64,
+    /// |λ − P_K(λ − ρ ũ)|, ũ = (un + µ|ut|, ut) (N·s), De Saxcé & Feng 1998.
+    pub de_saxce: f64,
+}
+
+/// Residuals of every contact.
+///
+/// `velocities` need not follow from `impulses`; see [`momentum_defect`] for that.
+pub fn contact_residuals(
+    problem: &ContactProblem,
+    target: Target,
+    velocities: &[Velocity],
+    impulses: &[Pair],
+) -> Vec<ContactResidual> {
+    let diagonal = problem.delassus_diagonal();
+    let one = |i: usize| {
+        let c = &problem.contacts[i];
+        let row = target.row(problem, i);
+        let [vn, ut] = c.velocity(velocities);
+        let [ln, lt] = impulses[i];
+        let un = vn + row.bias + row.compliance * ln;
+        let [rho_n, rho_t] = [1.0 / (diagonal[i][0] + row.compliance), 1.0 / diagonal[i][1]];
+        law_residual(c.friction, [un, ut], [ln, lt], [rho_n, rho_t])
+    };
+    (0..problem.contacts.len()).map(one).collect()
+}
+
+/// Residuals of one contact with relative velocity `u` (m/s), impulse `l` (N·s) and ρ (kg).
+pub fn law_residual(mu: f64, [un, ut]: Pair, [ln, lt]: Pair, [rho_n, rho_t]: Pair) -> ContactResidual {
+    let radius = mu * positive(ln);
+    // One ρ for both components: P_K is the Euclidean projection only in an unscaled plane.
+    let rho = rho_n.min(rho_t);
+    let projected = project_cone(mu, [ln - rho * (un + mu * ut.abs()), lt - rho * ut]);
+    ContactResidual {
+        normal: ln - positive(ln - rho_n * un),
+        tangent: lt - clamp(lt - rho_t * ut, radius),
+        approach: positive(-un),
+        pull: positive(-ln),
+        cone: positive(lt.abs() - radius),
+        complementarity: (ln * un).abs(),
+        dissipation: ut.abs() * (radius - lt.abs()).abs() + positive(lt * ut),
+        de_saxce: (ln - projected[0]).hypot(lt - projected[1]),
+    }
+}
+
+/// Euclidean projection onto the wedge K = {|λt| ≤ µ λn}.
+///
+/// Inside, it is the identity; in the polar wedge {µ|λt| ≤ −λn}, the apex; else the point of the
+/// nearer edge, whose direction is (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
+pub fn project_cone(mu: f64, [ln, lt]: Pair) -> Pair {
+    if lt.abs() <= mu * ln {
+        [ln, lt]
+    } else if mu * lt.abs() <= -ln {
+        [0.0, 0.0]
+    } else {
+        let n = (ln + mu * lt.abs()) / (1.0 + mu * mu);
+        [n, (mu * n).copysign(lt)]
+    }
+}
+
+/// max(x, 0) that hands NaN on, so that a blown-up solver cannot look exact.
+pub(super) fn positive(x: f64) -> f64 {
+    if x <= 0.0 { 0.0 } else { x }
+}
+
+/// x clamped to [−radius, radius]; NaN stays NaN.
+pub(super) fn clamp(x: f64, radius: f64) -> f64 {
+    if x > radius {
+        radius
+    } else if x < -radius {
+        -radius
+    } else {
+        x
+    }
+}
+
+/// Largest |natural map| over all contacts and both directions (N·s); NaN if anything is.
+pub fn natural_map(
+    problem: &ContactProblem,
+    target: Target,
+    velocities: &[Velocity],
+    impulses: &[Pair],
+) -> f64 {
+    let residuals = contact_residuals(problem, target, velocities, impulses);
+    let parts: Vec<f64> = residuals.iter().flat_map(|r| [r.normal, r.tangent]).collect();
+    Summary::of(&parts).max
+}
+
+/// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): velocities that do not follow from the impulses.
+pub fn momentum_defect(problem: &ContactProblem, velocities: &[Velocity], impulses: &[Pair]) -> f64 {
+    let follow = problem.velocities(impulses);
+    let difference: Vec<Velocity> =
+        velocities.iter().zip(&follow).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect();
+    problem.mass_norm(&difference)
+}
+
+/// Distribution of absolute values; all NaN if one of them is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Largest.
+    pub max: f64,
+    /// √(mean square).
+    pub rms: f64,
+    /// Smallest value that at least 95 % do not exceed.
+    pub p95: f64,
+}
+
+impl Summary {
+    /// Summary of |values|; zero for none.
+    pub fn of(values: &[f64]) -> Self {
+        if values.iter().any(|x| x.is_nan()) {
+            return Summary { max: f64::NAN, rms: f64::NAN, p95: f64::NAN };
+        }
+        let mut sorted: Vec<f64> = values.iter().map(|x| x.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let Some(&max) = sorted.last() else { return Summary::default() };
+        let rank = (0.95 * sorted.len() as f64).ceil() as usize;
+        // Squares of x/max cannot overflow.
+        let unit = if max > 0.0 && max.is_finite() { max } else { 1.0 };
+        let mean = sorted.iter().map(|x| (x / unit).powi(2)).sum::<f64>() / sorted.len() as f64;
+        Summary { max, rms: unit * mean.sqrt(), p95: sorted[rank.max(1) - 1] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_residual_is_nonzero_where_its_law_is_broken() {
+        // µ = 0.5, un = 2, ut = 3, λ = (4, 1), ρ = (0.5, 0.25). By hand:
+        // r_n = 4 − max(0, 4 − 1) = 1;  r_t = 1 − clamp(1 − 0.75, ±2) = 0.75;
+        // λn un = 8; |ut| |2 − 1| + λt ut = 3 + 3 = 6;
+        // De Saxcé: ρ = 0.25, ũ = (3.5, 3), λ − ρũ = (3.125, 0.25), inside: r = (0.875, 0.75).
+        let r = law_residual(0.5, [2.0, 3.0], [4.0, 1.0], [0.5, 0.25]);
+        assert_eq!((r.normal, r.tangent, r.complementarity, r.dissipation), (1.0, 0.75, 8.0, 6.0));
+        assert_eq!(r.de_saxce, 0.875f64.hypot(0.75));
+        assert_eq!((r.approach, r.pull, r.cone), (0.0, 0.0, 0.0));
+        // un = −1, λ = (−2, 3): r_n = −2 − max(0, −2 + 0.5) = −2, r_t = 3 − 0.
+        let r = law_residual(0.5, [-1.0, 0.0], [-2.0, 3.0], [0.5, 0.25]);
+        assert_eq!((r.normal, r.tangent, r.approach, r.pull, r.cone), (-2.0, 3.0, 1.0, 2.0, 3.0));
+        // Tensile: λ − ρũ = (−1.75, 3); µ|λt| = 1.5 ≤ 1.75: apex, so r = λ.
+        assert_eq!(r.de_saxce, 2.0f64.hypot(3.0));
+    }
+
+    #[test]
+    fn residuals_vanish_on_the_law_for_any_rho() {
+        let on_the_law = [
+            ([0.0, 0.0], [4.0, 1.0]),
+            ([0.0, 3.0], [4.0, -2.0]),
+            ([2.0, 3.0], [0.0, 0.0]),
+            ([0.0, -1.0], [2.0, 1.0]),
+        ];
+        for (u, l) in on_the_law {
+            for rho in [0.25, 1.0, 8.0] {
+                let r = law_residual(0.5, u, l, [rho, 2.0 * rho]);
+                // Powers of two make every step exact, but for the division by 1 + µ² of P_K.
+                assert!(r.de_saxce < 1e-15, "{u:?} {l:?} {r:?}");
+                assert_eq!(ContactResidual { de_saxce: 0.0, ..r }, ContactResidual::default());
+            }
+        }
+    }
+
+    #[test]
+    fn convex_relaxation_is_not_the_law() {
+        // Sliding with un = µ|ut| solves the relaxed cone problem; it must not pass for Coulomb.
+        let r = law_residual(0.5, [1.0, 2.0], [4.0, -2.0], [1.0, 1.0]);
+        assert_eq!((r.normal, r.tangent), (1.0, 0.0));
+        assert!(r.de_saxce > 0.5);
+    }
+
+    #[test]
+    fn cone_projection_has_three_regions() {
+        assert_eq!(project_cone(0.5, [2.0, -1.0]), [2.0, -1.0]);
+        assert_eq!(project_cone(0.5, [-2.0, 4.0]), [0.0, 0.0]);
+        // (0, 5) onto the edge (1, ½): n' = 2.5/1.25 = 2.
+        assert_eq!(project_cone(0.5, [0.0, 5.0]), [2.0, 1.0]);
+        assert_eq!(project_cone(0.5, [0.0, -5.0]), [2.0, -1.0]);
+        assert_eq!(project_cone(0.0, [3.0, 7.0]), [3.0, 0.0]);
+        assert_eq!(project_cone(0.0, [-3.0, 7.0]), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn summaries_by_hand_and_with_nan() {
+        let s = Summary::of(&[3.0, -4.0]);
+        assert_eq!((s.max, s.p95), (4.0, 4.0));
+        assert!((s.rms - 12.5f64.sqrt()).abs() < 1e-15);
+        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
+        assert_eq!(Summary::of(&hundred).p95, 95.0);
+        assert!(Summary::of(&[1.0, f64::NAN]).max.is_nan());
+        assert_eq!(Summary::of(&[]), Summary::default());
+    }
+
+    #[test]
+    fn a_blown_up_solver_does_not_look_exact() {
+        let r = law_residual(0.5, [f64::NAN, f64::NAN], [1.0, 0.0], [1.0, 1.0]);
+        assert!(r.normal.is_nan() && r.tangent.is_nan() && r.approach.is_nan());
+    }
+}

@@ -1,0 +1,133 @@
+//! Solver laws on contacts whose answer is known by hand.
+
+mod common;
+
+use simpulse::scenes::Scene;
+use simpulse::solvers::{self, VARIANTS};
+use simpulse::world::World;
+
+fn build(text: &str, solver: &str) -> World {
+    let scene = Scene::from_json(text, "test.json".as_ref()).unwrap();
+    scene.build(common::settings(solvers::find(solver).unwrap())).unwrap()
+}
+
+const GROUND: &str = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[50,1]}}]}"#;
+
+/// A box thrown flat onto the ground: both corners share the stopping impulse. The first row
+/// stops its corner alone and overshoots; the second takes part of that back. With clamped
+/// increments instead of clamped totals nothing could be taken back.
+#[test]
+fn the_accumulated_impulse_is_clamped() {
+    let text = format!(
+        r#"{{"name":"flat","bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.5],"velocity":[0,-6],"shapes":[{{"box":{{"half":[0.5,0.5]}},"friction":0}}]}}]}}"#
+    );
+    let mut world = build(&text, "pgs");
+    world.settings.budget.velocity_iterations = 40;
+    world.step().unwrap();
+    let points = world.contacts[0].manifold.points();
+    let each = 0.5 * (6.0 + 10.0 / 60.0);
+    for point in points {
+        assert!((point.normal_impulse - each).abs() < 1e-4, "{points:?}");
+    }
+    assert!(world.bodies.angular_velocity[1].abs() < 1e-4);
+    assert!(world.bodies.velocity_y[1].abs() < 1e-4);
+}
+
+/// Static sag of a soft contact: s = −F/(m_eff ω²), a disc on the ground at twice 30 Hz: g/ω².
+#[test]
+fn soft_contacts_sag_by_the_load_over_the_stiffness() {
+    let text = format!(
+        r#"{{"name":"sag","bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.5],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "soft_step");
+    for _ in 0..600 {
+        world.step().unwrap();
+    }
+    let omega = 2.0 * std::f64::consts::PI * 60.0;
+    let sag = 0.5 - world.bodies.position_y[1] as f64;
+    // 7.04e-5 m; one ulp of 0.5 is 6e-8.
+    assert!((sag - 10.0 / (omega * omega)).abs() < 2e-7, "{sag}");
+}
+
+/// A deep overlap recovers by the factor 0.929267 per substep (60 Hz, ζ 10, 240 Hz).
+#[test]
+fn soft_contacts_recover_geometrically() {
+    let text = format!(
+        r#"{{"name":"recover","gravity":[0,0],"bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.4],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "soft_step");
+    world.step().unwrap();
+    let depth = 0.5 - world.bodies.position_y[1] as f64;
+    let truth = 0.1 * 0.929267_f64.powi(4);
+    assert!((depth - truth).abs() < 1e-6, "{depth} for {truth}");
+}
+
+/// Baumgarte removes 0.3 of the overlap beyond the slop per step.
+#[test]
+fn baumgarte_removes_its_fraction() {
+    let text = format!(
+        r#"{{"name":"push","gravity":[0,0],"bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.45],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "pgs");
+    world.step().unwrap();
+    let depth = 0.5 - world.bodies.position_y[1] as f64;
+    assert!((depth - (0.05 - 0.3 * 0.045)).abs() < 1e-6, "{depth}");
+}
+
+/// Projection puts a body on the surface at once, and its velocity with it.
+#[test]
+fn projection_ends_on_the_surface_at_rest() {
+    let text = format!(
+        r#"{{"name":"project","bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.45],"velocity":[1,-3],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "projection");
+    world.step().unwrap();
+    assert!((world.bodies.position_y[1] - 0.5).abs() < 1e-6);
+    assert!(world.bodies.velocity_y[1].abs() < 1e-6);
+    assert_eq!(world.bodies.velocity_x[1], 1.0, "nothing rubs");
+}
+
+/// No solver lets a fast disc through the gap that a step leaves: speculative contacts stop it
+/// at the surface, projection puts it back.
+#[test]
+fn a_falling_disc_stops_at_the_ground() {
+    for variant in &VARIANTS {
+        let text = format!(
+            r#"{{"name":"drop","bodies":[{GROUND},
+            {{"type":"dynamic","position":[0,3],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+        );
+        let mut world = build(&text, variant.name);
+        for _ in 0..240 {
+            world.step().unwrap();
+        }
+        let y = world.bodies.position_y[1];
+        assert!((y - 0.5).abs() < 0.006, "{}: {y}", variant.name);
+        assert!(world.bodies.velocity_y[1].abs() < 1e-3, "{}", variant.name);
+    }
+}
+
+/// e = 0.5 from a fall of 2 m: the ball leaves with half of what it came with.
+#[test]
+fn a_bounce_returns_its_share_of_the_speed() {
+    for variant in &VARIANTS {
+        let text = format!(
+            r#"{{"name":"bounce","bodies":[{GROUND},{{"type":"dynamic","position":[0,2.5],
+            "shapes":[{{"circle":{{"radius":0.5}},"restitution":0.5}}]}}]}}"#
+        );
+        let mut world = build(&text, variant.name);
+        let mut fastest = (0.0_f32, 0.0_f32);
+        for _ in 0..60 {
+            world.step().unwrap();
+            fastest.0 = fastest.0.min(world.bodies.velocity_y[1]);
+            fastest.1 = fastest.1.max(world.bodies.velocity_y[1]);
+        }
+        // The approach is read at the start of the step that touches: up to one step of
+        // gravity, 1/6 m/s, may be missing.
+        assert!((fastest.1 + 0.5 * fastest.0).abs() < 0.09, "{}: {fastest:?}", variant.name);
+    }
+}
