@@ -33,6 +33,9 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
         return Err(Error::invalid("every", "needs --state or --contacts"));
     }
+    if args.state.is_some() && args.state == args.contacts {
+        return Err(Error::invalid("contacts", "is the same file as --state"));
+    }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;

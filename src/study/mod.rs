@@ -34,7 +34,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "friction_ramp",
     "arch",
     "card_house",
-    "pyramid:20",
+    "pyramid:40",
     "circle_pile:500",
 ];
 
@@ -70,7 +70,7 @@ impl Default for StudyPlan {
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
             steps: None,
-            timing_steps: 120,
+            timing_steps: 200,
             repeats: 3,
             seed: 1,
         }
@@ -132,6 +132,7 @@ pub fn open_scene(
     let (own_steps, own_dt) = (scene.steps, scene.dt);
     scene.steps = steps.unwrap_or(own_steps);
     scene.dt = dt.unwrap_or(own_dt);
+    scene.validate()?;
     if loaded.truth.is_some() && (scene.steps, scene.dt) != (own_steps, own_dt) {
         let (stem, size) = name.split_once(':').unwrap_or((name, ""));
         let entry = scenes::CATALOG.iter().find(|e| e.name == stem);
