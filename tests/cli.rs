@@ -76,6 +76,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["study", "--lanes", "1,2"], &["lanes", "2"]),
         (&["study", "--substeps", "2,0"], &["substeps", "0"]),
         (&["study", "--velocity-iterations", "0"], &["velocity_iterations", "0"]),
+        (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
         (&["study", "--repeats", "0"], &["repeats", "0"]),
         (&["study", "--steps", "0"], &["steps", "0"]),
         (&["studdy"], &["studdy"]),
@@ -222,7 +223,7 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
     assert_eq!(lines.len(), 1 + 2 * 4);
     let first: Vec<&str> = lines[2].split(',').collect();
     assert_eq!((first[0], first[2], first.len()), ("10", "1", 9));
-    assert!((first[1].parse::<f64>().unwrap() - 10.0 / 60.0).abs() < 1e-7);
+    assert!((first[1].parse::<f64>().unwrap() - 10.0 / 60.0).abs() < 1e-15);
 
     let contacts = std::fs::read_to_string(folder.path().join("c.csv")).unwrap();
     let mut lines = contacts.lines();

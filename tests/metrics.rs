@@ -73,7 +73,10 @@ fn a_push_from_nowhere_shows_in_every_balance() {
     let errors = observation.errors();
     // One of three boxes of 1 kg: 0.5 N·s of 3 kg × at most 0.5/√3 · √(1 + 1/6) m/s.
     assert!(errors.momentum > 0.3, "{errors:?}");
-    assert!(errors.angular_momentum > 0.1 && errors.energy_created > 0.01, "{errors:?}");
+    assert!(errors.angular_momentum > 0.1, "{errors:?}");
+    // ½ 1 kg 0.25 m²/s² + ½ (1/6) 0.25 = 0.146 J, of which friction takes some in the same
+    // step; the scale is the weight of 30 N × √(1/6) m = 12.2 J and more.
+    assert!((0.003..0.146 / 12.2).contains(&errors.energy_created), "{errors:?}");
 }
 
 #[test]

@@ -104,7 +104,7 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
         let color = COLORS[i % COLORS.len()];
         area.draw(&PathElement::new(vec![(x, 44), (x + 26, 44)], color.stroke_width(3)))?;
         write(area, name, (x + 32, 44), 14, HPos::Left)?;
-        x += 50 + 9 * name.chars().count() as i32;
+        x += 56 + 7 * name.chars().count() as i32;
     }
     let budgets = solvers.iter().map(|s| budgets_of(records, s).len()).max().unwrap_or(0);
     for budget in 0..budgets {

@@ -1,7 +1,7 @@
 //! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from a [`race`] of the same
+//! all cores at once, because no clock is read. *Times* come from a [race](mod@race) of the same
 //! setting in natural order and at every lane width, alone on the machine. All coloured
 //! widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
@@ -101,8 +101,14 @@ impl StudyPlan {
         for solver in &self.solvers {
             self.budgets.budgets(solver)?;
         }
+        let mut names = Vec::new();
         for name in &self.scenes {
-            self.open(name)?.scene.build(Settings::new(self.solvers[0]))?;
+            let scene = self.open(name)?.scene;
+            scene.validate()?;
+            if names.contains(&scene.name) {
+                return Err(Error::invalid("scenes", format!("two are called '{}'", scene.name)));
+            }
+            names.push(scene.name);
         }
         Ok(())
     }

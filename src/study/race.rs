@@ -149,7 +149,7 @@ impl Entrant {
         if self.failure.is_some() {
             return;
         }
-        let by_phase = (step + repeat) % PHASE_STEPS == 0;
+        let by_phase = (step + repeat).is_multiple_of(PHASE_STEPS);
         world.settings.timed = by_phase;
         let start = Instant::now();
         let outcome = world.step();
