@@ -9,7 +9,7 @@
 //! restitution, and how much energy that makes or loses.
 
 use super::parts::ground_line;
-use super::truth::{Observer, Truth, View};
+use super::truth::{Observer, Truth, View, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::params::{DEFAULT_GRAVITY, RESTITUTION_THRESHOLD};
 use crate::world::World;
@@ -89,8 +89,7 @@ impl Observer for Apexes {
             return None;
         }
         let found = self.found.iter().copied().chain(std::iter::repeat(0.0));
-        let errors = self.expected.iter().zip(found).map(|(e, f)| (f - e).abs());
-        Some(errors.map(|e| if e.is_nan() { f64::INFINITY } else { e }).fold(0.0, f64::max))
+        Some(largest(self.expected.iter().zip(found).map(|(e, f)| (f - e).abs())))
     }
 }
 

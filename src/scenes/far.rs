@@ -7,7 +7,7 @@
 
 use super::column::column;
 use super::parts::ground_box;
-use super::truth::{Observer, Truth};
+use super::truth::{Observer, Truth, largest};
 use super::{Entry, Scene, SceneShape};
 use crate::bodies::Bodies;
 use crate::world::World;
@@ -55,7 +55,7 @@ impl Observer for Twin {
             // There is no trajectory to compare with.
             Err(_) => f64::INFINITY,
         };
-        self.worst = Some(self.worst.map_or(distance, |worst| worst.max(distance)));
+        self.worst = Some(largest([distance, self.worst.unwrap_or(0.0)]));
     }
 
     fn error(&self) -> Option<f64> {
@@ -63,15 +63,14 @@ impl Observer for Twin {
     }
 }
 
-/// Greatest distance of a body from its twin's place (m); infinite if one has none.
+/// Greatest distance of a body from its twin's place (m); infinite where one is NaN.
 fn distance(near: &Bodies, far: &Bodies, shift: [f64; 2]) -> f64 {
     let off = |i: usize| {
         let x = f64::from(far.position_x[i]) - shift[0] - f64::from(near.position_x[i]);
         let y = f64::from(far.position_y[i]) - shift[1] - f64::from(near.position_y[i]);
-        let distance = x.hypot(y);
-        if distance.is_nan() { f64::INFINITY } else { distance }
+        x.hypot(y)
     };
-    (0..near.len().min(far.len())).map(off).fold(0.0, f64::max)
+    largest((0..near.len().min(far.len())).map(off))
 }
 
 #[cfg(test)]

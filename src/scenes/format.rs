@@ -8,7 +8,9 @@ use super::place::place_at;
 use crate::bodies::BodyKind;
 use crate::error::Error;
 use crate::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
-use serde::{Deserialize, Serialize};
+use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
 use std::path::Path;
 
 /// Steps of a scene that gives none: five seconds at the default step.
@@ -68,8 +70,8 @@ pub struct SceneBody {
 }
 
 /// A shape with its surface. In a file, an object with one geometry key beside the three numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "ShapeObject", into = "ShapeObject")]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(into = "ShapeObject")]
 pub struct SceneShape {
     /// In the frame of the body (m).
     pub geometry: Geometry,
@@ -203,6 +205,27 @@ impl TryFrom<ShapeObject> for SceneShape {
                 "a shape with {count} geometries, where exactly one of circle, box, polygon, capsule, segment is needed"
             )),
         }
+    }
+}
+
+/// Not `serde(try_from)`, which would report a wrong number of geometries behind
+/// the whole list of shapes; from inside the map it is reported at the shape.
+impl<'de> Deserialize<'de> for SceneShape {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ShapeVisitor;
+        impl<'de> Visitor<'de> for ShapeVisitor {
+            type Value = SceneShape;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a shape")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SceneShape, A::Error> {
+                let object = ShapeObject::deserialize(MapAccessDeserializer::new(map))?;
+                object.try_into().map_err(serde::de::Error::custom)
+            }
+        }
+        deserializer.deserialize_map(ShapeVisitor)
     }
 }
 

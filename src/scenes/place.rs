@@ -16,13 +16,6 @@ pub(super) fn place_at(text: &str, error: &serde_json::Error) -> String {
     let suffix = format!(" at line {} column {}", error.line(), error.column());
     let message = full.strip_suffix(&suffix).unwrap_or(&full);
 
-    let mut levels = levels_at(before);
-    if message.starts_with("missing field")
-        && let Some(Level::Object { key, .. }) = levels.last_mut()
-    {
-        // The last key read is not the one that is missing.
-        key.clear();
-    }
     let hint = match message {
         m if m.starts_with("number out of range") => {
             format!(" ({})", number_before(&String::from_utf8_lossy(before)))
@@ -30,7 +23,8 @@ pub(super) fn place_at(text: &str, error: &serde_json::Error) -> String {
         m if m.starts_with("unknown field") => nearest_key(m),
         _ => String::new(),
     };
-    let place = path(&levels);
+    // Of a missing field the position is behind the bracket of the object that misses it.
+    let place = path(&levels_at(before));
     let colon = if place.is_empty() { "" } else { ": " };
     format!("{place}{colon}{message}{hint}{suffix}")
 }

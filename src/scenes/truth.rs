@@ -107,6 +107,11 @@ impl<'a> View<'a> {
     }
 }
 
+/// The largest of distances and 0. A NaN, which `f64::max` would drop, is infinite.
+pub(super) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
+    distances.into_iter().fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })
+}
+
 /// A measurement of one view: the distance to the truth, if it can be told.
 pub(super) type Distance = Box<dyn FnMut(&View) -> Option<f64>>;
 
@@ -139,9 +144,7 @@ impl Worst {
             return;
         }
         if let Some(distance) = (self.distance)(view) {
-            // `max` would drop a NaN, which is the worst there can be.
-            let distance = if distance.is_nan() { f64::INFINITY } else { distance.abs() };
-            self.worst = Some(self.worst.map_or(distance, |w| w.max(distance)));
+            self.worst = Some(largest([distance.abs(), self.worst.unwrap_or(0.0)]));
         }
     }
 }
@@ -217,9 +220,7 @@ pub(super) fn stands(scene: &Scene) -> Truth {
 
 fn greatest_drop(view: &View, start: &[[f64; 2]]) -> f64 {
     let dynamic = (0..view.bodies.len()).filter(|&i| view.bodies.is_dynamic(i));
-    let drops = dynamic.map(|i| start[i][1] - view.center(i)[1]);
-    // Not `f64::max`, which drops NaN.
-    drops.fold(0.0, |worst, drop| if drop <= worst { worst } else { drop })
+    largest(dynamic.map(|i| start[i][1] - view.center(i)[1]))
 }
 
 #[cfg(test)]
@@ -324,6 +325,6 @@ mod tests {
         assert_eq!(drop(1.0, 2.0), 0.0);
         assert_eq!(drop(1.5, 2.0), 0.0);
         assert_eq!(drop(1.5, 1.75), 0.25);
-        assert!(drop(f32::NAN, 2.0).is_nan());
+        assert_eq!(drop(f32::NAN, 2.0), f64::INFINITY);
     }
 }
