@@ -133,7 +133,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
     /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Lays out random scenes
     #[arg(long)]

@@ -70,11 +70,12 @@ fn print(text: &str) -> Result<ExitCode, Error> {
     }
 }
 
-/// The first paragraph of a message, without its own prefix, on one line.
+/// A message without its own prefix and without advice on usage, on one line.
 fn one_line(message: &str) -> String {
     let message = message.strip_prefix("error: ").unwrap_or(message);
-    let paragraph = message.split("\n\n").next().unwrap_or(message);
-    paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
+    let message = message.split("\nUsage:").next().unwrap_or(message);
+    let message = message.split("\nFor more information").next().unwrap_or(message);
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn study(args: &StudyArgs) -> Result<ExitCode, Error> {

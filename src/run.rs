@@ -33,6 +33,9 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
         return Err(Error::invalid("every", "needs --state or --contacts"));
     }
+    if args.state.is_some() && args.state == args.contacts {
+        return Err(Error::invalid("contacts", "is the same file as --state"));
+    }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;
@@ -56,7 +59,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
             truth.observer.observe(&world);
         }
         if due && let Some(sheet) = &mut state {
-            write_state(sheet, &world)?;
+            write_state(sheet, &world, scene.dt)?;
         }
         if due && let Some(sheet) = &mut contacts {
             write_contacts(sheet, &world, &starts)?;
@@ -222,8 +225,8 @@ impl Sheet {
 }
 
 /// A line per body: origin, angle and velocity of the centre of mass.
-fn write_state(sheet: &mut Sheet, world: &World) -> Result<(), Error> {
-    let time = world.step_index as f64 * world.settings.dt as f64;
+fn write_state(sheet: &mut Sheet, world: &World, dt: f64) -> Result<(), Error> {
+    let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
         let omega = world.bodies.angular_velocity[i];

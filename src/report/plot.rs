@@ -5,7 +5,7 @@
 //! drawn here and not by the chart builder, so that a panel of any range has readable
 //! decades.
 
-use super::units::si;
+use super::units::si_short;
 use crate::error::Error;
 use crate::study::Record;
 use crate::world::Order;
@@ -104,7 +104,7 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
         let color = COLORS[i % COLORS.len()];
         area.draw(&PathElement::new(vec![(x, 44), (x + 26, 44)], color.stroke_width(3)))?;
         write(area, name, (x + 32, 44), 14, HPos::Left)?;
-        x += 50 + 9 * name.chars().count() as i32;
+        x += 56 + 7 * name.chars().count() as i32;
     }
     let budgets = solvers.iter().map(|s| budgets_of(records, s).len()).max().unwrap_or(0);
     for budget in 0..budgets {
@@ -145,30 +145,37 @@ fn points(axis: &Axis, records: &[Record], solvers: &[&str]) -> Vec<Point> {
     points
 }
 
-/// Whole decades around the values, at least one: (lowest, highest) exponent.
-fn decades(values: impl Iterator<Item = f64> + Clone) -> (i32, i32) {
-    let least = values.clone().fold(f64::INFINITY, f64::min);
-    let most = values.fold(0.0, f64::max);
-    let low = least.max(1e-12).log10().floor() as i32;
-    (low, (most.max(1e-12).log10().ceil() as i32).max(low + 1))
+/// Where an axis has its labels: 1, 2, 5, 10 … over a short range, decades over a long one.
+/// The first and the last one enclose the values.
+fn ticks(values: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let least = values.clone().fold(f64::INFINITY, f64::min).max(1e-12);
+    let most = values.fold(least, f64::max);
+    let (low, high) = (least.log10().floor() as i32, most.log10().ceil() as i32);
+    let factors: &[f64] = if high - low <= 2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let all: Vec<f64> = (low..=high.max(low + 1))
+        .flat_map(|exponent| factors.iter().map(move |f| f * 10f64.powi(exponent)))
+        .collect();
+    let first = all.iter().rposition(|&t| t <= 1.0001 * least).unwrap_or(0);
+    let last = all.iter().position(|&t| t >= 0.9999 * most && t > 1.5 * all[first]);
+    all[first..=last.unwrap_or(all.len() - 1)].to_vec()
 }
 
 fn panel(area: &Area, corner: (i32, i32), axis: &Axis, records: &[Record], solvers: &[&str]) -> Drawn {
     let points = points(axis, records, solvers);
     let (left, top) = (corner.0 + LEFT, corner.1);
-    let (right, bottom) = (corner.0 + PANEL_WIDTH - 14, corner.1 + PANEL_HEIGHT - BOTTOM);
+    let (right, bottom) = (corner.0 + PANEL_WIDTH - 24, corner.1 + PANEL_HEIGHT - BOTTOM);
     if points.is_empty() {
         let known = records.iter().any(|r| r.truth.is_some()) || axis.title != AXES[2].title;
         let text = if known { "nothing measured" } else { "no known truth" };
         return write(area, text, ((left + right) / 2, (top + bottom) / 2), 13, HPos::Center);
     }
-    let x_range = decades(points.iter().map(|p| p.error));
-    let y_range = decades(points.iter().map(|p| p.time_us));
-    let along = |value: f64, range: (i32, i32), from: i32, to: i32| {
-        let share = (value.log10() - range.0 as f64) / (range.1 - range.0) as f64;
-        from + (share * (to - from) as f64).round() as i32
+    let x_ticks = ticks(points.iter().map(|p| p.error));
+    let y_ticks = ticks(points.iter().map(|p| p.time_us));
+    let along = |value: f64, ticks: &[f64], from: i32, to: i32| {
+        let (low, high) = (ticks[0], ticks[ticks.len() - 1]);
+        from + ((value / low).log(high / low) * (to - from) as f64).round() as i32
     };
-    let at = |p: &Point| (along(p.error, x_range, left, right), along(p.time_us, y_range, bottom, top));
+    let at = |p: &Point| (along(p.error, &x_ticks, left, right), along(p.time_us, &y_ticks, bottom, top));
 
     let truth = records.iter().find_map(|r| r.truth);
     let (unit, title) = match truth {
@@ -176,27 +183,21 @@ fn panel(area: &Area, corner: (i32, i32), axis: &Axis, records: &[Record], solve
         _ => (axis.unit, axis.title.to_string()),
     };
     // At most five labels fit side by side.
-    let stride = (x_range.1 - x_range.0 + 4) / 5;
-    for exponent in x_range.0..=x_range.1 {
-        let x = along(10f64.powi(exponent), x_range, left, right);
+    let stride = x_ticks.len().div_ceil(5);
+    for (i, &tick) in x_ticks.iter().enumerate() {
+        let x = along(tick, &x_ticks, left, right);
         area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
-        if (exponent - x_range.0) % stride == 0 {
-            write(area, &decade(exponent, unit), (x, bottom + 11), 12, HPos::Center)?;
+        if i % stride == 0 {
+            write(area, &label(tick, unit), (x, bottom + 11), 12, HPos::Center)?;
         }
     }
-    for exponent in y_range.0..=y_range.1 {
-        let y = along(10f64.powi(exponent), y_range, bottom, top);
+    for &tick in &y_ticks {
+        let y = along(tick, &y_ticks, bottom, top);
         area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
-        write(
-            area,
-            &si(1e-6 * 10f64.powi(exponent), "s").replace(".00", "").replace(".0", ""),
-            (left - 6, y),
-            12,
-            HPos::Right,
-        )?;
+        write(area, &si_short(1e-6 * tick, "s"), (left - 6, y), 12, HPos::Right)?;
     }
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write(area, &title, ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
+    write(area, &fitting(&title), ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
 
     for solver in 0..solvers.len() {
         let color = COLORS[solver % COLORS.len()];
@@ -210,13 +211,21 @@ fn panel(area: &Area, corner: (i32, i32), axis: &Axis, records: &[Record], solve
     Ok(())
 }
 
-/// `1 mm` for lengths and the like, `1e-3` for shares.
-fn decade(exponent: i32, unit: &str) -> String {
-    let value = 10f64.powi(exponent);
-    if unit.is_empty() || unit == "1" || exponent > 2 {
-        return format!("{value:e} {unit}").trim_end().to_string();
+/// `1 mm` for lengths and the like, `1e-3` for shares and for much.
+fn label(value: f64, unit: &str) -> String {
+    if unit.is_empty() || unit == "1" || value >= 1e3 {
+        return format!("{value:.0e} {unit}").trim_end().to_string();
     }
-    si(value, unit).replace(".00", "").replace(".0", "")
+    si_short(value, unit)
+}
+
+/// As many characters of a title as fit under a panel.
+fn fitting(title: &str) -> String {
+    const MOST: usize = 42;
+    if title.chars().count() <= MOST {
+        return title.to_string();
+    }
+    title.chars().take(MOST - 1).chain(['…']).collect()
 }
 
 /// Circle, triangle, square, then crosses.
@@ -229,4 +238,26 @@ fn marker(area: &Area, (x, y): (i32, i32), budget: usize, color: &RGBColor) -> D
         _ => area.draw(&Cross::new((x, y), 4, color.stroke_width(2)))?,
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_enclose_the_values() {
+        assert_eq!(ticks([3.0, 30.0].into_iter()), [2.0, 5.0, 10.0, 20.0, 50.0]);
+        assert_eq!(ticks([1.0, 1.0].into_iter()), [1.0, 2.0]);
+        assert_eq!(ticks([0.3, 3e4].into_iter()).len(), 7);
+        for values in [[1e-12, 1e3], [9.99, 10.01], [5.0, 5.0], [2e-5, 3e-5]] {
+            let t = ticks(values.into_iter());
+            assert!(t.len() >= 2 && t[0] <= values[0] * 1.001 && t[t.len() - 1] >= values[1] * 0.999);
+        }
+    }
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!([label(1e-3, "m"), label(1e-3, ""), label(1e4, "N")], ["1 mm", "1e-3", "1e4 N"]);
+        assert!(fitting(&"x".repeat(90)).chars().count() <= 42);
+    }
 }

@@ -1,6 +1,6 @@
 //! The study in plain words: what to use where.
 
-use super::units::{digits, si};
+use super::units::{digits, si, si_short};
 use crate::study::Record;
 use crate::world::Order;
 
@@ -20,11 +20,11 @@ pub fn reading(records: &[Record]) -> String {
         });
         text += &match within {
             Some((tolerance, record)) => {
-                let tolerance = si(tolerance, "m").replace(".00", "");
+                let tolerance = si_short(tolerance, "m");
                 format!("cheapest setting within {tolerance} on {scene}: {}\n", setting(record))
             }
             None if group.iter().all(|r| r.failure.is_some()) => format!("on {scene} every setting failed\n"),
-            None => format!("no setting stays within {} on {scene}\n", si(TOLERANCES[4], "m")),
+            None => format!("no setting stays within {} on {scene}\n", si_short(TOLERANCES[4], "m")),
         };
         let error = |r: &Record| r.truth.and_then(|t| t.error);
         let least = group.iter().filter_map(error).min_by(f64::total_cmp);

@@ -16,6 +16,16 @@ pub fn si(value: f64, unit: &str) -> String {
     format!("{} {prefix}{unit}", digits(value / scale))
 }
 
+/// The same without zeros behind the point: `1 mm`, `2.5 s`.
+pub fn si_short(value: f64, unit: &str) -> String {
+    let text = si(value, unit);
+    let Some((number, unit)) = text.split_once(' ') else { return text };
+    if !number.contains('.') || number.contains('e') {
+        return text;
+    }
+    format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// A relative number: `2.4e-7`, `0`.
 pub fn ratio(value: f64) -> String {
     if value == 0.0 { "0".to_string() } else { format!("{value:.1e}") }
@@ -44,6 +54,13 @@ mod tests {
             (si(0.00123, ""), si(0.0, ""), si(0.5, "1")),
             ("1.2e-3".into(), "0".into(), "5.0e-1".into())
         );
+    }
+
+    #[test]
+    fn short_numbers_keep_whole_tens() {
+        let short: Vec<_> = [1e-3, 0.01, 0.1, 0.0025, 100.0].map(|x| si_short(x, "m")).to_vec();
+        assert_eq!(short, ["1 mm", "10 mm", "100 mm", "2.5 mm", "100 m"]);
+        assert_eq!(si_short(1e-3, ""), "1.0e-3");
     }
 
     #[test]

@@ -63,6 +63,9 @@ pub fn ablation(plan: &StudyPlan) -> Result<Vec<NeedCost>, Error> {
         settings.extend(forced.iter().map(|&(_, extra_needs)| Settings { extra_needs, ..base.clone() }));
         let laps = race(&scene, &settings, timing_steps(plan, &scene), plan.repeats, plan.seed)?;
         let Some(Ok(own)) = laps.first() else { continue };
+        if own.load.contacts == 0.0 {
+            continue;
+        }
         for ((need, _), lap) in forced.iter().zip(&laps[1..]) {
             let Ok(lap) = lap else { continue };
             let ns = per_contact(own);

@@ -1,7 +1,7 @@
 //! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from a [`race`] of the same
+//! all cores at once, because no clock is read. *Times* come from a [race](mod@race) of the same
 //! setting in natural order and at every lane width, alone on the machine. All coloured
 //! widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
@@ -34,7 +34,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "friction_ramp",
     "arch",
     "card_house",
-    "pyramid:20",
+    "pyramid:40",
     "circle_pile:500",
 ];
 
@@ -70,7 +70,7 @@ impl Default for StudyPlan {
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
             steps: None,
-            timing_steps: 120,
+            timing_steps: 200,
             repeats: 3,
             seed: 1,
         }
@@ -101,8 +101,14 @@ impl StudyPlan {
         for solver in &self.solvers {
             self.budgets.budgets(solver)?;
         }
+        let mut names = Vec::new();
         for name in &self.scenes {
-            self.open(name)?.scene.build(Settings::new(self.solvers[0]))?;
+            let scene = self.open(name)?.scene;
+            scene.validate()?;
+            if names.contains(&scene.name) {
+                return Err(Error::invalid("scenes", format!("two are called '{}'", scene.name)));
+            }
+            names.push(scene.name);
         }
         Ok(())
     }
@@ -132,6 +138,7 @@ pub fn open_scene(
     let (own_steps, own_dt) = (scene.steps, scene.dt);
     scene.steps = steps.unwrap_or(own_steps);
     scene.dt = dt.unwrap_or(own_dt);
+    scene.validate()?;
     if loaded.truth.is_some() && (scene.steps, scene.dt) != (own_steps, own_dt) {
         let (stem, size) = name.split_once(':').unwrap_or((name, ""));
         let entry = scenes::CATALOG.iter().find(|e| e.name == stem);

@@ -58,7 +58,7 @@ pub struct Load {
     pub overflow: f64,
     /// Share of lanes that hold a contact, in [0, 1].
     pub occupancy: f64,
-    /// Prepared constraint records (bytes per contact).
+    /// Prepared constraint records (bytes per contact, empty lanes left out).
     pub bytes_per_contact: f64,
 }
 
@@ -93,7 +93,7 @@ impl LoadSum {
             colors: self.colors,
             overflow: mean(t.overflow),
             occupancy: t.contacts as f64 / t.lane_slots.max(1) as f64,
-            bytes_per_contact: t.constraint_bytes as f64 / t.contacts.max(1) as f64,
+            bytes_per_contact: t.constraint_bytes as f64 / t.lane_slots.max(1) as f64,
         }
     }
 }
@@ -149,7 +149,7 @@ impl Entrant {
         if self.failure.is_some() {
             return;
         }
-        let by_phase = (step + repeat) % PHASE_STEPS == 0;
+        let by_phase = (step + repeat).is_multiple_of(PHASE_STEPS);
         world.settings.timed = by_phase;
         let start = Instant::now();
         let outcome = world.step();
