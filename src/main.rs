@@ -96,7 +96,7 @@ fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
     print(&text)
 }
 
-/// A bar that says what has just run.
+/// A bar that says what runs.
 fn with_bar<T>(work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
     let bar = ProgressBar::new(1);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");

@@ -150,6 +150,11 @@ pub fn json(
     serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
 }
 
+/// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
+fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
 /// Everything that was chosen, by the caller or by a constant.
 fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
@@ -171,7 +176,7 @@ fn settings(plan: &StudyPlan) -> Value {
             "broadphase": format!("{:?}", s.broadphase),
             "integrator": s.integrator,
             "rotation": s.rotation,
-            "contact_hertz": s.contact_hertz,
+            "contact_hertz": decimal(s.contact_hertz),
         })
     });
     json!({
@@ -186,16 +191,16 @@ fn settings(plan: &StudyPlan) -> Value {
         "seed": plan.seed,
         "world": standard,
         "constants": {
-            "linear_slop_m": params::LINEAR_SLOP,
-            "speculative_distance_m": params::SPECULATIVE_DISTANCE,
-            "aabb_margin_m": params::AABB_MARGIN,
-            "baumgarte": params::BAUMGARTE,
-            "contact_hertz_fraction": params::CONTACT_HERTZ_FRACTION,
-            "contact_damping_ratio": params::CONTACT_DAMPING_RATIO,
-            "max_push_speed_m_s": params::MAX_PUSH_SPEED,
-            "restitution_threshold_m_s": params::RESTITUTION_THRESHOLD,
-            "max_position_correction_m": params::MAX_POSITION_CORRECTION,
-            "diverged_speed_m_s": params::DIVERGED_SPEED,
+            "linear_slop_m": decimal(params::LINEAR_SLOP),
+            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
+            "aabb_margin_m": decimal(params::AABB_MARGIN),
+            "baumgarte": decimal(params::BAUMGARTE),
+            "contact_hertz_fraction": decimal(params::CONTACT_HERTZ_FRACTION),
+            "contact_damping_ratio": decimal(params::CONTACT_DAMPING_RATIO),
+            "max_push_speed_m_s": decimal(params::MAX_PUSH_SPEED),
+            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
+            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
+            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
         },
     })
 }

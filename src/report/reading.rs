@@ -55,3 +55,19 @@ fn setting(record: &Record) -> String {
     let time = record.lap.as_ref().map_or(0.0, |lap| lap.median_ns / 1e3);
     format!("{}, {}, {lanes}, {} µs", record.solver, record.budget_text, digits(time))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::record::tests::{failed, record};
+
+    #[test]
+    fn the_cheapest_within_the_least_tolerance_is_named() {
+        let records = [record(1, 1, 20.0, 4e-3), record(8, 2, 41.0, 9e-4), record(16, 4, 45.0, 1e-4)];
+        let expected = "cheapest setting within 1 mm on stack:2: pgs, 2 sub, 8 lanes, 41.0 µs\n";
+        assert_eq!(reading(&records), expected);
+        assert!(reading(&records[..1]).contains("within 5 mm on stack:2: pgs, 1 sub, 1 lane, 20.0 µs"));
+        assert_eq!(reading(&[record(1, 1, 1.0, 2.0)]), "no setting stays within 100 mm on stack:2\n");
+        assert_eq!(reading(&[failed(1)]), "on stack:2 every setting failed\n");
+    }
+}

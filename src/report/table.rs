@@ -173,3 +173,21 @@ pub fn error_list(errors: &Errors) -> String {
     ];
     lines.iter().map(|(name, value)| format!("  {name:<34}{value:>12}\n")).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::record::tests::{failed, record};
+
+    #[test]
+    fn errors_stand_once_per_budget_and_failures_below() {
+        let mut wrong = record(8, 1, 10.0, 1.234e-3);
+        wrong.bits_equal = Some(false);
+        let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1)]);
+        assert_eq!(text.matches("1.23 mm").count(), 1, "{text}");
+        assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
+        assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
+        assert!(text.lines().all(|line| line.chars().count() <= 160));
+        assert!(scene_table(&[]).is_empty());
+    }
+}
