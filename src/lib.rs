@@ -50,10 +50,12 @@
 
 pub mod bodies;
 pub mod broadphase;
+pub mod capture;
 pub mod clock;
 pub mod coloring;
 pub mod constraints;
 pub mod contacts;
+pub mod converge;
 pub mod error;
 pub mod lanes;
 pub mod narrowphase;
