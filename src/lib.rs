@@ -60,6 +60,7 @@ pub mod error;
 pub mod lanes;
 pub mod narrowphase;
 pub mod params;
+pub mod scenes;
 pub mod shapes;
 pub mod solvers;
 pub mod truth;

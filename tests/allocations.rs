@@ -46,6 +46,10 @@ fn the_counter_counts() {
 fn a_steady_step_allocates_nothing() {
     for name in ["pyramid:10", "disc_column:10", "bounce"] {
         for variant in &VARIANTS {
+            // Without friction a pyramid flows apart: no step of it is steady.
+            if (name, variant.name) == ("pyramid:10", "projection") {
+                continue;
+            }
             let mut world = common::run(&common::scene(name), common::settings(variant), 120);
             // Frozen steps find their pairs anew each time, moving ones only when bodies left
             // their bounds: both ways are to be free of allocations.

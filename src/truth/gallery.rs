@@ -5,6 +5,8 @@
 //! convergence rates.
 
 use super::problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 /// m/s²
 pub const GRAVITY: f64 = 10.0;
@@ -203,6 +205,38 @@ pub fn wedge(half_angle: f64, friction: f64) -> ContactProblem {
     p.contact(None, Some(b), [-0.5, 0.0], [cos, sin], friction);
     p.contact(None, Some(b), [0.5, 0.0], [-cos, sin], friction);
     p.problem
+}
+
+/// The problem with everything a little off, always in the same way for the same `seed`: velocities by
+/// up to `kick`/2 (m/s, rad/s), normals by 0.5 mrad, arms by 0.5 mm, gaps from −1.4 mm to 0.6 mm,
+/// friction by 20 %. Walls that lean by chance make piles jam, with G close to singular: the hardest
+/// problems here. Their solutions are known only through their certificates.
+pub fn shaken(mut problem: ContactProblem, seed: u64, kick: f64) -> ContactProblem {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    // 53 bits, in [−½, ½).
+    let mut next = || (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+    problem.name = format!("{}, shaken by {kick}, seed {seed}", problem.name);
+    for b in &mut problem.bodies {
+        for k in 0..3 {
+            let change = kick * next();
+            b.velocity[k] += change;
+            b.free_velocity[k] += change;
+        }
+    }
+    let mut previous: Option<ProblemContact> = None;
+    for c in &mut problem.contacts {
+        let (sin, cos) = (1e-3 * next()).sin_cos();
+        c.normal = match previous {
+            Some(p) if p.manifold == c.manifold => p.normal,
+            _ => [cos * c.normal[0] - sin * c.normal[1], sin * c.normal[0] + cos * c.normal[1]],
+        };
+        c.arm_a[0] += 1e-3 * next();
+        c.arm_b[0] += 1e-3 * next();
+        c.gap = 2e-3 * (next() - 0.2);
+        c.friction *= 1.0 + 0.4 * next();
+        previous = Some(*c);
+    }
+    problem
 }
 
 /// The problems that ship as frozen files, with their file names.

@@ -12,35 +12,41 @@
 //! closed and the tangential ones of sticking contacts, the rows of G named on the right, a
 //! slipping contact acting along n + s µ t. In the right states it gives the solution at once.
 //!
-//! **Source**: Alart & Curnier 1991; Acary, Brémond & Huber 2018 (line search, start).
-//! **Departures**: hyperstatic rows make the matrix A singular. It is factorised as A + ε, unit
-//! diagonal, and x ← x + (A + ε)⁻¹ (r − A x) is repeated: for a consistent system the proximal
-//! point method, which converges to the solution nearest to where it starts, by ε/(σ + ε) along
-//! each singular value σ. Where no fraction of the step lowers the merit, Gauss–Seidel sweeps (a
-//! number that doubles each time) take over.
-//! **Fails when** no sweeps come near a solution, and slowly on large hyperstatic piles near
-//! slipping: a pyramid of 4760 points at µ = 0.1 still changes states after 60 steps, where
-//! [`super::nncg`] converges.
+//! **Source**: Alart & Curnier 1991; Acary, Brémond & Huber 2018 (line search, proximal outer loop).
+//! **Departures**: hyperstatic contacts make the linear problem singular and their states
+//! ambiguous. So Newton solves a sequence of proximal problems (Rockafellar 1976): ε D (λ − λ_k) is
+//! added to the relative velocities, which makes G + ε D definite, and the solution is λ_{k+1}. The
+//! error falls by ε/(σ + ε) along every eigenvalue σ of D⁻¹G, and the impulses that G leaves
+//! undetermined stay where they began. ε shrinks after every success. After a failure it grows
+//! again, and Gauss–Seidel sweeps, twice as many each time, look for a better start. (Without the
+//! proximal term rounding kept switching the states of contacts on an edge: a pyramid of 40 rows
+//! stalled at a residual of 10⁻⁶.)
+//! **Fails when** a pile is jammed by friction, so that G has eigenvalues near ε that matter; then
+//! it stalls at residuals around 10⁻⁶ and [`mod@super::reference`] refuses its answer.
 
-use super::problem::{Block, ContactProblem, Pair};
-use super::residual::{Target, contact_residuals};
+use super::problem::{Block, ContactProblem, Pair, ProblemContact};
+use super::residual::{OwnRow, Target, clamp, positive};
 use super::sweeps::{Run, Status, Stop, Sweep, pgs};
 use faer::Col;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
-/// Symmetric sweeps before the first Newton step; doubled every time that a step fails.
+/// Symmetric sweeps before the first Newton step; doubled every time that a problem is left unsolved.
 const SWEEPS: usize = 20;
-/// Most sweeps between two Newton steps.
+/// Most sweeps at a time.
 const MOST_SWEEPS: usize = 1280;
-/// Shift ε of the unit diagonal: small against the least nonzero eigenvalues of a pile. LU leaves
-/// noise of 10⁻¹⁶/ε in undetermined impulses; at ε = 10⁻⁹ that noise kept switching the states of
-/// contacts on an edge, and a pyramid of 40 rows stalled at a residual of 10⁻⁶.
-const SHIFT: f64 = 1e-6;
-/// Proximal steps per linear solve.
-const PROXIMAL_STEPS: usize = 8;
+/// First shift ε of the unit diagonal.
+const FIRST_SHIFT: f64 = 1e-3;
+/// Least shift: LU leaves noise of 10⁻¹⁶/ε in undetermined impulses, which must not switch states.
+const LEAST_SHIFT: f64 = 1e-7;
+/// Factor by which the shift falls after a solved proximal problem, and rises after an unsolved one.
+const SHIFT_FACTOR: f64 = 10.0;
+/// Newton steps for one proximal problem.
+const STEPS: usize = 40;
 /// Halvings of a step before it counts as failed.
 const HALVINGS: usize = 6;
+/// A proximal problem is solved when its residual is this fraction of the one it started from.
+const INEXACT: f64 = 1e-2;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
@@ -50,18 +56,23 @@ enum State {
     Slip(f64),
 }
 
-/// Newton's method from `start`; one iteration is one linear solve, or a bout of sweeps.
+/// Newton's method from `start`; one iteration is one proximal problem, or a bout of sweeps.
 pub fn newton(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop) -> Run {
     let sweep = |from: &[Pair], n: usize| {
         pgs(problem, target, from, Sweep::Symmetric, Stop { tolerance: stop.tolerance, iterations: n })
     };
-    let mut sweeps = SWEEPS;
+    let (mut sweeps, mut shift) = (SWEEPS, FIRST_SHIFT);
     let mut run = sweep(start, sweeps);
     run.history = vec![run.history[0], run.history[run.history.len() - 1]];
     while run.status == Status::Limit && run.history.len() <= stop.iterations {
-        let next = match step(problem, target, &run) {
-            Some(impulses) => sweep(&impulses, 0),
+        let proximal = Proximal::new(problem, target, shift, &run.impulses);
+        let next = match proximal.solve() {
+            Some(impulses) => {
+                shift = (shift / SHIFT_FACTOR).max(LEAST_SHIFT);
+                sweep(&impulses, 0)
+            }
             None => {
+                shift = (shift * SHIFT_FACTOR).min(FIRST_SHIFT);
                 sweeps = (2 * sweeps).min(MOST_SWEEPS);
                 sweep(&run.impulses, sweeps)
             }
@@ -73,138 +84,163 @@ pub fn newton(problem: &ContactProblem, target: Target, start: &[Pair], stop: St
     run
 }
 
-/// Energy-weighted square of the natural map ∑ G_ii r_i² (J): the same in all units of mass.
-fn merit(problem: &ContactProblem, target: Target, diagonal: &[Pair], impulses: &[Pair]) -> f64 {
-    let velocities = problem.velocities(impulses);
-    let residuals = contact_residuals(problem, target, &velocities, impulses);
-    residuals.iter().zip(diagonal).map(|(r, g)| g[0] * r.normal.powi(2) + g[1] * r.tangent.powi(2)).sum()
+/// The contact law with ε D (λ − λ_center) added to the relative velocities, D the diagonal of G.
+struct Proximal<'a> {
+    problem: &'a ContactProblem,
+    law: Vec<OwnRow>,
+    diagonal: Vec<Pair>,
+    shift: f64,
+    center: &'a [Pair],
 }
 
-/// The impulses after one damped Newton step, or none if no fraction of it lowers the merit.
-fn step(problem: &ContactProblem, target: Target, run: &Run) -> Option<Vec<Pair>> {
-    let diagonal = problem.delassus_diagonal();
-    let states = classify(problem, target, &diagonal, run);
-    let goal = solve_states(problem, target, &diagonal, &states, &run.impulses)?;
-    let now = merit(problem, target, &diagonal, &run.impulses);
-    let mut fraction = 1.0;
-    for _ in 0..=HALVINGS {
-        let blend = |(l, g): (&Pair, &Pair)| [0, 1].map(|k| l[k] + fraction * (g[k] - l[k]));
-        let trial: Vec<Pair> = run.impulses.iter().zip(&goal).map(blend).collect();
-        // The directional derivative of the merit along a Newton step is −2 merit.
-        if merit(problem, target, &diagonal, &trial) <= (1.0 - 2e-4 * fraction) * now {
-            return Some(trial);
-        }
-        fraction *= 0.5;
+impl<'a> Proximal<'a> {
+    fn new(problem: &'a ContactProblem, target: Target, shift: f64, center: &'a [Pair]) -> Self {
+        let law = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
+        Proximal { problem, law, diagonal: problem.delassus_diagonal(), shift, center }
     }
-    None
-}
 
-fn classify(problem: &ContactProblem, target: Target, diagonal: &[Pair], run: &Run) -> Vec<State> {
-    let state = |i: usize| {
-        let c = &problem.contacts[i];
-        let row = target.row(problem, i);
-        let [vn, ut] = c.velocity(&run.velocities);
-        let [ln, lt] = run.impulses[i];
-        let un = vn + row.bias + row.compliance * ln;
-        let normal = ln - un / (diagonal[i][0] + row.compliance);
-        let tangent = lt - ut / diagonal[i][1];
-        if normal <= 0.0 {
-            State::Open
-        } else if tangent.abs() < c.friction * normal {
-            State::Stick
-        } else {
-            State::Slip(tangent.signum())
+    /// Impulses that solve this problem well enough, or none.
+    fn solve(&self) -> Option<Vec<Pair>> {
+        let mut impulses = self.center.to_vec();
+        let mut now = self.merit(&impulses, &self.arguments(&impulses));
+        let goal = INEXACT * INEXACT * now;
+        let mut states = Vec::new();
+        for _ in 0..STEPS {
+            let next_states = self.states(&self.arguments(&impulses));
+            // Solved exactly: a full step in these states has been taken.
+            if now <= goal || next_states == states {
+                return Some(impulses);
+            }
+            let target = self.solve_states(&next_states)?;
+            let mut fraction = 1.0;
+            let mut halvings = 0;
+            (impulses, now) = loop {
+                let blend = |(l, g): (&Pair, &Pair)| [0, 1].map(|k| l[k] + fraction * (g[k] - l[k]));
+                let trial: Vec<Pair> = impulses.iter().zip(&target).map(blend).collect();
+                let merit = self.merit(&trial, &self.arguments(&trial));
+                // The directional derivative of the merit along a Newton step is −2 merit.
+                if merit <= (1.0 - 2e-4 * fraction) * now {
+                    break (trial, merit);
+                }
+                halvings += 1;
+                if halvings > HALVINGS {
+                    return None;
+                }
+                fraction *= 0.5;
+            };
+            states = if fraction == 1.0 { next_states } else { Vec::new() };
         }
-    };
-    (0..problem.contacts.len()).map(state).collect()
-}
+        (now <= goal).then_some(impulses)
+    }
 
-/// Solves the linear problem of fixed states, nearest to `near`; none if it cannot be factorised.
-fn solve_states(
-    problem: &ContactProblem,
-    target: Target,
-    diagonal: &[Pair],
-    states: &[State],
-    near: &[Pair],
-) -> Option<Vec<Pair>> {
-    // Unknowns (contact, direction); `index` finds them again.
-    let mut unknowns: Vec<(usize, usize)> = Vec::new();
-    let mut index = vec![[usize::MAX; 2]; states.len()];
-    for (i, state) in states.iter().enumerate() {
-        let directions = match state {
-            State::Open => 0,
-            State::Slip(_) => 1,
-            State::Stick => 2,
+    /// (λn − ρn un, λt − ρt ut) of every contact.
+    fn arguments(&self, impulses: &[Pair]) -> Vec<Pair> {
+        let velocities = self.problem.velocities(impulses);
+        let one = |(i, c): (usize, &ProblemContact)| {
+            let ([ln, lt], [cn, ct], [gn, gt]) = (impulses[i], self.center[i], self.diagonal[i]);
+            let [vn, ut] = c.velocity(&velocities);
+            let un = vn + self.law[i].bias + self.law[i].compliance * ln;
+            let normal = ln - (un + self.shift * gn * (ln - cn)) / (gn + self.law[i].compliance);
+            [normal, lt - ut / gt - self.shift * (lt - ct)]
         };
-        for (direction, index) in index[i].iter_mut().enumerate().take(directions) {
-            *index = unknowns.len();
-            unknowns.push((i, direction));
-        }
+        self.problem.contacts.iter().enumerate().map(one).collect()
     }
-    let n = unknowns.len();
-    let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / diagonal[i][d].sqrt()).collect();
-    let slope = |i: usize| match states[i] {
-        State::Slip(sign) => sign * problem.contacts[i].friction,
-        _ => 0.0,
-    };
 
-    let mut entries: Vec<Triplet<usize, usize, f64>> = Vec::new();
-    for (body, touching) in contacts_of_bodies(problem, states).iter().enumerate() {
-        let b = &problem.bodies[body];
-        let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
-        for (i, rows) in touching {
-            for (j, columns) in touching {
-                let g = |d: usize, e: usize| -> f64 {
-                    (0..3).map(|k| rows[d][k] * inverse[k] * columns[e][k]).sum()
-                };
-                for (d, &row) in index[*i].iter().enumerate().filter(|(_, r)| **r != usize::MAX) {
-                    let normal = index[*j][0];
-                    let val = (g(d, 0) + slope(*j) * g(d, 1)) * scale[row] * scale[normal];
-                    entries.push(Triplet { row, col: normal, val });
-                    if states[*j] == State::Stick {
-                        let col = index[*j][1];
-                        entries.push(Triplet { row, col, val: g(d, 1) * scale[row] * scale[col] });
+    /// Energy-weighted square of the natural map ∑ G_ii r_i² (J): the same in all units of mass.
+    fn merit(&self, impulses: &[Pair], arguments: &[Pair]) -> f64 {
+        let one = |(i, c): (usize, &ProblemContact)| {
+            let ([ln, lt], [yn, yt], [gn, gt]) = (impulses[i], arguments[i], self.diagonal[i]);
+            let radius = c.friction * positive(yn);
+            gn * (ln - positive(yn)).powi(2) + gt * (lt - clamp(yt, radius)).powi(2)
+        };
+        self.problem.contacts.iter().enumerate().map(one).sum()
+    }
+
+    fn states(&self, arguments: &[Pair]) -> Vec<State> {
+        let one = |(&[normal, tangent], c): (&Pair, &ProblemContact)| {
+            if normal <= 0.0 {
+                State::Open
+            } else if tangent.abs() < c.friction * normal {
+                State::Stick
+            } else {
+                State::Slip(tangent.signum())
+            }
+        };
+        arguments.iter().zip(&self.problem.contacts).map(one).collect()
+    }
+
+    /// Solves the linear problem of fixed states; none if it cannot be factorised.
+    fn solve_states(&self, states: &[State]) -> Option<Vec<Pair>> {
+        // Unknowns (contact, direction); `index` finds them again.
+        let mut unknowns: Vec<(usize, usize)> = Vec::new();
+        let mut index = vec![[usize::MAX; 2]; states.len()];
+        for (i, state) in states.iter().enumerate() {
+            let directions = match state {
+                State::Open => 0,
+                State::Slip(_) => 1,
+                State::Stick => 2,
+            };
+            for (direction, index) in index[i].iter_mut().enumerate().take(directions) {
+                *index = unknowns.len();
+                unknowns.push((i, direction));
+            }
+        }
+        let n = unknowns.len();
+        // Rows and columns scaled by 1/√G_ii: unit diagonal.
+        let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / self.diagonal[i][d].sqrt()).collect();
+        let slope = |i: usize| match states[i] {
+            State::Slip(sign) => sign * self.problem.contacts[i].friction,
+            _ => 0.0,
+        };
+
+        let mut entries: Vec<Triplet<usize, usize, f64>> = Vec::new();
+        for (body, touching) in contacts_of_bodies(self.problem, states).iter().enumerate() {
+            let b = &self.problem.bodies[body];
+            let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+            for (i, rows) in touching {
+                for (j, columns) in touching {
+                    let g = |d: usize, e: usize| -> f64 {
+                        (0..3).map(|k| rows[d][k] * inverse[k] * columns[e][k]).sum()
+                    };
+                    for (d, &row) in index[*i].iter().enumerate().filter(|(_, r)| **r != usize::MAX) {
+                        let normal = index[*j][0];
+                        let val = (g(d, 0) + slope(*j) * g(d, 1)) * scale[row] * scale[normal];
+                        entries.push(Triplet { row, col: normal, val });
+                        if states[*j] == State::Stick {
+                            let col = index[*j][1];
+                            entries.push(Triplet { row, col, val: g(d, 1) * scale[row] * scale[col] });
+                        }
                     }
                 }
             }
         }
-    }
-    let free = problem.velocities(&vec![[0.0; 2]; states.len()]);
-    let mut right = Col::<f64>::zeros(n);
-    for (u, &(i, d)) in unknowns.iter().enumerate() {
-        let law = target.row(problem, i);
-        let bias = if d == 0 { law.bias } else { 0.0 };
-        let compliance = if d == 0 { law.compliance } else { 0.0 };
-        right[u] = -(problem.contacts[i].velocity(&free)[d] + bias) * scale[u];
-        entries.push(Triplet { row: u, col: u, val: compliance * scale[u] * scale[u] });
-    }
-    let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).ok()?;
-    entries.extend((0..n).map(|u| Triplet { row: u, col: u, val: SHIFT }));
-    let shifted = SparseColMat::try_new_from_triplets(n, n, &entries).ok()?;
-    let factors = shifted.sp_lu().ok()?;
-
-    let mut x = Col::from_fn(n, |u| near[unknowns[u].0][unknowns[u].1] / scale[u]);
-    for _ in 0..PROXIMAL_STEPS {
-        let residual = &right - &matrix * &x;
-        let change = factors.solve(&residual);
-        x += &change;
-        if change.norm_max() <= 1e-15 * x.norm_max() {
-            break;
+        let free = self.problem.velocities(&vec![[0.0; 2]; states.len()]);
+        let mut right = Col::<f64>::zeros(n);
+        for (u, &(i, d)) in unknowns.iter().enumerate() {
+            let law = if d == 0 { self.law[i] } else { OwnRow::default() };
+            let velocity = self.problem.contacts[i].velocity(&free)[d] + law.bias;
+            right[u] = -velocity * scale[u] + self.shift * self.center[i][d] / scale[u];
+            let val = law.compliance * scale[u] * scale[u] + self.shift;
+            entries.push(Triplet { row: u, col: u, val });
         }
-    }
-    if !x.iter().all(|x| x.is_finite()) {
-        return None;
-    }
-    let mut impulses = vec![[0.0; 2]; states.len()];
-    for (u, &(i, d)) in unknowns.iter().enumerate() {
-        impulses[i][d] = x[u] * scale[u];
-    }
-    for (i, l) in impulses.iter_mut().enumerate() {
-        if matches!(states[i], State::Slip(_)) {
-            l[1] = slope(i) * l[0];
+        let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).ok()?;
+        let factors = matrix.sp_lu().ok()?;
+        let mut x = factors.solve(&right);
+        x += factors.solve(&right - &matrix * &x);
+        if !x.iter().all(|x| x.is_finite()) {
+            return None;
         }
+        let mut impulses = vec![[0.0; 2]; states.len()];
+        for (u, &(i, d)) in unknowns.iter().enumerate() {
+            impulses[i][d] = x[u] * scale[u];
+        }
+        for (i, l) in impulses.iter_mut().enumerate() {
+            if matches!(states[i], State::Slip(_)) {
+                l[1] = slope(i) * l[0];
+            }
+        }
+        Some(impulses)
     }
-    Some(impulses)
 }
 
 /// Closed contacts of every body, with their rows on that body.

@@ -237,6 +237,21 @@ mod tests {
     }
 
     #[test]
+    fn gaps_close_overlaps_stay_and_rebounds_rebound() {
+        // Disc falling at 2 m/s; h = 1/240 s.
+        let disc = |gap: f64, rebound: f64| {
+            let mut p = disc_column(1);
+            p.bodies[0].free_velocity[1] = -2.0;
+            (p.contacts[0].gap, p.contacts[0].rebound) = (gap, rebound);
+            p.velocities(&solve(&p))[0][1]
+        };
+        close(disc(1.0 / 480.0, 0.0), -0.5);
+        close(disc(0.1, 0.0), -2.0);
+        assert!(disc(-0.1, 0.0).abs() < 1e-15);
+        close(disc(0.0, 1.5), 1.5);
+    }
+
+    #[test]
     fn a_pyramid_of_100_contacts_rests() {
         let p = box_pyramid(6, 0.6);
         assert!(p.contacts.len() > 100 && p.contacts.len() < 150, "{}", p.contacts.len());

@@ -1,0 +1,20 @@
+//! C7: boxes that start a quarter deep in each other.
+
+use super::parts::ground_line;
+use super::truth::rests_on_ground;
+use super::{Entry, Scene, SceneBody, SceneShape};
+
+/// Wherever they are pushed, once at rest the ground carries their weight.
+pub(super) const RECOVERY: Entry =
+    Entry::new("overlap_recovery", "a pyramid of ten boxes that start overlapping by a quarter", |_| {
+        let mut bodies = vec![ground_line(40.0)];
+        for row in 0..4 {
+            for i in 0..4 - row {
+                let position =
+                    [0.375 * f64::from(row - 4) + 0.75 * f64::from(i), 0.5 + 0.75 * f64::from(row)];
+                bodies.push(SceneBody::dynamic(position, SceneShape::rectangle(0.5, 0.5)));
+            }
+        }
+        Scene::new("overlap_recovery", bodies)
+    })
+    .known(|scene, _| rests_on_ground(scene));

@@ -1,0 +1,124 @@
+//! Where in a scene a JSON error stands, in the words of the scene: `bodies[3].shapes[0].density`.
+
+/// One open bracket on the way to a position in the text.
+enum Level {
+    /// `{`, with the last key read.
+    Object { key: String, expects_key: bool },
+    /// `[`, with the index of the current element.
+    Array { index: usize },
+}
+
+/// The message of a JSON `error` in `text`: place, what is wrong, the offending
+/// number or the nearest known key where there is one, line and column.
+pub(super) fn place_at(text: &str, error: &serde_json::Error) -> String {
+    let before = &text.as_bytes()[..offset_of(text, error.line(), error.column())];
+    let full = error.to_string();
+    let suffix = format!(" at line {} column {}", error.line(), error.column());
+    let message = full.strip_suffix(&suffix).unwrap_or(&full);
+
+    let hint = match message {
+        m if m.starts_with("number out of range") => {
+            format!(" ({})", number_before(&String::from_utf8_lossy(before)))
+        }
+        m if m.starts_with("unknown field") => nearest_key(m),
+        _ => String::new(),
+    };
+    // Of a missing field the position is behind the bracket of the object that misses it.
+    let place = path(&levels_at(before));
+    let colon = if place.is_empty() { "" } else { ": " };
+    format!("{place}{colon}{message}{hint}{suffix}")
+}
+
+/// Byte offset of a one-based line and column (in bytes).
+fn offset_of(text: &str, line: usize, column: usize) -> usize {
+    let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    (start + column).min(text.len())
+}
+
+/// The brackets that are open at the end of `text`. The text may end anywhere;
+/// what is malformed only makes the place less exact.
+fn levels_at(text: &[u8]) -> Vec<Level> {
+    let mut levels = Vec::new();
+    let mut i = 0;
+    while i < text.len() {
+        match text[i] {
+            b'{' => levels.push(Level::Object { key: String::new(), expects_key: true }),
+            b'[' => levels.push(Level::Array { index: 0 }),
+            b'}' | b']' => drop(levels.pop()),
+            b',' => match levels.last_mut() {
+                Some(Level::Object { expects_key, .. }) => *expects_key = true,
+                Some(Level::Array { index }) => *index += 1,
+                None => {}
+            },
+            b'"' => {
+                let start = i + 1;
+                i = start;
+                while i < text.len() && text[i] != b'"' {
+                    i += if text[i] == b'\\' { 2 } else { 1 };
+                }
+                let end = i.min(text.len());
+                if let Some(Level::Object { key, expects_key: expects_key @ true }) = levels.last_mut() {
+                    *key = String::from_utf8_lossy(&text[start..end]).into_owned();
+                    *expects_key = false;
+                }
+            }
+            _ => {}
+        }
+        i += 1;
+    }
+    levels
+}
+
+fn path(levels: &[Level]) -> String {
+    let mut path = String::new();
+    for level in levels {
+        match level {
+            Level::Object { key, .. } if key.is_empty() => {}
+            Level::Object { key, .. } if path.is_empty() => path.push_str(key),
+            Level::Object { key, .. } => path.extend([".", key]),
+            Level::Array { index } => path.push_str(&format!("[{index}]")),
+        }
+    }
+    path
+}
+
+/// The number that ends at, or one byte before, the end of `text`.
+fn number_before(text: &str) -> &str {
+    let is_number = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+    let end = text.trim_end_matches(|c| !is_number(c));
+    &end[end.trim_end_matches(is_number).len()..]
+}
+
+/// Serde says "unknown field `a`, expected one of `b`, `c`"; the nearest of the expected.
+fn nearest_key(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let unknown = quoted.next().unwrap_or_default();
+    match quoted.map(|k| (strsim::damerau_levenshtein(k, unknown), k)).min() {
+        Some((distance, key)) if distance <= 2 => format!("; did you mean `{key}`?"),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_place_follows_keys_and_indices() {
+        let place = |text: &str| path(&levels_at(text.as_bytes()));
+        assert_eq!(place(""), "");
+        assert_eq!(place(r#"{"a":"#), "a");
+        assert_eq!(place(r#"{"a":[1,{"b":"x,]}","#), "a[1].b");
+        assert_eq!(place(r#"{"a":[1,{"b":"x\"","c":[[0,0],[1,"#), "a[1].c[1][1]");
+        assert_eq!(place(r#"{"a":[{"b":1}"#), "a[0]");
+        assert_eq!(place("]]}}"), "");
+        assert_eq!(place(r#"{"unfinished \"#), r"unfinished \");
+    }
+
+    #[test]
+    fn the_number_is_found_before_the_position() {
+        assert_eq!(number_before("[1, 1e999"), "1e999");
+        assert_eq!(number_before("[1, -1.5E+400]"), "-1.5E+400");
+        assert_eq!(number_before(""), "");
+    }
+}
