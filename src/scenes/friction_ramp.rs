@@ -8,7 +8,7 @@
 //! first ramp.
 
 use super::parts::ground_line;
-use super::truth::{Truth, View, Worst, worst_of};
+use super::truth::{Truth, View, Worst, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::params::DEFAULT_GRAVITY;
 
@@ -77,7 +77,7 @@ impl Slide {
             let exact = -DEFAULT_GRAVITY[1] * (sin - self.mixed[i] * cos);
             ((speeds[i] - start[i]) / (view.time() - since) - exact).abs()
         });
-        Some(worst_of(errors))
+        Some(largest(errors))
     }
 }
 
