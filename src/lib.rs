@@ -53,6 +53,7 @@ pub mod broadphase;
 pub mod capture;
 pub mod clock;
 pub mod coloring;
+pub mod commands;
 pub mod constraints;
 pub mod contacts;
 pub mod converge;

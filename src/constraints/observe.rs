@@ -6,6 +6,7 @@
 //! [`super::Workspace::observe`] is set; a step then costs one branch per sweep.
 
 use super::sweep::NormalRule;
+use crate::lanes::BodyRow;
 use std::fmt;
 
 /// The rule of a velocity sweep, as a function of plain numbers.
@@ -13,6 +14,9 @@ pub struct ObservedRule {
     rule: Box<dyn Fn(bool, f32, f32, f32) -> f32>,
     /// Whether the sweep solved friction rows.
     pub friction: bool,
+    /// How far each row's body had moved since the step began: Δx, Δy (m), Δθ (rad); the fourth
+    /// is not a motion. `[rows]`
+    pub deltas: Vec<[f32; 4]>,
 }
 
 impl fmt::Debug for ObservedRule {
@@ -33,12 +37,16 @@ pub struct NormalLaw {
 /// Fastest approach that is tried (m/s): far beyond any bias a rule may ask for.
 const FASTEST_PROBE: f32 = 1048576.0;
 
+/// Two roundings of numbers below 4, relative to one speed.
+const KEEP_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
+
 impl ObservedRule {
-    /// Keeps a copy of `rule`.
-    pub fn of<R: NormalRule>(rule: R) -> Self {
+    /// Keeps a copy of `rule`, and of the motions that it saw.
+    pub fn of<R: NormalRule>(rule: R, rows: &[BodyRow]) -> Self {
         let rule =
             move |stiff, vn, separation, old| rule.normal_impulse::<f32>(stiff, vn, separation, 1.0, old);
-        ObservedRule { rule: Box::new(rule), friction: R::FRICTION }
+        let deltas = rows.iter().map(|row| row.delta).collect();
+        ObservedRule { rule: Box::new(rule), friction: R::FRICTION, deltas }
     }
 
     /// The law at a contact with this separation (m) and effective mass (kg); none where the rule
@@ -71,7 +79,9 @@ impl ObservedRule {
         let v = f64::from(speed);
         let scale = (twice - once) / v;
         let keep = (f(-speed, speed) - once) / v;
-        Some(NormalLaw { bias: (twice - 2.0 * once) / scale, compliance: (1.0 - keep) / (mass * scale) })
+        // A κ that differs from 1 by the rounding of the trials is 1.
+        let soft = if (1.0 - keep).abs() > KEEP_ROUNDING { 1.0 - keep } else { 0.0 };
+        Some(NormalLaw { bias: (twice - 2.0 * once) / scale, compliance: soft / (mass * scale) })
     }
 }
 
@@ -83,13 +93,15 @@ mod tests {
 
     #[test]
     fn the_rigid_rule_closes_gaps_and_nothing_else() {
-        let rule = ObservedRule::of(RigidRule { inv_h: 64.0 });
+        let rule = ObservedRule::of(RigidRule { inv_h: 64.0 }, &[]);
         assert!(rule.friction);
         // 2⁻⁶ m in 2⁻⁶ s: every number is a power of two, so exactly 1 m/s.
         let law = |separation| rule.law(false, separation, 3.0).unwrap();
         assert_eq!(law(1.0 / 64.0), NormalLaw { bias: 1.0, compliance: 0.0 });
         assert_eq!(law(0.0), NormalLaw { bias: 0.0, compliance: 0.0 });
         assert_eq!(law(-0.1), NormalLaw { bias: 0.0, compliance: 0.0 });
+        // Roundings of a bias that is no power of two are not taken for softness.
+        assert_eq!(law(0.0123).compliance, 0.0);
         // A bias beyond the first speeds tried.
         assert_eq!(law(16.0), NormalLaw { bias: 1024.0, compliance: 0.0 });
     }
@@ -98,7 +110,7 @@ mod tests {
     fn the_soft_rule_is_an_implicit_spring() {
         // ω = 2π 30, ζ = 10, h = 1/240: β = ω/(2ζ + hω), a = hω(2ζ + hω), and a spring's
         // compliance is 1/(m a).
-        let rule = ObservedRule::of(SoftRule::new(30.0, 1.0 / 240.0));
+        let rule = ObservedRule::of(SoftRule::new(30.0, 1.0 / 240.0), &[]);
         let (omega, h) = (std::f64::consts::TAU * 30.0, 1.0 / 240.0);
         let denominator = 20.0 + h * omega;
         let law = rule.law(false, -0.01, 2.0).unwrap();
@@ -121,6 +133,6 @@ mod tests {
                 old
             }
         }
-        assert_eq!(ObservedRule::of(Deaf).law(false, 0.0, 1.0), None);
+        assert_eq!(ObservedRule::of(Deaf, &[]).law(false, 0.0, 1.0), None);
     }
 }

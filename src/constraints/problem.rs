@@ -181,7 +181,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         sweep::sweep::<f32, N, _>(&mut self.work.rows, &mut self.work.serial, rule);
         self.count_sweep(if N::FRICTION && R::FRICTION { 2 } else { 1 });
         if self.work.observe {
-            self.work.last_rule = Some(ObservedRule::of(rule));
+            self.work.last_rule = Some(ObservedRule::of(rule, &self.work.rows));
         }
         self.clock.lap(phase);
     }

@@ -281,15 +281,15 @@ fn curve(
         points.insert(k, point);
         point
     };
-    let (mut k, mut best, mut best_at) = (0, f64::INFINITY, 0);
+    let (mut k, mut best, mut best_at, mut at_floor) = (0, f64::INFINITY, 0, false);
     while k <= options.max_iterations {
         let point = visit(k, &mut points);
         let own = point.own.unwrap_or(f64::INFINITY);
         if own < 0.9 * best {
             (best, best_at) = (own, k);
         }
-        let stands_still = best < NEAR_FLOOR && k > 64 + best_at + best_at / 4;
-        if !point.rigid.is_finite() || best == 0.0 || stands_still {
+        at_floor = best == 0.0 || best < NEAR_FLOOR && k > 64 + best_at + best_at / 4;
+        if !point.rigid.is_finite() || at_floor {
             break;
         }
         k += if k < 128 { 1 } else { k / 64 };
@@ -307,7 +307,7 @@ fn curve(
         }
     }
     let points: Vec<Point> = points.into_values().collect();
-    let [rigid, own] = LAWS.map(|law| reached(&points, law));
+    let [rigid, own] = LAWS.map(|law| reached(&points, law, at_floor));
     Curve {
         solver: schedule.name.clone(),
         arithmetic: "f32",
@@ -327,16 +327,14 @@ const LAWS: [fn(&Point) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
 /// left out of it.
 const ABOVE_FLOOR: f64 = 30.0;
 
-fn reached(points: &[Point], law: fn(&Point) -> Option<f64>) -> Reached {
+/// What `points` came to under `law`; `at_floor` tells that they end at the rounding floor.
+fn reached(points: &[Point], law: fn(&Point) -> Option<f64>, at_floor: bool) -> Reached {
     let first =
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));
     let residuals: Vec<[f64; 2]> =
         points.iter().filter_map(|p| Some([f64::from(p.iterations), law(p)?])).collect();
     let smallest = residuals.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    // A curve that first meets its smallest residual at its end is still falling: there is no
-    // floor to avoid.
-    let still_falling = residuals.iter().position(|p| p[1] == smallest) == residuals.len().checked_sub(1);
-    let floor = if still_falling { 0.0 } else { ABOVE_FLOOR * smallest };
+    let floor = if at_floor { ABOVE_FLOOR * smallest } else { 0.0 };
     let usable = residuals.iter().position(|p| p[1] <= floor).unwrap_or(residuals.len());
     Reached { first, smallest, rate: rates::rate_at(&residuals[..usable]) }
 }
@@ -426,7 +424,7 @@ fn scalar_curves(
                     velocity_error: if k == last { error } else { None },
                 })
                 .collect();
-            let [rigid, own] = LAWS.map(|law| reached(&points, law));
+            let [rigid, own] = LAWS.map(|law| reached(&points, law, false));
             curves.push(Curve {
                 solver: name.into(),
                 arithmetic: "f64",

@@ -9,7 +9,7 @@ use crate::bodies::{Bodies, BodyDef, BodyKind};
 use crate::clock::Clock;
 use crate::coloring::{Coloring, EXEMPT};
 use crate::constraints::motion::{Integrator, MotionInput, RotationUpdate};
-use crate::constraints::{Layout, Needs, OppositeKind, StepInput, Workspace};
+use crate::constraints::{Batches, Layout, Needs, OppositeKind, StepInput, Workspace};
 use crate::contacts::{Contact, Manifold, ManifoldPoint};
 use crate::error::Error;
 use crate::lanes::{BodyRow, LaneWidth};
@@ -184,7 +184,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The law of the last sweep at the separations that its bodies have moved to.
+    /// The law of the last sweep, at the separations that it saw.
     ///
     /// s = gap + n·(Δx + (R(Δθ) − 1) r), b minus a, with n·(R(Δθ) − 1) r = sin Δθ (r × n) +
     /// (1 − cos Δθ)(r × t).
@@ -193,7 +193,7 @@ impl<'a> Replay<'a> {
         let diagonal = self.problem.delassus_diagonal();
         let moved = |c: &ProblemContact| {
             let along = |body: Option<u32>, arm: Pair| {
-                let delta = body.map_or([0.0; 4], |b| self.work.rows[b as usize].delta.map(f64::from));
+                let delta = body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
                 let turn = delta[2].sin() * arm[0] + (1.0 - delta[2].cos()) * arm[1];
                 c.normal[0] * delta[0] + c.normal[1] * delta[1] + turn
             };
@@ -222,7 +222,7 @@ impl<'a> Replay<'a> {
     /// Gives every contact its lane, by the rules of a world's step.
     fn assign_lanes(&mut self, sequence: Sequence) {
         let inert = self.problem.bodies.len() as u32;
-        let Workspace { mut lanes, mut serial, .. } = std::mem::take(&mut self.work);
+        let (mut lanes, mut serial) = (Batches::default(), Batches::default());
         lanes.clear(self.width.lanes());
         serial.clear(1);
         let bodies = |i: u32| [self.contacts[i as usize].body_a, self.contacts[i as usize].body_b];

@@ -111,6 +111,7 @@ fn count(point: &Point) -> String {
 /// Nanoseconds in a unit that suits them, three digits.
 fn duration(ns: f64) -> String {
     let (value, unit) = match ns {
+        0.0 => return "0".into(),
         ns if ns < 1e3 => (ns, "ns"),
         ns if ns < 1e6 => (ns / 1e3, "µs"),
         ns if ns < 1e9 => (ns / 1e6, "ms"),
@@ -164,7 +165,7 @@ pub fn csv(report: &Report) -> Result<String, Error> {
 
 /// The whole report. Numbers that are not finite become null.
 pub fn json(report: &Report) -> Result<String, Error> {
-    let text = serde_json::to_string_pretty(report);
+    let text = serde_json::to_string(report);
     Ok(text.map_err(|e| Error::invalid("converge.json", e.to_string()))? + "\n")
 }
 
@@ -174,7 +175,7 @@ mod tests {
 
     #[test]
     fn durations_have_three_digits() {
-        let texts = [1.234, 12.34, 123.4, 1234.0, 2.5e6, 7e9].map(duration);
-        assert_eq!(texts, ["1.23 ns", "12.3 ns", "123 ns", "1.23 µs", "2.50 ms", "7.00 s"]);
+        let texts = [0.0, 1.234, 12.34, 123.4, 1234.0, 2.5e6, 7e9].map(duration);
+        assert_eq!(texts, ["0", "1.23 ns", "12.3 ns", "123 ns", "1.23 µs", "2.50 ms", "7.00 s"]);
     }
 }
