@@ -37,8 +37,8 @@ pub struct CaptureArgs {
     /// File to write
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// How the steps before are solved
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub run: RunArgs,
 }
 

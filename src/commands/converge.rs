@@ -34,7 +34,7 @@ Examples:
   simpulse converge pyramid.frozen --rounds 0 --out results
       No timing, so that the output is the same on every run.")]
 pub struct ConvergeArgs {
-    /// Frozen problem (a file ending in .frozen), or a scene as for `simpulse capture`
+    /// Frozen problem (a file, not ending in .json), or a scene as for `simpulse capture`
     #[arg(value_name = "FILE|SCENE")]
     pub problem: String,
     /// Step to freeze if a scene is given, from 1
@@ -91,8 +91,10 @@ impl ConvergeArgs {
 /// Runs the command.
 pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let options = args.options()?;
-    let frozen = if args.problem.ends_with(".frozen") {
-        Frozen::read(Path::new(&args.problem))?
+    let path = Path::new(&args.problem);
+    let is_scene = !args.problem.ends_with(".frozen") && (args.problem.ends_with(".json") || !path.is_file());
+    let frozen = if !is_scene {
+        Frozen::read(path)?
     } else {
         let (frozen, why_not) = freeze(&args.problem, args.step, &RunArgs::default())?;
         if let Some(why) = why_not {

@@ -1,6 +1,6 @@
 //! The law behind a rule, read off the rule itself.
 //!
-//! A sweep under a [`NormalRule`] converges, if it does, to impulses that the rule leaves alone.
+//! A sweep under a [`super::NormalRule`] converges, if it does, to impulses that the rule leaves alone.
 //! Which contact law those obey is asked of the rule by trying it, so that no solver can be
 //! measured against a law that it does not solve. Nothing is observed unless
 //! [`super::Workspace::observe`] is set; a step then costs one branch per sweep.

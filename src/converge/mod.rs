@@ -22,18 +22,19 @@
 
 pub mod plot;
 pub mod replay;
+mod scalar;
+mod setup;
 pub mod table;
+mod timing;
 
 use crate::error::Error;
 use crate::lanes::LaneWidth;
 use crate::params::{Budget, CONTACT_HERTZ};
 use crate::solvers::{VARIANTS, Variant};
-use crate::truth::nncg::nncg;
+use crate::truth::ContactProblem;
 use crate::truth::rates;
-use crate::truth::reference::Reference;
+use crate::truth::reference::{Certificate, Reference};
 use crate::truth::residual::{Summary, Target, contact_residuals, natural_map};
-use crate::truth::sweeps::{self, Splitting, Stop};
-use crate::truth::{ContactProblem, Pair};
 use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -133,7 +134,7 @@ pub struct Report {
     /// Unit of residuals (N·s).
     pub impulse_unit: f64,
     /// The reference's certificate; none if velocities could not be compared.
-    pub certificate: Option<crate::truth::reference::Certificate>,
+    pub certificate: Option<Certificate>,
     /// Whether there are warm-start impulses at all; if not, there are no warm curves.
     pub has_warm_start: bool,
     /// Lanes in coloured order.
@@ -203,12 +204,12 @@ pub fn converge(
     }
     if options.rounds > 0 {
         let mut cases: Vec<_> = timers.iter_mut().map(|(schedule, replay, _)| (*schedule, replay)).collect();
-        let times = time(&mut cases, options.rounds);
+        let times = timing::time(&mut cases, options.rounds);
         for (ns, (_, _, range)) in times.into_iter().zip(&timers) {
             curves[range.clone()].iter_mut().for_each(|curve| curve.ns_per_iteration = Some(ns));
         }
     }
-    curves.extend(scalar_curves(problem, reference, has_warm_start, options));
+    curves.extend(scalar::curves(problem, reference, has_warm_start, options));
     Ok(Report {
         problem: problem.name.clone(),
         bodies: problem.bodies.len(),
@@ -274,21 +275,26 @@ fn curve(
 ) -> Curve {
     let mut own_is_rigid = true;
     let mut points = BTreeMap::new();
+    // Changes below half a unit in the last place of the largest impulse are lost.
+    let unit = problem.impulse_unit();
+    let mut floor = 0.0_f64;
     let mut visit = |k: u32, points: &mut BTreeMap<u32, Point>| {
         let outcome = replay.run(schedule.variant, schedule.budget(k), start);
+        let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
+        floor = floor.max(0.5 * f64::from(f32::EPSILON) * largest / unit);
         let (point, same) = measure(problem, reference, k, &outcome);
         own_is_rigid &= same;
         points.insert(k, point);
         point
     };
-    let (mut k, mut best, mut best_at, mut at_floor) = (0, f64::INFINITY, 0, false);
+    let (mut k, mut best, mut best_at) = (0, f64::INFINITY, 0);
     while k <= options.max_iterations {
         let point = visit(k, &mut points);
         let own = point.own.unwrap_or(f64::INFINITY);
         if own < 0.9 * best {
             (best, best_at) = (own, k);
         }
-        at_floor = best == 0.0 || best < NEAR_FLOOR && k > 64 + best_at + best_at / 4;
+        let at_floor = best == 0.0 || best < NEAR_FLOOR && k > 64 + best_at + best_at / 4;
         if !point.rigid.is_finite() || at_floor {
             break;
         }
@@ -307,7 +313,7 @@ fn curve(
         }
     }
     let points: Vec<Point> = points.into_values().collect();
-    let [rigid, own] = LAWS.map(|law| reached(&points, law, at_floor));
+    let [rigid, own] = LAWS.map(|law| reached(&points, law, floor));
     Curve {
         solver: schedule.name.clone(),
         arithmetic: "f32",
@@ -323,120 +329,16 @@ fn curve(
 
 const LAWS: [fn(&Point) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
 
-/// Rounding spoils the fit near the floor: points below this many times the smallest residual are
-/// left out of it.
-const ABOVE_FLOOR: f64 = 30.0;
+/// Fits end this many times above the rounding floor: a residual there is off by 1 %.
+const ABOVE_FLOOR: f64 = 100.0;
 
-/// What `points` came to under `law`; `at_floor` tells that they end at the rounding floor.
-fn reached(points: &[Point], law: fn(&Point) -> Option<f64>, at_floor: bool) -> Reached {
+/// What `points` came to under `law`, with residuals rounded to about `floor`.
+fn reached(points: &[Point], law: fn(&Point) -> Option<f64>, floor: f64) -> Reached {
     let first =
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));
     let residuals: Vec<[f64; 2]> =
         points.iter().filter_map(|p| Some([f64::from(p.iterations), law(p)?])).collect();
     let smallest = residuals.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    let floor = if at_floor { ABOVE_FLOOR * smallest } else { 0.0 };
-    let usable = residuals.iter().position(|p| p[1] <= floor).unwrap_or(residuals.len());
+    let usable = residuals.iter().position(|p| p[1] <= ABOVE_FLOOR * floor).unwrap_or(residuals.len());
     Reached { first, smallest, rate: rates::rate_at(&residuals[..usable]) }
-}
-
-/// Shortest difference of two runs that is timed (ns), far above the clock's resolution.
-const TIMED_NS: f64 = 50_000.0;
-
-/// Median time of an iteration of each case (ns).
-///
-/// The difference between two steps of few and many iterations, over the difference of their
-/// numbers, so that set-up is not counted. Every round times every case once, so that a disturbance
-/// of the machine meets all of them.
-fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<f64> {
-    const FEW: u32 = 4;
-    let difference = |schedule: &Schedule, replay: &mut Replay, more: u32| {
-        let mut run = |k| replay.time(schedule.variant, schedule.budget(k), Start::Cold).as_nanos() as f64;
-        let few = run(FEW);
-        (run(FEW + more) - few) / f64::from(more)
-    };
-    let more: Vec<u32> = cases
-        .iter_mut()
-        .map(|(schedule, replay)| {
-            let estimate = difference(schedule, replay, 64).max(1.0);
-            (TIMED_NS / estimate).clamp(8.0, 4096.0) as u32
-        })
-        .collect();
-    let mut samples = vec![Vec::new(); cases.len()];
-    for _ in 0..rounds {
-        for (((schedule, replay), &more), samples) in cases.iter_mut().zip(&more).zip(&mut samples) {
-            samples.push(difference(schedule, replay, more));
-        }
-    }
-    samples
-        .into_iter()
-        .map(|mut s| {
-            s.sort_by(f64::total_cmp);
-            s[s.len() / 2]
-        })
-        .collect()
-}
-
-/// Scalar methods in `f64`, from `truth`. A contact is solved row by row there, so where there is
-/// friction the order of rows differs a little from the solvers'.
-fn scalar_curves(
-    problem: &ContactProblem,
-    reference: Option<&Reference>,
-    has_warm_start: bool,
-    options: &Options,
-) -> Vec<Curve> {
-    let stop = Stop { tolerance: 1e-9, iterations: options.max_iterations as usize };
-    let mut shuffled = problem.clone();
-    let order = Sequence::Shuffled(options.seed);
-    let manifolds: Vec<_> = problem.contacts.chunk_by(|p, q| p.manifold == q.manifold).collect();
-    shuffled.contacts =
-        order.order(manifolds.len()).iter().flat_map(|&i| manifolds[i as usize].iter().copied()).collect();
-    type Method = fn(&ContactProblem, &[Pair], Stop) -> sweeps::Run;
-    let methods: [(&str, &ContactProblem, Sequence, usize, Method); 5] = [
-        ("Gauss-Seidel", problem, Sequence::Natural, 1, |p, l, s| {
-            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
-        }),
-        ("Gauss-Seidel", &shuffled, order, 1, |p, l, s| {
-            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
-        }),
-        ("Jacobi", problem, Sequence::Natural, 1, |p, l, s| {
-            sweeps::jacobi(p, Target::Rigid, l, Splitting::Whole, s)
-        }),
-        ("Jacobi, mass splitting", problem, Sequence::Natural, 1, |p, l, s| {
-            sweeps::jacobi(p, Target::Rigid, l, Splitting::Mass, s)
-        }),
-        ("NNCG", problem, Sequence::Natural, 2, |p, l, s| nncg(p, Target::Rigid, l, s)),
-    ];
-    let mut curves = Vec::new();
-    for (name, problem, order, sweeps, method) in methods {
-        for start in [Start::Cold, Start::Warm].into_iter().take(if has_warm_start { 2 } else { 1 }) {
-            let warm = |c: &crate::truth::ProblemContact| {
-                if start == Start::Warm { c.warm_impulse } else { [0.0; 2] }
-            };
-            let run = method(problem, &problem.contacts.iter().map(warm).collect::<Vec<_>>(), stop);
-            let last = run.history.len() - 1;
-            let error = reference.map(|r| problem.velocity_error(&run.velocities, &r.velocities));
-            let points: Vec<Point> = (0..=last)
-                .map(|k| Point {
-                    iterations: k as u32,
-                    sweeps: k * sweeps,
-                    rigid: run.history[k],
-                    own: Some(run.history[k]),
-                    velocity_error: if k == last { error } else { None },
-                })
-                .collect();
-            let [rigid, own] = LAWS.map(|law| reached(&points, law, false));
-            curves.push(Curve {
-                solver: name.into(),
-                arithmetic: "f64",
-                order,
-                start,
-                points,
-                rigid,
-                own,
-                own_is_rigid: true,
-                ns_per_iteration: None,
-            });
-        }
-    }
-    curves
 }
