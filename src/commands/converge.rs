@@ -92,8 +92,8 @@ impl ConvergeArgs {
 pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let options = args.options()?;
     let path = Path::new(&args.problem);
-    let is_scene = !args.problem.ends_with(".frozen") && (args.problem.ends_with(".json") || !path.is_file());
-    let frozen = if !is_scene {
+    let is_frozen = args.problem.ends_with(".frozen") || path.is_file() && !args.problem.ends_with(".json");
+    let frozen = if is_frozen {
         Frozen::read(path)?
     } else {
         let (frozen, why_not) = freeze(&args.problem, args.step, &RunArgs::default())?;

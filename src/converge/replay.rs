@@ -101,7 +101,7 @@ pub struct Replay<'a> {
     work: Workspace,
     rows: Vec<BodyRow>,
     contacts: Vec<Contact>,
-    /// Manifold and point of each contact of the problem, and whether its sides are exchanged.
+    /// Contact and point within it that each contact of the problem became.
     places: Vec<(usize, usize)>,
     scratch: Vec<Contact>,
     input: StepInput,
