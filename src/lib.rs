@@ -50,10 +50,13 @@
 
 pub mod bodies;
 pub mod broadphase;
+pub mod capture;
 pub mod clock;
 pub mod coloring;
+pub mod commands;
 pub mod constraints;
 pub mod contacts;
+pub mod converge;
 pub mod error;
 pub mod lanes;
 pub mod metrics;

@@ -286,6 +286,13 @@ impl World {
         self.timings = clock.stop();
     }
 
+    /// Finds the contacts of the coming step, with the impulses that it would start from, and
+    /// solves nothing. The step finds the same contacts again.
+    pub fn find_contacts(&mut self) {
+        self.update_pairs();
+        self.update_contacts();
+    }
+
     /// The constraint records and body rows of the last step, for benches of single kernels.
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work

@@ -51,7 +51,7 @@ use crate::params::MAX_POSITION_CORRECTION;
 ///
 /// A rule is the whole difference between sequential-impulse solvers; the sweep around
 /// it is shared. `stiff` tells that body a is static or kinematic.
-pub trait NormalRule: Copy {
+pub trait NormalRule: Copy + 'static {
     /// Whether the sweep solves the friction rows as well.
     const FRICTION: bool;
     /// Whether the rule reads the separation.
