@@ -12,11 +12,20 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   simpulse                                       the default study, into results/
-  simpulse study --quick                         a look at everything, in seconds
+  simpulse --quick                               a look at everything, in seconds
   simpulse study --scenes stack:40,arch --solvers soft_step,pgs --lanes 1,8 --substeps 2,4,8
   simpulse run pyramid:50 --solver soft_step --lanes 16
   simpulse scene arch --json > my.json           a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
+
+const STUDY_EXAMPLES: &str = "\
+Without any budget option, each solver runs at half its standard budget, at that budget,
+and at its double. With some, every combination runs; what a solver ignores is left out.
+
+Examples:
+  simpulse study --quick
+  simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
+  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
 
 /// A laboratory for 2D contact solvers: how fast are they, and how wrong?
 ///
@@ -24,17 +33,21 @@ Examples:
 /// or that are hard, at lane widths 1, 4, 8 and 16 and three budgets each. It prints a table
 /// per scene and writes study.csv, study.json and speed_vs_error.svg.
 #[derive(Parser, Debug)]
-#[command(version, after_help = EXAMPLES, max_term_width = 100)]
+#[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to do; a study where none is given.
     #[command(subcommand)]
     pub command: Option<Command>,
+    /// Choices for the study that runs without a command.
+    #[command(flatten)]
+    pub study: StudyArgs,
 }
 
 /// What to do.
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
+    #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
@@ -48,14 +61,6 @@ pub enum Command {
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Without any budget option, each solver runs at half its standard budget, at that budget,
-and at its double. With some, every combination runs; what a solver ignores is left out.
-
-Examples:
-  simpulse study --quick
-  simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
-  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack")]
 pub struct StudyArgs {
     /// Scenes (`simpulse scenes` lists them), with a size after a colon, or .json files
     #[arg(long, value_delimiter = ',', value_name = "SCENE,…")]

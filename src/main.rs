@@ -41,13 +41,7 @@ fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => {
-            let default = Cli::parse_from(["simpulse", "study"]);
-            match default.command {
-                Some(Command::Study(args)) => study(&args),
-                _ => Ok(ExitCode::SUCCESS),
-            }
-        }
+        None => study(&cli.study),
         Some(Command::Study(args)) => study(&args),
         Some(Command::Run(args)) => match run::run(&args)? {
             run::Ending::Finished(text) => print(&text),
