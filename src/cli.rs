@@ -1,6 +1,8 @@
 //! The command line: what can be asked for.
 
 use clap::{Args, Parser, Subcommand};
+use simpulse::commands::capture::CaptureArgs;
+use simpulse::commands::converge::ConvergeArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
 use simpulse::solvers::{VARIANTS, Variant, find};
@@ -51,6 +53,10 @@ pub enum Command {
     Study(StudyArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
+    /// Freeze the contact problem of one step in a file
+    Capture(CaptureArgs),
+    /// Count the iterations every solver needs on one frozen problem
+    Converge(ConvergeArgs),
     /// List the scenes
     Scenes,
     /// List the solvers

@@ -8,6 +8,7 @@ mod run;
 use clap::Parser;
 use cli::{Cli, Command, SceneArgs, StudyArgs};
 use indicatif::{ProgressBar, ProgressStyle};
+use simpulse::commands;
 use simpulse::error::Error;
 use simpulse::report::{self, files};
 use simpulse::scenes::CATALOG;
@@ -50,6 +51,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
                 Ok(ExitCode::FAILURE)
             }
         },
+        Some(Command::Capture(args)) => commands::capture::run(&args),
+        Some(Command::Converge(args)) => commands::converge::run(&args),
         Some(Command::Scenes) => print(&scenes()),
         Some(Command::Solvers) => print(&solvers()),
         Some(Command::Scene(args)) => print(&scene(&args)?),
