@@ -5,6 +5,7 @@ use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
+use simpulse::params::CONTACT_HERTZ;
 use simpulse::solvers::{VARIANTS, Variant, find};
 use simpulse::study::StudyPlan;
 use simpulse::study::budget::BudgetGrid;
@@ -92,6 +93,10 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
@@ -143,6 +148,10 @@ pub struct RunArgs {
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Step in seconds [default: that of the scene]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
@@ -192,6 +201,7 @@ impl StudyArgs {
                 relax_iterations: self.relax_iterations.clone(),
                 position_iterations: self.position_iterations.clone(),
             },
+            contact_hertz: self.contact_hertz,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),
