@@ -8,6 +8,7 @@ mod run;
 use clap::Parser;
 use cli::{Cli, Command, SceneArgs, StudyArgs};
 use indicatif::{ProgressBar, ProgressStyle};
+use simpulse::commands;
 use simpulse::error::Error;
 use simpulse::report::{self, files};
 use simpulse::scenes::CATALOG;
@@ -41,13 +42,7 @@ fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => {
-            let default = Cli::parse_from(["simpulse", "study"]);
-            match default.command {
-                Some(Command::Study(args)) => study(&args),
-                _ => Ok(ExitCode::SUCCESS),
-            }
-        }
+        None => study(&cli.study),
         Some(Command::Study(args)) => study(&args),
         Some(Command::Run(args)) => match run::run(&args)? {
             run::Ending::Finished(text) => print(&text),
@@ -56,6 +51,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
                 Ok(ExitCode::FAILURE)
             }
         },
+        Some(Command::Capture(args)) => commands::capture::run(&args),
+        Some(Command::Converge(args)) => commands::converge::run(&args),
         Some(Command::Scenes) => print(&scenes()),
         Some(Command::Solvers) => print(&solvers()),
         Some(Command::Scene(args)) => print(&scene(&args)?),

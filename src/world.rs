@@ -124,7 +124,12 @@ pub struct Divergence {
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} has speed {} m/s", self.step, self.body, self.speed)
+        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
+        if self.speed.is_finite() {
+            write!(f, "moves at {:.3e} m/s", self.speed)
+        } else {
+            write!(f, "has no finite speed")
+        }
     }
 }
 

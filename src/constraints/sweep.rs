@@ -32,7 +32,7 @@
 //! s = s₀ + n·(Δx_b − Δx_a) + σ_b (r_b × n) + κ_b (r_b × t) − σ_a (r_a × n) − κ_a (r_a × t)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ (see [`turn`]).
+//! with σ = sin Δθ and κ = 1 − cos Δθ, both from their Taylor series.
 //!
 //! # Effective mass
 //!

@@ -30,12 +30,7 @@ pub fn reading(records: &[Record]) -> String {
         let least = group.iter().filter_map(error).min_by(f64::total_cmp);
         let nearest = least.and_then(|least| fastest(group.iter().filter(|r| error(r) == Some(least))));
         if let Some((record, truth)) = nearest.and_then(|r| Some((r, r.truth?))) {
-            let distance = si(truth.error.unwrap_or(0.0), truth.unit);
-            text += &format!(
-                "  nearest to its truth ({}), {distance} off: {}\n",
-                truth.quantity,
-                setting(record)
-            );
+            text += &format!("  nearest to its truth ({}): {}\n", truth.quantity, setting(record));
         }
     }
     text
@@ -53,7 +48,17 @@ fn setting(record: &Record) -> String {
         (Order::Colored, lanes) => format!("{lanes} lanes"),
     };
     let time = record.lap.as_ref().map_or(0.0, |lap| lap.median_ns / 1e3);
-    format!("{}, {}, {lanes}, {} µs", record.solver, record.budget_text, digits(time))
+    let mut text = format!("{}, {}, {lanes}, {} µs", record.solver, record.budget_text, digits(time));
+    // No time without its errors: a setting can be shallow and far from the truth.
+    if let Some(errors) = record.errors {
+        text += &format!(" ({} deep", si(errors.penetration_max, "m"));
+        match record.truth.map(|t| (t.error, t.unit)) {
+            Some((Some(error), unit)) => text += &format!(", {} from its truth)", si(error, unit)),
+            Some((None, _)) => text += ", truth missed)",
+            None => text += ")",
+        }
+    }
+    text
 }
 
 #[cfg(test)]
@@ -64,9 +69,11 @@ mod tests {
     #[test]
     fn the_cheapest_within_the_least_tolerance_is_named() {
         let records = [record(1, 1, 20.0, 4e-3), record(8, 2, 41.0, 9e-4), record(16, 4, 45.0, 1e-4)];
-        let expected = "cheapest setting within 1 mm on stack:2: pgs, 2 sub, 8 lanes, 41.0 µs\n";
+        let expected =
+            "cheapest setting within 1 mm on stack:2: pgs, 2 sub, 8 lanes, 41.0 µs (900 µm deep)\n";
         assert_eq!(reading(&records), expected);
-        assert!(reading(&records[..1]).contains("within 5 mm on stack:2: pgs, 1 sub, 1 lane, 20.0 µs"));
+        let within = "within 5 mm on stack:2: pgs, 1 sub, 1 lane, 20.0 µs (4.00 mm deep)";
+        assert!(reading(&records[..1]).contains(within));
         assert_eq!(reading(&[record(1, 1, 1.0, 2.0)]), "no setting stays within 100 mm on stack:2\n");
         assert_eq!(reading(&[failed(1)]), "on stack:2 every setting failed\n");
     }

@@ -10,7 +10,7 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 /// What the columns of [`scene_table`] are, once for the whole study.
 pub const LEGEND: &str = "\
 lanes: nat is one after the other in natural order, numbers are lanes in coloured order.  ± is the median
-deviation of a repeat.  ns/row: passes over constraints per row and sweep.  ×: times faster than 1 lane.
+deviation of a repeat.  ns/row: a sweep, per row that it solves.  ×: times faster than 1 lane.
 law: contact-law residual in the scene's weight × step.  energy, moment.: gained or lost, relative.  rest:
 rms speed of the last second.  occ.: lanes that hold a contact.  front: on the front of time against
 p penetration, l law residual, t truth; errors are the same for all coloured widths of a budget.
