@@ -62,4 +62,5 @@ pub mod scenes;
 pub mod shapes;
 pub mod solvers;
 pub mod truth;
+pub mod verify;
 pub mod world;
