@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
+use simpulse::commands::verify::VerifyArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
 use simpulse::params::CONTACT_HERTZ;
@@ -58,6 +59,8 @@ pub enum Command {
     Capture(CaptureArgs),
     /// Count the iterations every solver needs on one frozen problem
     Converge(ConvergeArgs),
+    /// Run the hard cases whose truth is known
+    Verify(VerifyArgs),
     /// List the scenes
     Scenes,
     /// List the solvers
