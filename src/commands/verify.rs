@@ -2,7 +2,9 @@
 
 use crate::error::Error;
 use crate::solvers::{DEFAULT, VARIANTS, Variant, find};
-use crate::verify::{self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required};
+use crate::verify::{
+    self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -142,9 +144,9 @@ fn text(matrix: &Matrix) -> String {
             }
         }
     }
-    let broken = CASES.len() - matrix.cases.len();
-    let left = if broken > 0 {
-        format!("not asked for: {broken} of {} cases\n", CASES.len())
+    let others = CASES.len() - matrix.cases.len();
+    let left = if others > 0 {
+        format!("not asked for: {others} of {} cases\n", CASES.len())
     } else {
         String::new()
     };
@@ -172,41 +174,36 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
             } else {
                 String::new()
             };
-            format!("{word} {}{truth} ({})", number(f.measured), margin(f.margin()))
+            format!("{word} {}{truth} ({})", number(f.measured), number(f.margin()))
         }
     }
 }
 
-fn margin(margin: f64) -> String {
-    if margin == f64::INFINITY { "∞".into() } else { format!("{margin:.2e}") }
-}
-
 /// The small table of a sweep, one column per solver.
-fn sweeps<'a>(matrix: &'a Matrix, row: usize, case: &Case) -> String {
+fn sweeps(matrix: &Matrix, row: usize, case: &Case) -> String {
     let columns = matrix.solvers.iter().zip(&matrix.cells[row]);
-    let sweep_of = |(solver, cell): (&&'static Variant, &'a Cell)| match cell {
-        Cell::Found(Finding { sweep: Some((parameter, rows)), .. }) => Some((solver.name, *parameter, rows)),
-        _ => None,
-    };
-    let found: Vec<_> = columns.filter_map(sweep_of).collect();
-    let Some((_, parameter, first)) = found.first() else { return String::new() };
+    let found: Vec<(&str, &Sweep)> = columns
+        .filter_map(|(solver, cell)| match cell {
+            Cell::Found(Finding { sweep: Some(sweep), .. }) => Some((solver.name, sweep)),
+            _ => None,
+        })
+        .collect();
+    let Some((_, first)) = found.first() else { return String::new() };
     let mut table = plain();
-    table.set_header(std::iter::once(*parameter).chain(found.iter().map(|(name, ..)| *name)));
-    for (i, (value, ..)) in first.iter().enumerate() {
-        let cells = found.iter().map(|(.., rows)| match rows.get(i) {
-            Some((_, measured, holds)) => {
-                format!("{} {}", if *holds { "pass" } else { "FAIL" }, number(*measured))
-            }
+    table.set_header(std::iter::once(first.parameter).chain(found.iter().map(|(name, _)| *name)));
+    for (i, row) in first.rows.iter().enumerate() {
+        let cells = found.iter().map(|(_, sweep)| match sweep.rows.get(i) {
+            Some(row) => format!("{} {}", if row.holds { "pass" } else { "FAIL" }, number(row.measured)),
             None => String::new(),
         });
-        table.add_row(std::iter::once(number(*value)).chain(cells));
+        table.add_row(std::iter::once(number(row.value)).chain(cells));
     }
     format!("\n{}: {}\n{table}\n", case.id, case.summary)
 }
 
 fn plain() -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Dynamic);
     table
 }
 
@@ -255,10 +252,10 @@ fn json(matrix: &Matrix) -> Value {
                     value[key] = finite(x);
                 }
                 value["note"] = json!(f.note);
-                if let Some((parameter, rows)) = &f.sweep {
-                    let rows: Vec<_> =
-                        rows.iter().map(|(x, m, h)| json!([finite(*x), finite(*m), h])).collect();
-                    value["sweep"] = json!({ "parameter": parameter, "rows": rows });
+                if let Some(sweep) = &f.sweep {
+                    let row = |r: &SweepRow| json!([finite(r.value), finite(r.measured), r.holds]);
+                    let rows: Vec<_> = sweep.rows.iter().map(row).collect();
+                    value["sweep"] = json!({ "parameter": sweep.parameter, "rows": rows });
                 }
             }
         }
@@ -304,5 +301,58 @@ fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
         _ => Ok(code),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (13.0, "13"),
+            (0.38333, "0.3833"),
+            (4454.9, "4455"),
+            (-4.529, "-4.529"),
+            (1e5, "1.00e5"),
+            (7.72e-5, "7.72e-5"),
+            (f64::INFINITY, "∞"),
+            (f64::NEG_INFINITY, "-∞"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_cell_shows_verdict_value_and_margin() {
+        let cell = Cell::Found(Finding::new(1.5, 1.0, 0.25));
+        assert_eq!(cell_text(&cell, false), "FAIL 1.5 (2)");
+        assert_eq!(cell_text(&cell, true), "FAIL 1.5, truth 1 ± 0.25 (2)");
+        assert_eq!(cell_text(&Cell::Foreign, false), "not its law");
+    }
+
+    #[test]
+    fn the_list_says_what_is_required_and_what_is_skipped() {
+        let cases = verify::select(&["B2.box".to_string(), "A6".to_string()]).unwrap();
+        let text = list(&cases);
+        for part in ["A6.elastic", "not required of soft_step", "(law of soft_step)", "B20 (bridge"] {
+            assert!(text.contains(part), "{part} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn the_file_is_replaced_as_a_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("verify.json");
+        let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
+        let matrix = verify::run(cases, VARIANTS.iter().collect(), 1, Lab::new, &|_| ());
+        write(temporary(&path).unwrap(), &path, &json(&matrix)).unwrap();
+        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
+        assert_eq!(read["broken_promises"], json!([]));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(temporary(&folder.path().join("missing/verify.json")).is_err());
     }
 }

@@ -4,8 +4,9 @@ use super::lab::*;
 use super::{Failure, Finding, Lab};
 use crate::scenes::{Scene, SceneBody, SceneShape};
 
-/// A5. Worst apex of four bounces from 10 m with e = ½. A scheme that sees an impact once per step sees it up to v dt too
-/// deep, and the energy of that height, m g v dt, is what it may be off by: v dt in the first apex, with v² = 2 g 10 m.
+/// A5. Worst apex of four bounces from 10 m with e = ½. A scheme that sees an impact once per step sees
+/// it up to v dt too deep, and the energy of that height, m g v dt, is what it may be off by: v dt in
+/// the first apex, with v² = 2 g 10 m.
 pub(super) fn bounce(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce", (2.0 * G * 10.0).sqrt() / 60.0)
 }
@@ -74,8 +75,8 @@ pub(super) fn cradle_sequence(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(speeds[4], 1.0, 0.01).note(list(&speeds)))
 }
 
-/// A18. Three that touch: two laws conserve momentum and energy, the sequential (0, 0, 1) and the simultaneous
-/// (−1/3, 2/3, 2/3). The distance to the nearer.
+/// A18. Three that touch: two laws conserve momentum and energy, the sequential (0, 0, 1) and the
+/// simultaneous (−1/3, 2/3, 2/3). The distance to the nearer.
 pub(super) fn cradle_law(lab: &Lab) -> Result<Finding, Failure> {
     let (speeds, _) = cradle(lab, 3, 0.0)?;
     let (distance, law) = nearest_law(&speeds);

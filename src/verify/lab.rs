@@ -1,6 +1,6 @@
 //! Where cases are run: worlds of one solver, and readings of their state in `f64`.
 
-use super::{Failure, Finding};
+use super::{Failure, Finding, Sweep, SweepRow};
 use crate::bodies::BodyKind;
 use crate::contacts::Contact;
 use crate::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP};
@@ -169,8 +169,8 @@ pub(super) fn ground_load(world: &World) -> f64 {
     sum / f64::from(world.settings.dt)
 }
 
-/// How far the load under bodies of `mass` (kg) that rest as well as [`REST`] asks may be from their weight (N): in
-/// a step, no velocity may change by more than 2 · [`REST`].
+/// How far the load under bodies of `mass` (kg) that rest as well as [`REST`] asks may be from their
+/// weight (N): in a step, no velocity may change by more than 2 · [`REST`].
 pub(super) fn load_tolerance(mass: f64, dt: f64) -> f64 {
     2.0 * REST * mass / dt
 }
@@ -239,9 +239,9 @@ pub(super) fn bisect(
     Ok(0.5 * (low + high))
 }
 
-/// Tries a growing parameter; what is measured is the last value before the first that fails
-/// (0 if the first does), what is wanted is the last of all. `hold` gives a number for the table and whether it is
-/// good enough; a run that diverges does not hold.
+/// Tries a growing parameter; what is measured is the last value before the first that fails (0 if the
+/// first does), what is wanted is the last of all. `hold` gives a number for the table and whether it
+/// is good enough; a run that diverges does not hold.
 pub(super) fn sweep(
     parameter: &'static str,
     values: &[f64],
@@ -253,11 +253,11 @@ pub(super) fn sweep(
             Err(Failure::Diverged(_)) => (f64::INFINITY, false),
             other => other?,
         };
-        rows.push((value, measured, holds));
+        rows.push(SweepRow { value, measured, holds });
     }
-    let held = rows.iter().take_while(|row| row.2).last().map_or(0.0, |row| row.0);
+    let held = rows.iter().take_while(|row| row.holds).last().map_or(0.0, |row| row.value);
     let all = values.last().copied().unwrap_or(0.0);
-    Ok(Finding { sweep: Some((parameter, rows)), ..Finding::new(held, all, 0.0) })
+    Ok(Finding { sweep: Some(Sweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
 }
 
 /// Ground at height 0 of friction µ: a line of half length `half` (m).
@@ -265,7 +265,8 @@ pub(super) fn ground(half: f64, friction: f64) -> SceneBody {
     SceneBody::fixed([0.0, 0.0], SceneShape::line(half).friction(friction))
 }
 
-/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its centre `height` above it (m).
+/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its centre
+/// `height` above it (m).
 pub(super) fn on_slope(angle: f64, friction: f64, shape: SceneShape, height: f64) -> Scene {
     let (sin, cos) = angle.sin_cos();
     let plank = SceneShape::rectangle(40.0, 0.5).friction(friction);

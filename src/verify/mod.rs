@@ -18,14 +18,25 @@
 //! | promise | because |
 //! |---|---|
 //! | free motion is exact on its discrete formula | semi-implicit Euler |
-//! | one body slides, sticks and rolls by Coulomb's law | friction rows are rigid, warm started, solved last |
+//! | one body slides, sticks and rolls by Coulomb's law once loads are warm | friction rows are rigid, solved last |
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
 //! | piles whose Gauss–Seidel rate leaves no error within the run come to rest | cos²(π/2N) and R/(1+R) per sweep |
 //! | overlap is pushed apart no faster than 3 m/s | the cap |
 //!
-//! It does not promise: bounces within a step, heavy loads on light bodies (the depth F/(m ω²)
-//! itself exceeds the body), positions finer than an `f32` of the distance from the origin, one
-//! solution where the sweeps of one step have not converged.
+//! It does not promise:
+//!
+//! - Bounces within a step, positions finer than an `f32` of the distance from the origin, one
+//!   solution where the sweeps of a step have not converged.
+//! - Heavy loads on light bodies: the depth F/(m ω²) itself exceeds the body.
+//! - **High stacks.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
+//!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
+//!   column of N links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam
+//!   does, at q N³ = 7.837 K: N = 14.1. More iterations or substeps do not help; a higher frequency does.
+//! - **Friction in the first substep.** A box on a slope has contact points ½ m below its centre:
+//!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box. The
+//!   rest, 0.6 g h sin θ, is left once, and friction that exceeds tan θ by little takes long to stop it.
+//! - **Rolling discs.** Within a step, contact points turn with their body, so a disc that rolls by
+//!   φ seems to lift off by r (1 − cos φ) and sinks until the spring makes up for it.
 
 mod far;
 mod impacts;
@@ -91,8 +102,28 @@ pub struct Finding {
     pub tolerance: f64,
     /// What else is worth knowing; often empty.
     pub note: String,
-    /// Of a threshold: the parameter's name, and per value what was measured and whether it was good enough.
-    pub sweep: Option<(&'static str, Vec<(f64, f64, bool)>)>,
+    /// Where the truth is a threshold, how it was found.
+    pub sweep: Option<Sweep>,
+}
+
+/// A parameter tried value by value.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Sweep {
+    /// Its name, with its unit.
+    pub parameter: &'static str,
+    /// In the order tried.
+    pub rows: Vec<SweepRow>,
+}
+
+/// A row of a [`Sweep`].
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct SweepRow {
+    /// Of the parameter.
+    pub value: f64,
+    /// What was measured there; infinite if the run diverged.
+    pub measured: f64,
+    /// Whether it is good enough.
+    pub holds: bool,
 }
 
 impl Finding {

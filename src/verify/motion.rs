@@ -111,9 +111,9 @@ fn slid(lab: &Lab, name: &str, dt: f64) -> Result<(f64, f64), Failure> {
     Ok((distance / (parabola * (1.0 + 1.0 / n)) - 1.0, distance / parabola - 1.0))
 }
 
-/// B14. The shortest step that moves a body at rest at 1.5 m, where `f32`s are 2⁻²³ m apart. A step of n substeps moves it by
-/// g h² (1 + … + n) = g dt² (n + 1)/(2n); half a spacing, 2⁻²⁴ m, is the least that is not rounded away, so
-/// dt = √(2⁻²³ n/(g (n + 1))): 7.7e-5 s for n = 1, 9.8e-5 s for n = 4.
+/// B14. The shortest step that moves a body at rest at 1.5 m, where `f32`s are 2⁻²³ m apart. A step of
+/// n substeps moves it by g h² (1 + … + n) = g dt² (n + 1)/(2n); half a spacing, 2⁻²⁴ m, is the least
+/// that is not rounded away, so dt = √(2⁻²³ n/(g (n + 1))): 7.7e-5 s for n = 1, 9.8e-5 s for n = 4.
 pub(super) fn freeze(lab: &Lab) -> Result<Finding, Failure> {
     let start = 1.5;
     let found = bisect(1e-5, 3e-4, |dt| {

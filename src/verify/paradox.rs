@@ -9,8 +9,9 @@ use crate::truth::{ContactProblem, ProblemBody, ProblemContact, Velocity};
 /// Angle of a card from the vertical (rad).
 const LEAN: f64 = 25.0 * std::f64::consts::PI / 180.0;
 
-/// B10. Least friction at the feet of two leaning cards, by the linear program of statics. Moments about the top of one card:
-/// tan φ (W/2 + P)/(W + P) for a load P on its top; here the worst of P = 0, W and 10 W, relative.
+/// B10. Least friction at the feet of two leaning cards, by the linear program of statics. Moments
+/// about the top of one card: tan φ (W/2 + P)/(W + P) for a load P on its top; here the worst of P = 0,
+/// W and 10 W, relative.
 pub(super) fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
     let mut worst = 0.0;
     for extra in [0.0, 1.0, 10.0] {
@@ -62,10 +63,11 @@ fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
 /// Half length and half thickness of a simulated card (m): long, so that overlap hardly changes its angle.
 const CARD: [f64; 2] = [2.0, 0.02];
 
-/// B10. The same by simulation, P = 0: the friction below which the tops drop by 5 cm in three seconds. A card of half length l and
-/// half thickness t stands on the inner corner of its foot and leans with the outer one of its top, so its centre is t cos φ nearer to the
-/// line through the top: µ = tan φ/2 − t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and
-/// the threshold by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
+/// B10. The same by simulation, P = 0: the friction below which the tops drop by 5 cm in three seconds.
+/// A card of half length l and half thickness t stands on the inner corner of its foot and leans with
+/// the outer one of its top, so its centre is t cos φ nearer to the line through the top: µ = tan φ/2 −
+/// t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and the threshold
+/// by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
 pub(super) fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {
     let truth = 0.5 * LEAN.tan() - CARD[1] / (2.0 * CARD[0]);
     let found = bisect(0.0, 2.0 * truth, |friction| {
@@ -88,9 +90,10 @@ fn cards(friction: f64) -> Scene {
     Scene::new("cards", vec![ground(20.0, friction * friction), card(1.0), card(-1.0)])
 }
 
-/// B12. A rod of 1 kg and half length 1 m slides at 1 m/s on its lower end, tan θ = 2, µ = 2: pressing the end down, friction would need
-/// (1.6 − 1.2 µ) λn = g h, so the end sticks: an impact without a collision, λn = 0.3 + 0.85 g h. Impulse of the first
-/// step, and speed of the end after it; steps of 1 ms, twice the term in h for what substeps after the first add.
+/// B12. A rod of 1 kg and half length 1 m slides at 1 m/s on its lower end, tan θ = 2, µ = 2: pressing
+/// the end down, friction would need (1.6 − 1.2 µ) λn = g h, so the end sticks: an impact without a
+/// collision, λn = 0.3 + 0.85 g h. Impulse of the first step, and speed of the end after it; steps of 1
+/// ms, twice the term in h for what substeps after the first add.
 fn rod(lab: &Lab) -> Result<[f64; 2], Failure> {
     let (sin, cos) = (2.0 / 5f64.sqrt(), 1.0 / 5f64.sqrt());
     let thickness = 1e-4;

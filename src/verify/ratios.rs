@@ -22,8 +22,9 @@ pub(super) fn light_on_heavy(lab: &Lab) -> Result<Finding, Failure> {
 
 const RATIOS: &[f64] = &[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 
-/// Two discs of these masses (kg), lower first. At rest means: in order, no deeper than the slop or a soft contact
-/// under its load, kinetic energy below 1e-6 J per kg. The table shows the depth of the upper contact.
+/// Two discs of these masses (kg), lower first. At rest means: in order, no deeper than the slop or a
+/// soft contact under its load, kinetic energy below 1e-6 J per kg. The table shows the depth of the
+/// upper contact.
 fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
     let disc = |i: usize| {
         let shape = SceneShape::disc(0.5).density(4.0 * masses[i] / PI);

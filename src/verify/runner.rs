@@ -35,7 +35,7 @@ pub struct Matrix {
     pub cases: Vec<&'static Case>,
     /// Columns.
     pub solvers: Vec<&'static Variant>,
-    /// `[case][solver]`
+    /// One vector per case, one cell per solver.
     pub cells: Vec<Vec<Cell>>,
 }
 
