@@ -55,6 +55,9 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         }
         times.add(&world.timings);
         observation.observe(&world);
+        if let Some(blow_up) = observation.blown_up() {
+            return Ok(Ending::Diverged(blow_up.into()));
+        }
         if let Some(truth) = &mut loaded.truth {
             truth.observer.observe(&world);
         }

@@ -9,6 +9,7 @@ use crate::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::coloring::{Coloring, EXEMPT};
 use crate::constraints::motion::{self, Integrator, MotionInput, RotationUpdate};
+use crate::constraints::observe::ObservedRule;
 use crate::constraints::restitution::Bounces;
 use crate::constraints::{Layout, Needs, OppositeKind, StepInput, Workspace};
 use crate::contacts::Contact;
@@ -48,6 +49,8 @@ pub struct Settings {
     pub contact_hertz: f32,
     /// Sum impulses over the substeps into [`Contact::step_impulse`].
     pub record_impulses: bool,
+    /// Keep the rule of each step's last velocity sweep, see [`World::observed_rule`].
+    pub observe_rule: bool,
     /// Read the clock around every phase.
     pub timed: bool,
     /// How candidate pairs are found.
@@ -72,6 +75,7 @@ impl Settings {
             dt: 1.0 / 60.0,
             contact_hertz: CONTACT_HERTZ,
             record_impulses: false,
+            observe_rule: false,
             timed: false,
             broadphase: BroadPhaseKind::HashGrid,
             integrator: Integrator::default(),
@@ -290,6 +294,12 @@ impl World {
         self.update_contacts();
     }
 
+    /// The rule of the last step's last velocity sweep: none without one, or without
+    /// `Settings::observe_rule`.
+    pub fn observed_rule(&self) -> Option<&ObservedRule> {
+        self.work.last_rule.as_ref()
+    }
+
     /// The constraint records and body rows of the last step, for benches of single kernels.
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work
@@ -321,6 +331,7 @@ impl World {
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
         };
+        (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
         (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
     }

@@ -153,27 +153,44 @@ pub fn ablation_table(costs: &[NeedCost]) -> String {
     text
 }
 
-/// The errors of one run, a line each.
+/// The errors of one run, a line each; what is absent has none.
 pub fn error_list(errors: &Errors) -> String {
+    let e = errors;
+    let length = |value: f64| si(value, "m");
     let lines = [
-        ("penetration max", si(errors.penetration_max, "m")),
-        ("penetration mean", si(errors.penetration_mean, "m")),
-        ("penetration rms", si(errors.penetration_rms, "m")),
-        ("penetration 99 %", si(errors.penetration_p99, "m")),
-        ("penetration max / half-extent", ratio(errors.penetration_relative)),
-        ("law residual, normal, rms", ratio(errors.law_normal_rms)),
-        ("law residual, normal, max", ratio(errors.law_normal_max)),
-        ("law residual, tangential, rms", ratio(errors.law_tangent_rms)),
-        ("law residual, tangential, max", ratio(errors.law_tangent_max)),
-        ("momentum out of balance", ratio(errors.momentum)),
-        ("angular momentum out of balance", ratio(errors.angular_momentum)),
-        ("energy change", ratio(errors.energy_change)),
-        ("energy created, worst step", ratio(errors.energy_created)),
-        ("rest velocity, last second", si(errors.rest_velocity, "m/s")),
+        ("penetration max", Some(length(e.penetration_max))),
+        ("penetration mean", Some(length(e.penetration_mean))),
+        ("penetration rms", Some(length(e.penetration_rms))),
+        ("penetration 99 %", Some(length(e.penetration_p99))),
+        ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
+        ("soft contacts give way, last second", e.soft_floor.map(length)),
+        ("penetration beyond that", e.penetration_excess.map(length)),
+        ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
+        ("law residual, normal, max", Some(ratio(e.law_normal_max))),
+        ("law residual, tangential, rms", Some(ratio(e.law_tangent_rms))),
+        ("law residual, tangential, max", Some(ratio(e.law_tangent_max))),
+        ("complementarity violated, max", Some(ratio(e.complementarity))),
+        ("friction cone violated, max", Some(ratio(e.cone))),
+        ("gap to maximal dissipation, max", Some(ratio(e.dissipation))),
+        ("residual of its own law, rms", e.own_rms.map(ratio)),
+        ("residual of its own law, max", e.own_max.map(ratio)),
+        ("momentum out of balance", Some(ratio(e.momentum))),
+        ("angular momentum out of balance", Some(ratio(e.angular_momentum))),
+        ("energy change", Some(ratio(e.energy_change))),
+        ("energy created, worst step", Some(ratio(e.energy_created))),
+        ("energy unexplained, worst step", Some(ratio(e.energy_unexplained))),
+        ("energy taken by friction", Some(ratio(e.friction_loss))),
+        ("energy taken by normal impulses", Some(ratio(e.impact_loss))),
+        ("rest velocity, last second", Some(si(e.rest_velocity, "m/s"))),
+        (
+            "creep, last second, with 95 %",
+            Some(format!("{} ± {}", si(e.creep, "m/s"), si(e.creep_half_width, "m/s"))),
+        ),
+        ("settled after", Some(e.settled.map_or("never".to_string(), |t| si(t, "s")))),
     ];
-    lines.iter().map(|(name, value)| format!("  {name:<34}{value:>12}\n")).collect()
+    let shown = lines.into_iter().filter_map(|(name, value)| Some((name, value?)));
+    shown.map(|(name, value)| format!("  {name:<36}{value:>12}\n")).collect()
 }
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -267,7 +267,11 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Err
         Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
     };
-    let mut world = scene.build(Settings { record_impulses: true, ..settings(plan, cell, order, width) })?;
+    let mut world = scene.build(Settings {
+        record_impulses: true,
+        observe_rule: true,
+        ..settings(plan, cell, order, width)
+    })?;
     let mut observation = Observation::new(&world);
     let (mut hash, timed) = (0, timing_steps(plan, &scene));
     for step in 1..=scene.steps {
@@ -275,6 +279,9 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Err
             return Ok(Outcome { errors: Err(divergence), truth: None, hash });
         }
         observation.observe(&world);
+        if let Some(blow_up) = observation.blown_up() {
+            return Ok(Outcome { errors: Err(blow_up), truth: None, hash });
+        }
         if let Some(truth) = &mut truth {
             truth.observer.observe(&world);
         }
