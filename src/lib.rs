@@ -50,17 +50,23 @@
 
 pub mod bodies;
 pub mod broadphase;
+pub mod capture;
 pub mod clock;
 pub mod coloring;
+pub mod commands;
 pub mod constraints;
 pub mod contacts;
+pub mod converge;
 pub mod error;
 pub mod lanes;
+pub mod metrics;
 pub mod narrowphase;
 pub mod params;
+pub mod report;
 pub mod scenes;
 pub mod shapes;
 pub mod solvers;
+pub mod study;
 pub mod truth;
 pub mod verify;
 pub mod world;

@@ -1,1 +1,167 @@
-fn main() {}
+//! The program: parse, run, report.
+//!
+//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met.
+
+mod cli;
+mod run;
+
+use clap::Parser;
+use cli::{Cli, Command, SceneArgs, StudyArgs};
+use indicatif::{ProgressBar, ProgressStyle};
+use simpulse::commands;
+use simpulse::error::Error;
+use simpulse::report::{self, files};
+use simpulse::scenes::CATALOG;
+use simpulse::solvers::VARIANTS;
+use simpulse::study::{self, Progress, ablation, budget, open_scene};
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+fn main() -> ExitCode {
+    let result = match Cli::try_parse() {
+        Ok(cli) => execute(cli),
+        // Help and version are answers; clap's advice on the rest goes on one line.
+        Err(error) if !error.use_stderr() => {
+            let _ = error.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => {
+            eprintln!("error: {}", one_line(&error.to_string()));
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {}", one_line(&error.to_string()));
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn execute(cli: Cli) -> Result<ExitCode, Error> {
+    match cli.command {
+        None => study(&cli.study),
+        Some(Command::Study(args)) => study(&args),
+        Some(Command::Run(args)) => match run::run(&args)? {
+            run::Ending::Finished(text) => print(&text),
+            run::Ending::Diverged(failure) => {
+                eprintln!("failed: {} {failure}; nothing written", args.scene);
+                Ok(ExitCode::FAILURE)
+            }
+        },
+        Some(Command::Capture(args)) => commands::capture::run(&args),
+        Some(Command::Converge(args)) => commands::converge::run(&args),
+        Some(Command::Verify(args)) => commands::verify::run(&args),
+        Some(Command::Scenes) => print(&scenes()),
+        Some(Command::Solvers) => print(&solvers()),
+        Some(Command::Scene(args)) => print(&scene(&args)?),
+    }
+}
+
+/// To standard output; a reader that has left is not an error.
+fn print(text: &str) -> Result<ExitCode, Error> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// A message without its own prefix and without advice on usage, on one line.
+fn one_line(message: &str) -> String {
+    let message = message.strip_prefix("error: ").unwrap_or(message);
+    let message = message.split("\nUsage:").next().unwrap_or(message);
+    let message = message.split("\nFor more information").next().unwrap_or(message);
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
+    let plan = args.plan()?;
+    plan.check()?;
+    // Before the long wait, not after it.
+    files::prepare_folder(&args.out)?;
+    let records = match std::io::stderr().is_terminal() {
+        true => with_bar(|tell| study::run(&plan, tell))?,
+        false => with_lines(&plan.scenes, |tell| study::run(&plan, tell))?,
+    };
+    let costs = ablation::ablation(&plan)?;
+    let paths = report::write_study(&args.out, &plan, &records, &costs)?;
+    let mut text = report::text(&records, &costs) + "\n";
+    for path in paths {
+        text += &format!("wrote {}\n", path.display());
+    }
+    print(&text)
+}
+
+/// A bar that says what runs.
+fn with_bar<T>(work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
+    let bar = ProgressBar::new(1);
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let result = work(&|progress: Progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+        bar.set_message(progress.what);
+    });
+    bar.finish_and_clear();
+    result
+}
+
+/// Where there is no terminal, a line when the times of a scene are begun.
+fn with_lines<T>(scenes: &[String], work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
+    eprintln!("measuring errors of {} scenes, then times", scenes.len());
+    let last = Mutex::new(String::new());
+    work(&|progress: Progress| {
+        let Progress { done, total, what } = progress;
+        let scene = what.strip_prefix("times ").and_then(|w| w.split(" · ").next());
+        if let (Some(scene), Ok(mut last)) = (scene, last.lock())
+            && *last != scene
+        {
+            *last = scene.to_string();
+            eprintln!("{done}/{total} times of {scene}");
+        }
+    })
+}
+
+fn scenes() -> String {
+    let mut text = String::new();
+    for entry in CATALOG {
+        let name = match entry.size {
+            Some(size) => format!("{}:{}", entry.name, size.default),
+            None => entry.name.to_string(),
+        };
+        let known = if entry.truth.is_some() { " [truth known]" } else { "" };
+        let size = entry.size.map_or(String::new(), |s| format!(" ({} to {} {})", s.min, s.max, s.meaning));
+        text += &format!("{name:<22}{}{size}{known}\n", entry.summary);
+    }
+    text
+}
+
+fn solvers() -> String {
+    let line = |v: &simpulse::solvers::Variant| {
+        let standard = budget::brief(&v.budget, v);
+        format!("{:<12}{} [{}; standard {standard}]\n", v.name, v.summary, v.source)
+    };
+    VARIANTS.iter().map(line).collect()
+}
+
+fn scene(args: &SceneArgs) -> Result<String, Error> {
+    let loaded = open_scene(&args.name, args.seed, None, None)?;
+    let scene = loaded.scene;
+    if args.json {
+        return Ok(scene.to_json());
+    }
+    let [gx, gy] = scene.gravity;
+    let mut text = format!(
+        "{}: {} bodies, {} steps of {} s, gravity ({gx}, {gy})\n",
+        scene.name,
+        scene.bodies.len(),
+        scene.steps,
+        scene.dt
+    );
+    if let Some(truth) = loaded.truth {
+        text += &format!("known: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
+    }
+    Ok(text)
+}

@@ -124,7 +124,12 @@ pub struct Divergence {
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} has speed {} m/s", self.step, self.body, self.speed)
+        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
+        if self.speed.is_finite() {
+            write!(f, "moves at {:.3e} m/s", self.speed)
+        } else {
+            write!(f, "has no finite speed")
+        }
     }
 }
 
@@ -279,6 +284,13 @@ impl World {
         self.pairs_are_stale = true;
         self.solve(&mut clock);
         self.timings = clock.stop();
+    }
+
+    /// Finds the contacts of the coming step, with the impulses that it would start from, and
+    /// solves nothing. The step finds the same contacts again.
+    pub fn find_contacts(&mut self) {
+        self.update_pairs();
+        self.update_contacts();
     }
 
     /// The constraint records and body rows of the last step, for benches of single kernels.

@@ -61,9 +61,8 @@ fn free_fall_is_the_discrete_parabola() {
 /// Free spin (A16): θ = ω t when turned exactly, atan(ω h)/(ω h) of it when normalised.
 #[test]
 fn free_spin_turns_by_the_angle_of_its_update() {
-    let updates: [(RotationUpdate, fn(f64) -> f64); 2] =
-        [(RotationUpdate::Exact, |_| 1.0), (RotationUpdate::Normalized, |x| x.atan() / x)];
-    for (update, ratio) in updates {
+    for update in [RotationUpdate::Exact, RotationUpdate::Normalized] {
+        let ratio = |x: f64| if update == RotationUpdate::Exact { 1.0 } else { x.atan() / x };
         for spin in [5.0, 50.0, 200.0] {
             let mut settings = Settings::new(&VARIANTS[2]);
             (settings.rotation, settings.gravity) = (update, [0.0; 2]);

@@ -1,14 +1,14 @@
 //! `simpulse verify`: hard cases with known truths, against every solver.
 
+use crate::error::Error;
+use crate::solvers::{DEFAULT, VARIANTS, Variant, find};
+use crate::verify::{
+    self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+};
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use simpulse::error::Error;
-use simpulse::solvers::{DEFAULT, VARIANTS, Variant, find};
-use simpulse::verify::{
-    self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
-};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

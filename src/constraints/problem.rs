@@ -3,6 +3,7 @@
 use super::batches::Batches;
 use super::motion::Motion;
 use super::needs::{KernelNeeds, Needs};
+use super::observe::ObservedRule;
 use super::prepare;
 use super::restitution::{self, Bounces};
 use super::sweep::{self, NormalRule};
@@ -27,6 +28,10 @@ pub struct Workspace {
     pub lane_bounces: Bounces,
     /// Bounces of `serial`.
     pub serial_bounces: Bounces,
+    /// Keep the rule of the last velocity sweep in `last_rule`.
+    pub observe: bool,
+    /// See `observe`.
+    pub last_rule: Option<ObservedRule>,
 }
 
 /// One step's problem at one width and with one set of needs.
@@ -175,6 +180,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         sweep::sweep::<L, N, _>(&mut self.work.rows, &mut self.work.lanes, rule);
         sweep::sweep::<f32, N, _>(&mut self.work.rows, &mut self.work.serial, rule);
         self.count_sweep(if N::FRICTION && R::FRICTION { 2 } else { 1 });
+        if self.work.observe {
+            self.work.last_rule = Some(ObservedRule::of(rule, &self.work.rows));
+        }
         self.clock.lap(phase);
     }
 

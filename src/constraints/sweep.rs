@@ -32,7 +32,7 @@
 //! s = s₀ + n·(Δx_b − Δx_a) + σ_b (r_b × n) + κ_b (r_b × t) − σ_a (r_a × n) − κ_a (r_a × t)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ (see [`turn`]).
+//! with σ = sin Δθ and κ = 1 − cos Δθ, both from their Taylor series.
 //!
 //! # Effective mass
 //!
@@ -51,7 +51,7 @@ use crate::params::MAX_POSITION_CORRECTION;
 ///
 /// A rule is the whole difference between sequential-impulse solvers; the sweep around
 /// it is shared. `stiff` tells that body a is static or kinematic.
-pub trait NormalRule: Copy {
+pub trait NormalRule: Copy + 'static {
     /// Whether the sweep solves the friction rows as well.
     const FRICTION: bool;
     /// Whether the rule reads the separation.

@@ -1,6 +1,7 @@
 //! Solver variants, one file each; [`VARIANTS`] is the table that everything iterates.
 //!
-//! A variant is a schedule of passes over a [`Problem`] and a [`NormalRule`] or two.
+//! A variant is a schedule of passes over a [`Problem`] and a
+//! [`NormalRule`](crate::constraints::NormalRule) or two.
 //! Variants never import one another. `pgs.rs` is the tutorial: it explains the whole
 //! method, the others only what differs.
 

@@ -1,0 +1,88 @@
+//! Which machine and which compiler a result belongs to.
+
+/// Written beside every result.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Environment {
+    /// Model name of the processor.
+    pub cpu: String,
+    /// Processors that the run could use.
+    pub processors: usize,
+    /// Version of the compiler that built the program.
+    pub compiler: String,
+    /// `x86_64`, …
+    pub architecture: &'static str,
+    /// `linux`, …
+    pub system: &'static str,
+    /// Instruction sets that the compiler was allowed to use: these, not the processor's,
+    /// decide what a lane width becomes.
+    pub target_features: Vec<&'static str>,
+    /// Widest lanes that one instruction of these sets processes.
+    pub native_lanes: usize,
+    /// Whether the program was built with optimisation checks on.
+    pub debug_assertions: bool,
+    /// Version of this crate.
+    pub version: &'static str,
+}
+
+impl Environment {
+    /// Of this program on this machine.
+    pub fn current() -> Self {
+        Environment {
+            cpu: cpu_model(),
+            processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
+            compiler: compiler(),
+            architecture: std::env::consts::ARCH,
+            system: std::env::consts::OS,
+            target_features: target_features(),
+            native_lanes: native_lanes(),
+            debug_assertions: cfg!(debug_assertions),
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+}
+
+fn cpu_model() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    model.map_or("unknown".to_string(), |(_, name)| name.trim().to_string())
+}
+
+fn target_features() -> Vec<&'static str> {
+    macro_rules! enabled {
+        ($($name:literal),*) => { [$(($name, cfg!(target_feature = $name))),*] };
+    }
+    let all = enabled!(
+        "sse2", "sse4.1", "avx", "avx2", "fma", "avx512f", "avx512vl", "avx512dq", "neon", "simd128"
+    );
+    all.into_iter().filter(|f| f.1).map(|f| f.0).collect()
+}
+
+fn native_lanes() -> usize {
+    if cfg!(target_feature = "avx512f") {
+        16
+    } else if cfg!(target_feature = "avx") {
+        8
+    } else if cfg!(any(target_feature = "sse2", target_feature = "neon", target_feature = "simd128")) {
+        4
+    } else {
+        1
+    }
+}
+
+/// The compiler writes its version into the comment section of the program; no constant
+/// of the language holds it.
+fn compiler() -> String {
+    const MARK: &[u8] = b"rustc version ";
+    let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+    // This constant is in the program too, but no digit follows it.
+    let versions = program.windows(MARK.len()).enumerate().filter(|w| w.1 == MARK);
+    let mut texts = versions.map(|(at, _)| &program[at + MARK.len()..]);
+    match texts.find(|text| text.first().is_some_and(u8::is_ascii_digit)) {
+        Some(text) => {
+            let printable = text.iter().take_while(|c| (b' '..0x7f).contains(c));
+            printable
+                .fold("rustc ".to_string(), |version, &c| version + char::from(c).encode_utf8(&mut [0; 4]))
+        }
+        None => format!("rustc {} or later", env!("CARGO_PKG_RUST_VERSION")),
+    }
+}

@@ -1,0 +1,270 @@
+//! The program as a user meets it: what it refuses, and what a small study leaves behind.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn simpulse(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn entries(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Whether `word` stands in `text` as a number would: `nan`, but not in `dominant`.
+fn has_word(text: &str, word: &str) -> bool {
+    let lower = text.to_lowercase();
+    lower.split(|c: char| !c.is_ascii_alphanumeric()).any(|part| part == word)
+}
+
+/// Exit code 2, one line on standard error that begins with `error:` and contains `parts`,
+/// nothing on standard output, and no new file.
+fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
+    let before = entries(folder);
+    let output = simpulse(folder, args);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
+    assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{args:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{args:?}: '{part}' is not in: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{args:?}: {}", text(&output.stdout));
+    assert_eq!(entries(folder), before, "{args:?}");
+}
+
+#[test]
+fn bad_requests_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let table: &[(&[&str], &[&str])] = &[
+        (&["run", "staack"], &["unknown scene 'staack'", "'stack'"]),
+        (&["run", "stack:x"], &["'x'", "stack"]),
+        (&["run", "stack:0"], &["'0'"]),
+        (&["scene", "arhc", "--json"], &["'arch'"]),
+        (&["run", "stack:2", "--solver", "softstep"], &["unknown solver 'softstep'", "'soft_step'"]),
+        (&["run", "stack:2", "--lanes", "5"], &["lanes", "5"]),
+        (&["run", "stack:2", "--order", "natral"], &["'natral'", "'natural'"]),
+        (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
+        (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
+        (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
+        (&["run", "stack:2", "--contact-hertz", "-3"], &["contact_hertz", "-3"]),
+        (&["study", "--contact-hertz", "nan"], &["contact_hertz", "NaN"]),
+        (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
+        (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
+        (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
+        (
+            &["run", "stack:2", "--solver", "pgs", "--velocity-iterations", "0"],
+            &["velocity_iterations", "pgs"],
+        ),
+        (&["run", "stack:2", "--dt", "0"], &["dt", "0"]),
+        (&["run", "stack:2", "--dt", "-0.1"], &["dt", "-0.1"]),
+        (&["run", "stack:2", "--dt", "nan"], &["dt"]),
+        (&["run", "stack:2", "--steps", "0"], &["steps", "0"]),
+        (&["run", "stack:2", "--every", "0", "--state", "s.csv"], &["every", "0"]),
+        (&["run", "stack:2", "--every", "5"], &["every", "--state"]),
+        (&["run", "stack:2", "--state", "a.csv", "--contacts", "a.csv"], &["same file"]),
+        (&["run", "missing.json"], &["missing.json"]),
+        (&["run", "stack:2", "--state", "no/such/folder/s.csv"], &["no/such/folder/s.csv"]),
+        (&["run", "stack:2", "--statte", "s.csv"], &["--statte"]),
+        (&["study", "--scenes", "stack:2,pyramidd"], &["'pyramidd'", "'pyramid'"]),
+        (&["study", "--solvers", "pgs,sof_step"], &["'sof_step'", "'soft_step'"]),
+        (&["study", "--lanes", "1,2"], &["lanes", "2"]),
+        (&["study", "--substeps", "2,0"], &["substeps", "0"]),
+        (&["study", "--velocity-iterations", "0"], &["velocity_iterations", "0"]),
+        (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
+        (&["study", "--repeats", "0"], &["repeats", "0"]),
+        (&["study", "--steps", "0"], &["steps", "0"]),
+        (&["studdy"], &["studdy"]),
+    ];
+    for (args, parts) in table {
+        refused(folder.path(), args, parts);
+    }
+}
+
+#[test]
+fn bad_scene_files_are_refused_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = |shape: &str| {
+        format!(r#"{{"name":"x","bodies":[{{"type":"dynamic","position":[0,0],"shapes":[{shape}]}}]}}"#)
+    };
+    let files = [
+        ("malformed.json", "{".to_string(), "line 1"),
+        ("key.json", r#"{"name":"x","bodies":[],"gravitty":[0,0]}"#.to_string(), "gravitty"),
+        ("nan.json", r#"{"name":"x","dt":NaN,"bodies":[]}"#.to_string(), "dt"),
+        ("infinite.json", r#"{"name":"x","dt":1e999,"bodies":[]}"#.to_string(), "dt"),
+        ("dt.json", r#"{"name":"x","dt":-1,"bodies":[]}"#.to_string(), "dt"),
+        ("density.json", body(r#"{"circle":{"radius":1},"density":0}"#), "bodies[0].shapes[0].density"),
+        ("radius.json", body(r#"{"circle":{"radius":-2}}"#), "-2"),
+        (
+            "concave.json",
+            body(r#"{"polygon":{"points":[[0,0],[2,0],[0.5,0.5],[0,2]]}}"#),
+            "bodies[0].shapes[0]",
+        ),
+        (
+            "long.json",
+            body(r#"{"polygon":{"points":[[4,0],[3,2],[2,3],[0,4],[-2,3],[-3,2],[-4,0],[0,-4],[2,-3]]}}"#),
+            "9",
+        ),
+    ];
+    for (name, content, _) in &files {
+        std::fs::write(folder.path().join(name), content).unwrap();
+    }
+    for (name, _, part) in &files {
+        refused(folder.path(), &["run", name, "--state", "s.csv"], &[name, part]);
+        refused(folder.path(), &["study", "--scenes", name, "--quick"], &[name, part]);
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_before_the_study() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("taken"), "").unwrap();
+    // The default study would take much longer than this test may.
+    refused(folder.path(), &["study", "--out", "taken"], &["taken"]);
+    refused(folder.path(), &["study", "--out", "taken/below"], &["taken"]);
+}
+
+#[test]
+fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = r#"{"name":"fast","bodies":[
+        {"type":"static","position":[0,0],"shapes":[{"circle":{"radius":1}}]},
+        {"type":"dynamic","position":[5,0],"velocity":[200000,0],"shapes":[{"circle":{"radius":1}}]}]}"#;
+    std::fs::write(folder.path().join("fast.json"), scene).unwrap();
+    let output = simpulse(folder.path(), &["run", "fast.json", "--state", "s.csv", "--every", "1"]);
+    assert_eq!(output.status.code(), Some(1));
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("step 1") && message.contains("body 1") && message.contains("2.000e5"),
+        "{message}"
+    );
+    assert_eq!(entries(folder.path()), ["fast.json"]);
+
+    let study =
+        simpulse(folder.path(), &["study", "--scenes", "fast.json", "--quick", "--lanes", "1", "--out", "r"]);
+    assert_eq!(study.status.code(), Some(0), "{}", text(&study.stderr));
+    let table = text(&study.stdout);
+    assert!(table.contains("failed") && table.contains("diverged at step 1: body 1"), "{table}");
+    assert!(!has_word(table, "nan") && !has_word(table, "inf"));
+}
+
+#[test]
+fn a_small_study_leaves_three_whole_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = [
+        "study",
+        "--scenes",
+        "stack:3,bounce",
+        "--lanes",
+        "1,8",
+        "--steps",
+        "40",
+        "--repeats",
+        "1",
+        "--out",
+        "a/b",
+    ];
+    let output = simpulse(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let out = folder.path().join("a/b");
+    assert_eq!(entries(&out), ["speed_vs_error.svg", "study.csv", "study.json"]);
+
+    let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    // 2 scenes × 3 solvers × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 2 * 3 * 3 * 3);
+    for row in &rows {
+        for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
+            let value: f64 = row[column(name)].parse().unwrap();
+            assert!(value.is_finite() && value >= 0.0, "{name} {value}");
+        }
+        assert_eq!(&row[column("bits_equal")], "true");
+    }
+    let csv_text = std::fs::read_to_string(out.join("study.csv")).unwrap();
+
+    let json_text = std::fs::read_to_string(out.join("study.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json_text).unwrap();
+    assert_eq!(json["records"].as_array().unwrap().len(), rows.len());
+    for key in ["cpu", "compiler", "target_features", "version"] {
+        assert!(!json["environment"][key].is_null(), "{key}");
+    }
+    assert!(json["environment"]["compiler"].as_str().unwrap().starts_with("rustc 1."));
+    assert_eq!(json["settings"]["repeats"], 1);
+
+    let svg = std::fs::read_to_string(out.join("speed_vs_error.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("stack:3"));
+    for text in [csv_text.as_str(), &json_text, &svg, text(&output.stdout)] {
+        assert!(!has_word(text, "nan") && !has_word(text, "inf"), "{text}");
+    }
+    assert!(text(&output.stdout).contains("cheapest setting within"));
+}
+
+#[test]
+fn a_run_writes_its_columns_at_the_steps_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let args =
+        ["run", "stack:3", "--steps", "25", "--every", "10", "--state", "s.csv", "--contacts", "c.csv"];
+    let output = simpulse(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    for phase in ["pairs", "collide", "prepare", "solve", "relax", "integrate", "store", "penetration"] {
+        assert!(text(&output.stdout).contains(phase), "{phase}");
+    }
+    let state = std::fs::read_to_string(folder.path().join("s.csv")).unwrap();
+    let lines: Vec<&str> = state.lines().collect();
+    assert_eq!(lines[0], "step,time,body,x,y,angle,vx,vy,omega");
+    // Steps 10 and 20 of the ground and three boxes.
+    assert_eq!(lines.len(), 1 + 2 * 4);
+    let first: Vec<&str> = lines[2].split(',').collect();
+    assert_eq!((first[0], first[2], first.len()), ("10", "1", 9));
+    assert!((first[1].parse::<f64>().unwrap() - 10.0 / 60.0).abs() < 1e-15);
+
+    let contacts = std::fs::read_to_string(folder.path().join("c.csv")).unwrap();
+    let mut lines = contacts.lines();
+    let header = "step,body_a,body_b,feature,px,py,nx,ny,separation,normal_impulse,tangent_impulse";
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|c| c.parse().unwrap()).collect()).collect();
+    // Two points under each of three boxes, at two steps.
+    assert_eq!(rows.len(), 2 * 3 * 2);
+    // The ground carries three boxes of 10 N for 1/60 s; the columns settle by millimetres,
+    // which moves the load by less than a tenth.
+    let ground: f64 = rows.iter().filter(|r| r[0] == 20.0 && r[1] == 0.0).map(|r| r[9]).sum();
+    assert!((ground - 0.5).abs() < 0.05, "{ground}");
+    // The points under the lowest box are its corners, on the ground.
+    for row in rows.iter().filter(|r| r[1] == 0.0) {
+        assert!((row[4].abs() - 0.5).abs() < 0.02 && row[5].abs() < 0.02 && row[7] == 1.0, "{row:?}");
+    }
+}
+
+#[test]
+fn lists_and_scenes_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let solvers = simpulse(folder.path(), &["solvers"]);
+    assert_eq!(text(&solvers.stdout).lines().count(), simpulse::solvers::VARIANTS.len());
+    let scenes = simpulse(folder.path(), &["scenes"]);
+    assert_eq!(text(&scenes.stdout).lines().count(), simpulse::scenes::CATALOG.len());
+
+    // A scene that is printed can be read, and is the same when it is printed again.
+    let printed = simpulse(folder.path(), &["scene", "card_house", "--json"]).stdout;
+    std::fs::write(folder.path().join("house.json"), &printed).unwrap();
+    assert_eq!(simpulse(folder.path(), &["scene", "house.json", "--json"]).stdout, printed);
+
+    let help = simpulse(folder.path(), &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    assert!(text(&help.stdout).contains("Examples:"));
+}
+
+#[test]
+fn the_default_study_names_scenes_that_exist() {
+    simpulse::study::StudyPlan::default().check().unwrap();
+    simpulse::study::StudyPlan::quick().check().unwrap();
+}
