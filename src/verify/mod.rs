@@ -33,10 +33,12 @@
 //!   column of N links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam
 //!   does, at q N³ = 7.837 K: N = 14.1. More iterations or substeps do not help; a higher frequency does.
 //! - **Friction in the first substep.** A box on a slope has contact points ½ m below its centre:
-//!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box. The
-//!   rest, 0.6 g h sin θ, is left once, and friction that exceeds tan θ by little takes long to stop it.
-//! - **Rolling discs.** Within a step, contact points turn with their body, so a disc that rolls by
-//!   φ seems to lift off by r (1 − cos φ) and sinks until the spring makes up for it.
+//!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
+//!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
+//!   that exceeds tan θ by little takes long to stop that.
+//! - **Rolling discs.** Within a step, contact points turn with their body, so a disc that rolls by φ
+//!   seems to lift off by r (1 − cos φ). Where that, over h, exceeds g h, the contact opens before
+//!   the step is over; at 3.3 m/s and r = ½ m the disc sinks by 1.7 mm instead of 0.07 mm.
 
 mod far;
 mod impacts;
