@@ -7,9 +7,12 @@
 
 pub mod ablation;
 pub mod budget;
+pub mod curve;
 pub mod pareto;
+pub mod profile;
 pub mod race;
 pub mod record;
+pub mod slices;
 
 use crate::error::Error;
 use crate::lanes::LaneWidth;
