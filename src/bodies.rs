@@ -93,6 +93,8 @@ pub struct Bodies {
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub group: Vec<i32>,
+    /// Whether a body is made of discs about its centre of mass: turning it moves no contact.
+    pub round: Vec<bool>,
 }
 
 impl Bodies {
@@ -131,6 +133,7 @@ impl Bodies {
         self.local_center.push(Vec2::new(cx as f32, cy as f32));
         self.kind.push(def.kind);
         self.group.push(def.group);
+        self.round.push(false);
         self.kind.len() - 1
     }
 

@@ -3,8 +3,10 @@
 use clap::{Args, Parser, Subcommand};
 use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
+use simpulse::commands::verify::VerifyArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
+use simpulse::params::CONTACT_HERTZ;
 use simpulse::solvers::{VARIANTS, Variant, find};
 use simpulse::study::StudyPlan;
 use simpulse::study::budget::BudgetGrid;
@@ -58,6 +60,8 @@ pub enum Command {
     Capture(CaptureArgs),
     /// Count the iterations every solver needs on one frozen problem
     Converge(ConvergeArgs),
+    /// Run the hard cases whose truth is known
+    Verify(VerifyArgs),
     /// List the scenes
     Scenes,
     /// List the solvers
@@ -93,6 +97,10 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
@@ -144,6 +152,10 @@ pub struct RunArgs {
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Step in seconds [default: that of the scene]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
@@ -193,6 +205,7 @@ impl StudyArgs {
                 relax_iterations: self.relax_iterations.clone(),
                 position_iterations: self.position_iterations.clone(),
             },
+            contact_hertz: self.contact_hertz,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),

@@ -68,4 +68,5 @@ pub mod shapes;
 pub mod solvers;
 pub mod study;
 pub mod truth;
+pub mod verify;
 pub mod world;

@@ -101,10 +101,12 @@ fn settings(args: &RunArgs) -> Result<Settings, Error> {
         position_iterations: args.position_iterations.unwrap_or(own.position_iterations),
     };
     budget::check(&chosen, solver)?;
+    budget::check_hertz(args.contact_hertz)?;
     Ok(Settings {
         width: lanes,
         order,
         budget: chosen,
+        contact_hertz: args.contact_hertz,
         record_impulses: true,
         timed: true,
         ..Settings::new(solver)

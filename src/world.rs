@@ -217,6 +217,9 @@ impl World {
         let mass = combine(&parts);
         let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
         let index = self.bodies.push(body, &mass);
+        self.bodies.round[index] = body.shapes.iter().all(|part| {
+            matches!(part.shape.translated(-center), Shape::Circle { center, .. } if center == Vec2::ZERO)
+        });
         for part in &body.shapes {
             let shape = part.shape.translated(-center);
             let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
@@ -242,17 +245,10 @@ impl World {
         let count = bodies.len();
         let mut rubs = vec![false; count];
         let mut has_corner = vec![false; count];
-        let mut is_disc = vec![true; count];
         for (i, shape) in self.shapes.iter().enumerate() {
             let body = self.shape_body[i] as usize;
             rubs[body] |= self.surfaces[i].friction > 0.0;
-            match shape {
-                Shape::Circle { center, .. } => is_disc[body] &= *center == Vec2::ZERO,
-                _ => {
-                    has_corner[body] = true;
-                    is_disc[body] = false;
-                }
-            }
+            has_corner[body] |= !matches!(shape, Shape::Circle { .. });
         }
         // A pair has the property if both bodies have it and one of them is dynamic.
         let pair_of = |has: &[bool]| {
@@ -260,7 +256,7 @@ impl World {
         };
         let friction = pair_of(&rubs);
         let spins = (0..count).any(|i| bodies.angular_velocity[i] != 0.0 || bodies.torque[i] != 0.0);
-        let discs = (0..count).all(|i| !bodies.is_dynamic(i) || is_disc[i]);
+        let discs = (0..count).all(|i| !bodies.is_dynamic(i) || bodies.round[i]);
         Needs {
             rotation: friction || spins || !discs,
             friction,
@@ -274,6 +270,7 @@ impl World {
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
+        self.work.motion.finish(&mut self.work.rows);
         motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
         clock.lap(Phase::Store);
         self.step_index += 1;

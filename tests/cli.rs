@@ -55,6 +55,9 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
+        (&["run", "stack:2", "--contact-hertz", "-3"], &["contact_hertz", "-3"]),
+        (&["study", "--contact-hertz", "nan"], &["contact_hertz", "NaN"]),
+        (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
         (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
         (

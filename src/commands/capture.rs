@@ -88,6 +88,9 @@ impl RunArgs {
     }
 }
 
+/// Contact points from which on a reference may take seconds.
+const PATIENCE: usize = 300;
+
 /// The problem of step `step` of a scene, with its reference if there is one, and if not, why.
 ///
 /// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
@@ -98,6 +101,9 @@ pub fn freeze(name: &str, step: u64, run: &RunArgs) -> Result<(Frozen, Option<St
     let problem = capture(&mut world, format!("{name}, step {step}"));
     if problem.contacts.is_empty() {
         return Err(Error::invalid("--step", format!("step {step} of '{name}' has no contacts")));
+    }
+    if problem.contacts.len() > PATIENCE {
+        eprintln!("looking for a reference of {} contact points", problem.contacts.len());
     }
     Ok(match reference(&problem) {
         Ok(reference) => (Frozen { problem, reference: Some(reference) }, None),

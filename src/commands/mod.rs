@@ -2,6 +2,7 @@
 
 pub mod capture;
 pub mod converge;
+pub mod verify;
 
 use crate::error::Error;
 use crate::scenes::{self, Scene};

@@ -37,6 +37,7 @@ use crate::truth::reference::{Certificate, Reference};
 use crate::truth::residual::{Summary, Target, contact_residuals, natural_map};
 use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 /// Residuals whose first iteration is reported (1).
@@ -261,8 +262,8 @@ fn measure(
     (Point { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
 }
 
-/// Residual of the own law below which a curve that stands still has reached its rounding floor.
-const NEAR_FLOOR: f64 = 1e-4;
+/// A curve that stands still within this many times the rounding floor has reached it.
+const NEAR_FLOOR: f64 = 20.0;
 
 fn curve(
     problem: &ContactProblem,
@@ -277,11 +278,11 @@ fn curve(
     let mut points = BTreeMap::new();
     // Changes below half a unit in the last place of the largest impulse are lost.
     let unit = problem.impulse_unit();
-    let mut floor = 0.0_f64;
+    let floor = Cell::new(0.0_f64);
     let mut visit = |k: u32, points: &mut BTreeMap<u32, Point>| {
         let outcome = replay.run(schedule.variant, schedule.budget(k), start);
         let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
-        floor = floor.max(0.5 * f64::from(f32::EPSILON) * largest / unit);
+        floor.set(floor.get().max(0.5 * f64::from(f32::EPSILON) * largest / unit));
         let (point, same) = measure(problem, reference, k, &outcome);
         own_is_rigid &= same;
         points.insert(k, point);
@@ -294,7 +295,7 @@ fn curve(
         if own < 0.9 * best {
             (best, best_at) = (own, k);
         }
-        let at_floor = best == 0.0 || best < NEAR_FLOOR && k > 64 + best_at + best_at / 4;
+        let at_floor = best == 0.0 || best < NEAR_FLOOR * floor.get() && k > 64 + best_at + best_at / 4;
         if !point.rigid.is_finite() || at_floor {
             break;
         }
@@ -313,7 +314,7 @@ fn curve(
         }
     }
     let points: Vec<Point> = points.into_values().collect();
-    let [rigid, own] = LAWS.map(|law| reached(&points, law, floor));
+    let [rigid, own] = LAWS.map(|law| reached(&points, law, floor.get()));
     Curve {
         solver: schedule.name.clone(),
         arithmetic: "f32",

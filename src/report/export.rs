@@ -214,6 +214,7 @@ fn settings(plan: &StudyPlan) -> Value {
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,
         "repeats": plan.repeats,
+        "contact_hertz": plan.contact_hertz,
         "seed": plan.seed,
         "world": standard,
         "constants": {

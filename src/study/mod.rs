@@ -17,7 +17,7 @@ pub mod slices;
 use crate::error::Error;
 use crate::lanes::LaneWidth;
 use crate::metrics::{Errors, Observation};
-use crate::params::Budget;
+use crate::params::{Budget, CONTACT_HERTZ};
 use crate::scenes::{self, Loaded, Scene};
 use crate::solvers::{VARIANTS, Variant};
 use crate::world::{Divergence, Order, Settings};
@@ -55,6 +55,8 @@ pub struct StudyPlan {
     pub orders: Vec<Order>,
     /// Work per step.
     pub budgets: BudgetGrid,
+    /// Stiffness of soft contacts (Hz), for solvers that have them.
+    pub contact_hertz: f32,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
     /// Most steps of a timing run.
@@ -73,6 +75,7 @@ impl Default for StudyPlan {
             widths: LaneWidth::ALL.to_vec(),
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
+            contact_hertz: CONTACT_HERTZ,
             steps: None,
             timing_steps: 200,
             repeats: 3,
@@ -98,6 +101,7 @@ impl StudyPlan {
         if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
             return Err(Error::invalid(name, "none given"));
         }
+        budget::check_hertz(self.contact_hertz)?;
         let counts = [("steps", self.steps.unwrap_or(1)), ("repeats", self.repeats)];
         if let Some((name, _)) = counts.into_iter().find(|c| c.1 == 0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
@@ -217,8 +221,9 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
 }
 
 /// Settings of a cell in one order at one width.
-fn settings(cell: &Cell, order: Order, width: LaneWidth) -> Settings {
-    Settings { width, order, budget: cell.budget, ..Settings::new(cell.solver) }
+fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
+    let contact_hertz = plan.contact_hertz;
+    Settings { width, order, budget: cell.budget, contact_hertz, ..Settings::new(cell.solver) }
 }
 
 /// Steps of a timing run.
@@ -268,7 +273,7 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Err
     let mut world = scene.build(Settings {
         record_impulses: true,
         observe_rule: true,
-        ..settings(cell, order, width)
+        ..settings(plan, cell, order, width)
     })?;
     let mut observation = Observation::new(&world);
     let (mut hash, timed) = (0, timing_steps(plan, &scene));
@@ -307,7 +312,7 @@ fn timed_records(
     let racing: Vec<Settings> = rows
         .iter()
         .filter(|row| row.2.errors.is_ok())
-        .map(|&(order, width, _)| settings(cell, order, width))
+        .map(|&(order, width, _)| settings(plan, cell, order, width))
         .collect();
     let mut laps = race(scene, &racing, timing_steps(plan, scene), plan.repeats, plan.seed)?.into_iter();
     let mut records: Vec<Record> = Vec::new();
