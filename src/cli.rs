@@ -1,6 +1,7 @@
 //! The command line: what can be asked for.
 
 use clap::{Args, Parser, Subcommand};
+use simpulse::commands::advise::AdviseArgs;
 use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
 use simpulse::commands::verify::VerifyArgs;
@@ -56,6 +57,8 @@ pub enum Command {
     Study(StudyArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
+    /// Find the cheapest setting within given tolerances on a scene
+    Advise(AdviseArgs),
     /// Freeze the contact problem of one step in a file
     Capture(CaptureArgs),
     /// Count the iterations every solver needs on one frozen problem

@@ -65,8 +65,8 @@ impl Scale {
             let all = exponents.clone().flat_map(|e| digits.iter().map(move |d| d * 10f64.powi(e)));
             all.filter(|t| (limits[0]..=limits[1]).contains(t)).collect()
         };
-        let sets = digits.iter().map(within);
-        let ticks = sets.clone().find(|t| t.len() >= 2).or_else(|| sets.last()).unwrap_or_default();
+        let mut sets = digits.iter().map(within);
+        let ticks = sets.clone().find(|t| t.len() >= 2).or_else(|| sets.next_back()).unwrap_or_default();
         let stride = ticks.len().div_ceil(most.max(1)).max(1);
         Scale { limits, ticks: ticks.into_iter().step_by(stride).collect() }
     }
