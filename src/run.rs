@@ -235,7 +235,7 @@ fn write_state(sheet: &mut Sheet, world: &World, dt: f64) -> Result<(), Error> {
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
         let omega = world.bodies.angular_velocity[i];
-        let pose = (origin.x, origin.y, world.bodies.angle(i));
+        let pose = (origin[0], origin[1], world.bodies.angle(i));
         sheet.row((world.step_index, time, i, pose, velocity.x, velocity.y, omega))?;
     }
     Ok(())

@@ -389,8 +389,8 @@ impl World {
         let mut points = 0;
         for candidate in &self.candidates {
             let (a, b) = (candidate.shape_a as usize, candidate.shape_b as usize);
-            let pose_a = self.bodies.pose(candidate.body_a as usize);
-            let pose_b = self.bodies.pose(candidate.body_b as usize);
+            let [pose_a, pose_b] =
+                self.bodies.relative_poses(candidate.body_a as usize, candidate.body_b as usize);
             let mut manifold =
                 collide(&self.shapes[a], &pose_a, &self.shapes[b], &pose_b, SPECULATIVE_DISTANCE);
             if manifold.count == 0 {
@@ -499,6 +499,8 @@ impl World {
         let arrays = [
             &b.position_x,
             &b.position_y,
+            &b.position_x_rest,
+            &b.position_y_rest,
             &b.rotation_cos,
             &b.rotation_sin,
             &b.velocity_x,

@@ -13,6 +13,7 @@
 use super::needs::Needs;
 use crate::bodies::{Bodies, BodyKind};
 use crate::lanes::BodyRow;
+use glam::Vec2;
 use wide::{f32x4, f32x8};
 
 /// How velocities and positions follow each other.
@@ -214,8 +215,7 @@ pub fn store(bodies: &mut Bodies, rows: &[BodyRow], rotation: bool) {
         bodies.velocity_x[i] = row.velocity[0];
         bodies.velocity_y[i] = row.velocity[1];
         bodies.angular_velocity[i] = row.velocity[2];
-        bodies.position_x[i] += row.delta[0];
-        bodies.position_y[i] += row.delta[1];
+        bodies.advance(i, Vec2::new(row.delta[0], row.delta[1]));
     }
     if !rotation {
         return;

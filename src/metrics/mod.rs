@@ -233,7 +233,8 @@ impl Observation {
             let (own, rest) = steps.split_at(contact.manifold.count as usize);
             steps = rest;
             let [a, b] = [contact.shape_a, contact.shape_b].map(|s| &world.shapes[s as usize]);
-            let [pose_a, pose_b] = [contact.body_a, contact.body_b].map(|i| world.bodies.pose(i as usize));
+            let [pose_a, pose_b] =
+                world.bodies.relative_poses(contact.body_a as usize, contact.body_b as usize);
             let manifold = collide(a, &pose_a, b, &pose_b, SPECULATIVE_DISTANCE);
             for point in manifold.points() {
                 self.penetration.add(-point.separation as f64);

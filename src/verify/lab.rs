@@ -101,7 +101,7 @@ pub(super) fn time(world: &World) -> f64 {
 
 /// Centre of mass of body `i` (m).
 pub(super) fn center(world: &World, i: usize) -> [f64; 2] {
-    [f64::from(world.bodies.position_x[i]), f64::from(world.bodies.position_y[i])]
+    world.bodies.center(i)
 }
 
 /// m/s

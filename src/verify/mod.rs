@@ -22,11 +22,12 @@
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
 //! | piles whose Gauss–Seidel rate leaves no error within the run come to rest | cos²(π/2N) and R/(1+R) per sweep |
 //! | overlap is pushed apart no faster than 3 m/s | the cap |
+//! | the distance from the origin and the length of a step do not matter | positions keep what their sums round away |
+//! | discs roll without lifting off | their contact points do not turn with them |
 //!
 //! It does not promise:
 //!
-//! - Bounces within a step, positions finer than an `f32` of the distance from the origin, one
-//!   solution where the sweeps of a step have not converged.
+//! - Bounces within a step, one solution where the sweeps of a step have not converged.
 //! - Heavy loads on light bodies: the depth F/(m ω²) itself exceeds the body.
 //! - **High stacks.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
 //!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
@@ -36,9 +37,8 @@
 //!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
 //!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
 //!   that exceeds tan θ by little takes long to stop that.
-//! - **Rolling discs.** Within a step, contact points turn with their body, so a disc that rolls by φ
-//!   seems to lift off by r (1 − cos φ). Where that, over h, exceeds g h, the contact opens before
-//!   the step is over; at 3.3 m/s and r = ½ m the disc sinks by 1.7 mm instead of 0.07 mm.
+//! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
+//!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
 mod far;
 mod impacts;
