@@ -1,6 +1,7 @@
 //! The command line: what can be asked for.
 
 use clap::{Args, Parser, Subcommand};
+use simpulse::commands::advise::AdviseArgs;
 use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
 use simpulse::commands::verify::VerifyArgs;
@@ -35,7 +36,8 @@ Examples:
 ///
 /// Without a command, runs the default study: every solver on scenes whose truth is known
 /// or that are hard, at lane widths 1, 4, 8 and 16 and three budgets each. It prints a table
-/// per scene and writes study.csv, study.json and speed_vs_error.svg.
+/// per scene and writes study.csv, study.json, speed_vs_error.svg and
+/// profiles.svg.
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -55,6 +57,8 @@ pub enum Command {
     Study(StudyArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
+    /// Find the cheapest setting within given tolerances on a scene
+    Advise(AdviseArgs),
     /// Freeze the contact problem of one step in a file
     Capture(CaptureArgs),
     /// Count the iterations every solver needs on one frozen problem

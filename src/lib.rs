@@ -48,6 +48,7 @@
 //! # Ok::<(), simpulse::error::Error>(())
 //! ```
 
+pub mod advise;
 pub mod bodies;
 pub mod broadphase;
 pub mod capture;

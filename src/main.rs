@@ -51,6 +51,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
                 Ok(ExitCode::FAILURE)
             }
         },
+        Some(Command::Advise(args)) => commands::advise::run(&args),
         Some(Command::Capture(args)) => commands::capture::run(&args),
         Some(Command::Converge(args)) => commands::converge::run(&args),
         Some(Command::Verify(args)) => commands::verify::run(&args),

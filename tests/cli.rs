@@ -157,7 +157,7 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
 }
 
 #[test]
-fn a_small_study_leaves_three_whole_files() {
+fn a_small_study_leaves_whole_files() {
     let folder = tempfile::tempdir().unwrap();
     let args = [
         "study",
@@ -175,7 +175,7 @@ fn a_small_study_leaves_three_whole_files() {
     let output = simpulse(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let out = folder.path().join("a/b");
-    assert_eq!(entries(&out), ["speed_vs_error.svg", "study.csv", "study.json"]);
+    assert_eq!(entries(&out), ["profiles.svg", "speed_vs_error.svg", "study.csv", "study.json"]);
 
     let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();
     let header = reader.headers().unwrap().clone();

@@ -17,7 +17,7 @@ p penetration, l law residual, t truth; errors are the same for all coloured wid
 ";
 
 /// Lines of a table without the frame.
-fn table(header: &[&str]) -> Table {
+pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header(header.to_vec());
@@ -25,7 +25,7 @@ fn table(header: &[&str]) -> Table {
 }
 
 /// Every column but the first `left` to the right, and two blanks between columns.
-fn finish(mut table: Table, left: usize) -> String {
+pub(super) fn finish(mut table: Table, left: usize) -> String {
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));
         if i >= left {

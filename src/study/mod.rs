@@ -7,9 +7,12 @@
 
 pub mod ablation;
 pub mod budget;
+pub mod curve;
 pub mod pareto;
+pub mod profile;
 pub mod race;
 pub mod record;
+pub mod slices;
 
 use crate::error::Error;
 use crate::lanes::LaneWidth;
@@ -174,11 +177,13 @@ struct Cell<'a> {
 
 /// What an error run found.
 #[derive(Clone)]
-struct Outcome {
-    errors: Result<Errors, Divergence>,
-    truth: Option<TruthError>,
+pub struct Outcome {
+    /// Those of the whole run; where it failed, by what.
+    pub errors: Result<Errors, Divergence>,
+    /// Distance to what is known about the scene.
+    pub truth: Option<TruthError>,
     /// Hash after the steps of a timing run.
-    hash: u64,
+    pub hash: u64,
 }
 
 /// Runs the plan; one record per scene, solver, budget, order and width, in that order.
@@ -262,18 +267,21 @@ fn error_runs(
 }
 
 fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Error> {
-    let Loaded { scene, mut truth } = plan.open(cell.name)?;
+    let loaded = plan.open(cell.name)?;
     let width = match order {
         Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
     };
-    let mut world = scene.build(Settings {
-        record_impulses: true,
-        observe_rule: true,
-        ..settings(plan, cell, order, width)
-    })?;
+    let timed = timing_steps(plan, &loaded.scene);
+    observe(loaded, settings(plan, cell, order, width), timed)
+}
+
+/// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
+pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
+    let Loaded { scene, mut truth } = loaded;
+    let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
     let mut observation = Observation::new(&world);
-    let (mut hash, timed) = (0, timing_steps(plan, &scene));
+    let mut hash = 0;
     for step in 1..=scene.steps {
         if let Err(divergence) = world.step() {
             return Ok(Outcome { errors: Err(divergence), truth: None, hash });
@@ -285,7 +293,7 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Err
         if let Some(truth) = &mut truth {
             truth.observer.observe(&world);
         }
-        if step == timed {
+        if step == hash_at {
             hash = world.state_hash();
         }
     }
