@@ -111,24 +111,30 @@ fn a_falling_disc_stops_at_the_ground() {
     }
 }
 
-/// e = 0.5 from a fall of 2 m: the ball leaves with half of what it came with.
+/// A ball returns to e² of its height, whatever the step and the substeps: the rebound keeps the
+/// energy that semi-implicit Euler keeps in flight. The highest of the sampled positions is
+/// within g h²/8 of the apex of the discrete orbit, 0.35 mm at 1/60 s.
 #[test]
-fn a_bounce_returns_its_share_of_the_speed() {
+fn a_ball_returns_to_e_squared_of_its_height() {
     for variant in &VARIANTS {
-        let text = format!(
-            r#"{{"name":"bounce","bodies":[{GROUND},{{"type":"dynamic","position":[0,2.5],
-            "shapes":[{{"circle":{{"radius":0.5}},"restitution":0.5}}]}}]}}"#
-        );
-        let mut world = build(&text, variant.name);
-        let mut fastest = (0.0_f32, 0.0_f32);
-        for _ in 0..60 {
-            world.step().unwrap();
-            fastest.0 = fastest.0.min(world.bodies.velocity_y[1]);
-            fastest.1 = fastest.1.max(world.bodies.velocity_y[1]);
+        for (e, steps_per_second) in [(0.5, 60.0), (0.8, 60.0), (1.0, 60.0), (1.0, 97.0)] {
+            let dt = 1.0 / steps_per_second;
+            let text = format!(
+                r#"{{"name":"bounce","dt":{dt},"bodies":[{GROUND},{{"type":"dynamic","position":[0,2.5],
+                "shapes":[{{"circle":{{"radius":0.5}},"restitution":{e}}}]}}]}}"#
+            );
+            let mut world = build(&text, variant.name);
+            let (mut rising, mut apex) = (false, 0.0_f64);
+            for _ in 0..(1.9 * steps_per_second) as usize {
+                world.step().unwrap();
+                rising |= world.bodies.velocity_y[1] > 0.0;
+                if rising {
+                    apex = apex.max(world.bodies.position_y[1] as f64);
+                }
+            }
+            let truth = 0.5 + 2.0 * e * e;
+            assert!((apex - truth).abs() < 4e-4, "{} e {e} dt {dt}: {apex} for {truth}", variant.name);
         }
-        // The approach is read at the start of the step that touches: up to one step of
-        // gravity, 1/6 m/s, may be missing.
-        assert!((fastest.1 + 0.5 * fastest.0).abs() < 0.09, "{}: {fastest:?}", variant.name);
     }
 }
 

@@ -116,6 +116,11 @@ impl Motion {
         self.free.resize(count + 1, [0.0; 4]);
     }
 
+    /// Changes of velocity in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.
+    pub fn kicks(&self) -> &[[f32; 4]] {
+        &self.kick
+    }
+
     /// v ← v/(1 + h c) + h a, for every row.
     pub fn integrate_velocities(&mut self, rows: &mut [BodyRow]) {
         self.explicit_positions(rows);

@@ -94,12 +94,13 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             assert!(batches.width == width || batches.segments.is_empty());
             assert!(batches.row_a.iter().chain(&batches.row_b).all(|&row| row < rows));
         }
-        let Workspace { rows, lanes, serial, lane_bounces, serial_bounces, .. } = work;
+        let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = work;
         prepare::prepare::<L, N>(rows, lanes, contacts);
         prepare::prepare::<f32, N>(rows, serial, contacts);
         if input.needs.restitution {
-            restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts);
-            restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts);
+            let (kicks, h) = (motion.kicks(), input.h);
+            restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts, kicks, h);
+            restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts, kicks, h);
         }
         clock.lap(Phase::Prepare);
         let contacts_points = contacts.iter().map(|c| c.manifold.count as usize).sum();
@@ -206,8 +207,8 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             restitution::track::<L, N>(rows, lanes, lane_bounces);
             restitution::track::<f32, N>(rows, serial, serial_bounces);
             if substep + 1 == self.budget.substeps {
-                restitution::apply::<L, N>(rows, lanes, lane_bounces);
-                restitution::apply::<f32, N>(rows, serial, serial_bounces);
+                restitution::apply::<L, N>(rows, lanes, lane_bounces, self.h);
+                restitution::apply::<f32, N>(rows, serial, serial_bounces, self.h);
                 self.count_sweep(1);
             }
             self.clock.lap(Phase::Restitution);

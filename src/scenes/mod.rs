@@ -10,12 +10,14 @@ mod check;
 mod circle_pile;
 mod collision;
 mod column;
+mod compounds;
 mod dominoes;
 mod far;
 mod format;
 mod free;
 mod friction_ramp;
 mod incline;
+mod junkyard;
 mod mass_ratio;
 mod overlap;
 mod parts;
@@ -23,7 +25,9 @@ mod place;
 mod pyramid;
 mod single_box;
 mod sliding;
+mod smash;
 mod truth;
+mod tumbler;
 mod washer;
 
 pub use check::MAX_BODIES;
@@ -65,6 +69,10 @@ pub static CATALOG: &[Entry] = &[
     dominoes::DOMINOES,
     card_house::HOUSE,
     washer::WASHER,
+    tumbler::TUMBLER,
+    smash::SMASH,
+    junkyard::JUNKYARD,
+    compounds::COMPOUNDS,
     circle_pile::PILE,
 ];
 

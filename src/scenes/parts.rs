@@ -1,6 +1,7 @@
 //! Words that scenes are written in.
 
 use super::format::*;
+use super::truth::View;
 use crate::bodies::BodyKind;
 use crate::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
 
@@ -114,4 +115,38 @@ pub(super) fn ground_line(half: f64) -> SceneBody {
 /// Ground with its top at height 0: a box of half extents (`half`, 1) (m).
 pub(super) fn ground_box(half: f64) -> SceneBody {
     SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(half, 1.0))
+}
+
+/// A yard with its floor's middle at height 0: metre blocks from −`half` to `half`, and walls
+/// `height` of them high at both ends. Blocks overlap by 0.1 m, so that nothing slips through.
+pub(super) fn yard(half: i32, height: i32) -> SceneBody {
+    let (half_width, mut shapes) = (f64::from(half), Vec::new());
+    for x in -half..=half {
+        shapes.push(SceneShape::rectangle_at([0.55, 0.5], [f64::from(x), 0.0]));
+    }
+    for y in 1..=height {
+        for x in [-half_width, half_width] {
+            shapes.push(SceneShape::rectangle_at([0.5, 0.55], [x, f64::from(y)]));
+        }
+    }
+    SceneBody { shapes, ..SceneBody::fixed([0.0, 0.0], SceneShape::line(1.0)) }
+}
+
+/// Bodies whose centre is below the middle of a floor at height 0; NaN counts.
+pub(super) fn below_floor(view: &View) -> usize {
+    let above = |&i: &usize| !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0;
+    view.bodies.len() - (0..view.bodies.len()).filter(above).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::truth::by_hand;
+
+    #[test]
+    fn below_the_floor_are_dynamic_bodies_and_nan() {
+        let mut bodies = by_hand::bodies(&[[0.0, -1.0], [0.0, 0.5], [0.0, -0.1], [0.0, f32::NAN]]);
+        bodies.kind[0] = BodyKind::Static;
+        assert_eq!(below_floor(&by_hand::view(&bodies, 1)), 2);
+    }
 }

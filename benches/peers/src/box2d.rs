@@ -1,0 +1,211 @@
+//! Box2D through its C interface: the one place with unsafe code.
+
+use crate::engine::{Contender, Engine, Stage, State};
+use boxdd_sys::ffi::*;
+use simpulse::bodies::BodyKind;
+use simpulse::scenes::{Geometry, Scene, SceneShape};
+
+/// Most contacts of one body that are counted.
+const MOST_CONTACTS: usize = 100_000;
+
+/// A scene in Box2D. Friction mixes as √(µa µb) and restitution as max, as in the scene's terms.
+pub struct Box2d {
+    world: b2WorldId,
+    bodies: Vec<b2BodyId>,
+    dt: f32,
+    substeps: i32,
+}
+
+impl Box2d {
+    /// Errors: no world left, or a shape that Box2D refuses.
+    pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
+        // SAFETY: definitions come from the library's own defaults and outlive the calls that
+        // read them; ids are used while their world lives, and only by this thread.
+        unsafe {
+            if b2IsDoublePrecision() {
+                return Err("a build in double precision".into());
+            }
+            let mut def = b2DefaultWorldDef();
+            // The defaults cross the interface whole only if both sides agree on the layout.
+            if (def.gravity.y, def.contactHertz) != (-10.0, 30.0) {
+                return Err("the library's structures are laid out differently".into());
+            }
+            def.gravity = vector(scene.gravity);
+            def.enableSleep = false;
+            def.enableContinuous = false;
+            def.workerCount = 1;
+            def.contactHertz = contender.hertz;
+            let world = b2CreateWorld(&def);
+            if !b2World_IsValid(world) {
+                return Err("no world left".into());
+            }
+            let mut engine =
+                Box2d { world, bodies: Vec::new(), dt: scene.dt as f32, substeps: contender.substeps as i32 };
+            for body in &scene.bodies {
+                let mut def = b2DefaultBodyDef();
+                def.type_ = match body.kind {
+                    BodyKind::Static => b2BodyType_b2_staticBody,
+                    BodyKind::Kinematic => b2BodyType_b2_kinematicBody,
+                    BodyKind::Dynamic => b2BodyType_b2_dynamicBody,
+                };
+                def.position = vector(body.position);
+                def.rotation = rotation(body.angle);
+                def.linearVelocity = vector(body.velocity);
+                def.angularVelocity = body.angular_velocity as f32;
+                def.gravityScale = body.gravity_scale as f32;
+                def.linearDamping = body.linear_damping as f32;
+                def.angularDamping = body.angular_damping as f32;
+                def.enableSleep = false;
+                let id = b2CreateBody(engine.world, &def);
+                for shape in &body.shapes {
+                    add_shape(id, shape, body.group)?;
+                }
+                engine.bodies.push(id);
+            }
+            Ok(engine)
+        }
+    }
+
+    fn profile(&self) -> b2Profile {
+        // SAFETY: the world lives as long as `self`.
+        unsafe { b2World_GetProfile(self.world) }
+    }
+}
+
+/// # Safety
+/// `body` must be alive.
+unsafe fn add_shape(body: b2BodyId, shape: &SceneShape, group: i32) -> Result<(), String> {
+    // SAFETY: as in `Box2d::new`.
+    unsafe {
+        let mut def = b2DefaultShapeDef();
+        def.density = shape.density as f32;
+        def.material.friction = shape.friction as f32;
+        def.material.restitution = shape.restitution as f32;
+        // Shapes of one negative group never collide, those of one positive group always.
+        if group < 0 {
+            return Err(format!("group {group} is negative"));
+        }
+        def.filter.groupIndex = -group;
+        match &shape.geometry {
+            Geometry::Circle(c) => {
+                let circle = b2Circle { center: vector(c.center), radius: c.radius as f32 };
+                b2CreateCircleShape(body, &def, &circle);
+            }
+            Geometry::Box(b) => {
+                let [w, h] = b.half.map(|x| x as f32);
+                let polygon =
+                    b2MakeOffsetRoundedBox(w, h, vector(b.center), rotation(b.angle), b.radius as f32);
+                b2CreatePolygonShape(body, &def, &polygon);
+            }
+            Geometry::Polygon(p) => {
+                let points: Vec<b2Vec2> = p.points.iter().map(|&v| vector(v)).collect();
+                let hull = b2ComputeHull(points.as_ptr(), points.len() as i32);
+                if hull.count as usize != points.len() {
+                    return Err(format!("the hull of {} points has {}", points.len(), hull.count));
+                }
+                let polygon = b2MakePolygon(&hull, p.radius as f32);
+                b2CreatePolygonShape(body, &def, &polygon);
+            }
+            Geometry::Capsule(c) => {
+                let capsule =
+                    b2Capsule { center1: vector(c.a), center2: vector(c.b), radius: c.radius as f32 };
+                b2CreateCapsuleShape(body, &def, &capsule);
+            }
+            Geometry::Segment(s) => {
+                let segment = b2Segment { point1: vector(s.a), point2: vector(s.b) };
+                b2CreateSegmentShape(body, &def, &segment);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn vector(v: [f64; 2]) -> b2Vec2 {
+    b2Vec2 { x: v[0] as f32, y: v[1] as f32 }
+}
+
+fn rotation(angle: f64) -> b2Rot {
+    let (sin, cos) = angle.sin_cos();
+    b2Rot { c: cos as f32, s: sin as f32 }
+}
+
+impl Engine for Box2d {
+    fn step(&mut self) -> Result<(), String> {
+        // SAFETY: the world lives as long as `self`.
+        unsafe { b2World_Step(self.world, self.dt, self.substeps) };
+        Ok(())
+    }
+
+    fn state(&self, body: usize) -> State {
+        let id = self.bodies[body];
+        // SAFETY: bodies live as long as their world.
+        let (p, r, v, w) = unsafe {
+            (
+                b2Body_GetWorldCenter(id),
+                b2Body_GetRotation(id),
+                b2Body_GetLinearVelocity(id),
+                b2Body_GetAngularVelocity(id),
+            )
+        };
+        State { position: [p.x, p.y], rotation: [r.c, r.s], velocity: [v.x, v.y], angular_velocity: w }
+    }
+
+    fn bodies(&self) -> usize {
+        // SAFETY: the world lives as long as `self`.
+        unsafe { b2World_GetCounters(self.world) }.bodyCount as usize
+    }
+
+    fn points(&self) -> usize {
+        let mut ends = 0;
+        let mut buffer: Vec<b2ContactData> = Vec::new();
+        for &id in &self.bodies {
+            // SAFETY: the buffer has room for `capacity` contacts, and the call says how many it wrote.
+            unsafe {
+                let capacity = (b2Body_GetContactCapacity(id).max(0) as usize).min(MOST_CONTACTS);
+                buffer.clear();
+                buffer.reserve(capacity);
+                let count = b2Body_GetContactData(id, buffer.as_mut_ptr(), capacity as i32);
+                buffer.set_len(count.max(0) as usize);
+            }
+            // Each contact is listed at both bodies: a static end counts as much as a dynamic one.
+            ends += buffer.iter().map(|c| c.manifold.pointCount as usize).sum::<usize>();
+        }
+        ends / 2
+    }
+
+    fn stages(&self) -> [Option<f64>; Stage::ALL.len()] {
+        let p = self.profile();
+        Stage::ALL.map(|stage| {
+            let ms = match stage {
+                Stage::Pairs => p.pairs + p.transforms + p.refit,
+                Stage::Collide => p.collide,
+                Stage::Color => p.solverSetup,
+                Stage::Prepare => p.prepareConstraints,
+                Stage::WarmStart => p.warmStart,
+                Stage::Solve => p.solveImpulses,
+                Stage::Relax => p.relaxImpulses + p.applyRestitution,
+                Stage::Integrate => p.integrateVelocities + p.integratePositions,
+                Stage::Stages => {
+                    p.warmStart
+                        + p.solveImpulses
+                        + p.relaxImpulses
+                        + p.applyRestitution
+                        + p.integrateVelocities
+                        + p.integratePositions
+                }
+                Stage::Store => p.storeImpulses,
+            };
+            Some(f64::from(ms))
+        })
+    }
+
+    /// Its clocks always run.
+    fn set_timed(&mut self, _: bool) {}
+}
+
+impl Drop for Box2d {
+    fn drop(&mut self) {
+        // SAFETY: no id of this world is used afterwards.
+        unsafe { b2DestroyWorld(self.world) };
+    }
+}

@@ -1,0 +1,188 @@
+//! The neutral check: errors from body poses in double precision, the same for every engine.
+//!
+//! Poses and velocities are copied into a mirror of the scene that is never stepped; overlaps
+//! come from GJK and EPA in `f64`, which no engine here uses for its contacts.
+
+use crate::engine::Engine;
+use simpulse::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
+use simpulse::metrics::state::BodyState;
+use simpulse::narrowphase::{epa::penetration, gjk::distance};
+use simpulse::params::SPECULATIVE_DISTANCE;
+use simpulse::scenes::{Loaded, Truth};
+use simpulse::shapes::Shape;
+use simpulse::solvers;
+use simpulse::world::{Settings, World};
+
+/// The last steps of a run that are looked at, one second.
+pub const WINDOW: u32 = 60;
+
+/// Overlaps are measured every this many steps of the window: they change slowly.
+const STRIDE: u32 = 20;
+
+/// How wrong a run was over its last second.
+#[derive(Clone, Debug, Default)]
+pub struct Errors {
+    /// Pairs of shapes nearer than [`SPECULATIVE_DISTANCE`] at the end.
+    pub pairs: usize,
+    /// Mean overlap of such pairs, open ones counted as zero (m).
+    pub penetration_mean: f64,
+    /// Deepest overlap (m).
+    pub penetration_max: f64,
+    /// The same in half the width of the thinnest dynamic shape.
+    pub penetration_relative: f64,
+    /// Root mean square of √(2 E_kin/M) (m/s).
+    pub rms_velocity: f64,
+    /// Highest centre of a dynamic body at the end (m).
+    pub top: f64,
+    /// How far the highest centre is below where it started (m).
+    pub sunk: f64,
+    /// What is known about the scene: the quantity, its unit, its error.
+    pub truth: Option<(&'static str, &'static str, f64)>,
+}
+
+/// Watches one engine over its last second.
+pub struct Checker {
+    mirror: World,
+    truth: Option<Truth>,
+    steps: u64,
+    broadphase: BroadPhase,
+    proxies: Vec<Proxy>,
+    half_extent: f64,
+    top_at_start: f64,
+    squares: f64,
+    observed: u32,
+    overlaps: (f64, usize),
+    errors: Errors,
+}
+
+impl Checker {
+    /// For a scene of the catalogue. Errors: a scene that is not valid.
+    pub fn new(Loaded { scene, truth }: Loaded) -> Result<Self, String> {
+        let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
+        let mirror = scene.build(settings).map_err(|e| e.to_string())?;
+        let shapes = || mirror.shapes.iter().zip(&mirror.shape_body);
+        let proxy = |(shape, &body): (&Shape, &u32)| Proxy {
+            aabb: shape.aabb(&mirror.bodies.pose(body as usize)),
+            body,
+            group: mirror.bodies.group[body as usize],
+            dynamic: mirror.bodies.is_dynamic(body as usize),
+        };
+        let proxies = shapes().map(proxy).collect();
+        let half_extent = shapes()
+            .filter(|&(_, &body)| mirror.bodies.is_dynamic(body as usize))
+            .map(|(shape, _)| f64::from(shape.min_half_extent()))
+            .fold(f64::INFINITY, f64::min);
+        let top_at_start = top(&mirror);
+        Ok(Checker {
+            mirror,
+            truth,
+            steps: u64::from(scene.steps),
+            broadphase: BroadPhase::new(BroadPhaseKind::HashGrid),
+            proxies,
+            half_extent,
+            top_at_start,
+            squares: 0.0,
+            observed: 0,
+            overlaps: (0.0, 0),
+            errors: Errors::default(),
+        })
+    }
+
+    /// Looks at an engine `left` steps before its end. Errors: a body with a number that is none.
+    pub fn observe(&mut self, engine: &dyn Engine, left: u32) -> Result<(), String> {
+        let bodies = &mut self.mirror.bodies;
+        for i in 0..bodies.len() {
+            let state = engine.state(i);
+            let all = [state.position, state.rotation, state.velocity].concat();
+            if !all.iter().all(|x| x.is_finite()) || !state.angular_velocity.is_finite() {
+                return Err(format!("body {i} has a number that is none"));
+            }
+            [bodies.position_x[i], bodies.position_y[i]] = state.position;
+            [bodies.rotation_cos[i], bodies.rotation_sin[i]] = state.rotation;
+            [bodies.velocity_x[i], bodies.velocity_y[i]] = state.velocity;
+            bodies.angular_velocity[i] = state.angular_velocity;
+        }
+        // Observers count from the start of the scene's own length; a shorter run ends where it does.
+        self.mirror.step_index = self.steps - u64::from(left);
+        if let Some(truth) = &mut self.truth {
+            truth.observer.observe(&self.mirror);
+        }
+        let (mut energy, mut mass) = (0.0, 0.0);
+        for i in (0..self.mirror.bodies.len()).filter(|&i| self.mirror.bodies.is_dynamic(i)) {
+            let body = BodyState::of(&self.mirror.bodies, i, Default::default());
+            energy += body.kinetic_energy();
+            mass += body.mass();
+        }
+        self.squares += 2.0 * energy / mass;
+        self.observed += 1;
+        if left.is_multiple_of(STRIDE) {
+            self.add_overlaps();
+        }
+        Ok(())
+    }
+
+    fn add_overlaps(&mut self) {
+        let world = &self.mirror;
+        for ((proxy, shape), &body) in self.proxies.iter_mut().zip(&world.shapes).zip(&world.shape_body) {
+            proxy.aabb = shape.aabb(&world.bodies.pose(body as usize)).grown(SPECULATIVE_DISTANCE);
+        }
+        let mut candidates = Vec::new();
+        self.broadphase.pairs(&self.proxies, &mut candidates);
+        self.errors.pairs = 0;
+        for pair in candidates {
+            let [(a, pose_a), (b, pose_b)] = pair.map(|s| {
+                let s = s as usize;
+                (&world.shapes[s], world.bodies.pose(world.shape_body[s] as usize))
+            });
+            let apart = distance(a, &pose_a, b, &pose_b).distance;
+            let cores = if apart > 0.0 { apart } else { -penetration(a, &pose_a, b, &pose_b).depth };
+            let separation = cores - f64::from(a.radius()) - f64::from(b.radius());
+            if separation < f64::from(SPECULATIVE_DISTANCE) {
+                let depth = (-separation).max(0.0);
+                self.errors.pairs += 1;
+                self.overlaps = (self.overlaps.0 + depth, self.overlaps.1 + 1);
+                self.errors.penetration_max = self.errors.penetration_max.max(depth);
+            }
+        }
+    }
+
+    /// The errors of what was seen.
+    pub fn finish(self) -> Errors {
+        let truth = self.truth.and_then(|t| Some((t.quantity, t.unit, t.observer.error()?)));
+        let top = top(&self.mirror);
+        Errors {
+            penetration_mean: self.overlaps.0 / self.overlaps.1.max(1) as f64,
+            penetration_relative: self.errors.penetration_max / self.half_extent,
+            rms_velocity: (self.squares / f64::from(self.observed.max(1))).sqrt(),
+            top,
+            sunk: self.top_at_start - top,
+            truth,
+            ..self.errors
+        }
+    }
+}
+
+/// Highest centre of a dynamic body (m).
+fn top(world: &World) -> f64 {
+    let bodies = &world.bodies;
+    let dynamic = (0..bodies.len()).filter(|&i| bodies.is_dynamic(i));
+    dynamic.map(|i| f64::from(bodies.position_y[i])).fold(f64::NEG_INFINITY, f64::max)
+}
+
+impl Errors {
+    /// Whether the run may be timed at all. Errors: what it did that its scene forbids.
+    pub fn verdict(&self, stands: bool) -> Result<(), String> {
+        if let Some((quantity, "bodies", error)) = self.truth
+            && error > 0.0
+        {
+            return Err(format!("{error} {quantity}"));
+        }
+        if self.penetration_relative > 1.0 {
+            return Err(format!("overlap of {:.3} m: past the middle of a body", self.penetration_max));
+        }
+        if stands && self.sunk > 0.5 {
+            return Err(format!("collapsed: the top sank by {:.2} m", self.sunk));
+        }
+        Ok(())
+    }
+}

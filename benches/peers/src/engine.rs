@@ -1,0 +1,166 @@
+//! What the race and the check ask of an engine, and the settings it runs with.
+
+use simpulse::broadphase::BroadPhaseKind;
+use simpulse::lanes::LaneWidth;
+use simpulse::scenes::Scene;
+
+/// A scene inside an engine: one thread, no sleeping, no continuous collision.
+pub trait Engine {
+    /// Advances by the scene's step. Errors: the engine itself says that it diverged.
+    fn step(&mut self) -> Result<(), String>;
+
+    /// State of a body by its number in the scene.
+    fn state(&self, body: usize) -> State;
+
+    /// Bodies in the engine.
+    fn bodies(&self) -> usize;
+
+    /// Contact points that the engine solves now.
+    fn points(&self) -> usize;
+
+    /// Times of the last step (ms), by [`Stage`]; none where the engine does not tell.
+    fn stages(&self) -> [Option<f64>; Stage::ALL.len()];
+
+    /// Whether clocks inside the step run, where that can be chosen.
+    fn set_timed(&mut self, on: bool);
+}
+
+/// A body after a step, in the bits the engine holds.
+pub struct State {
+    /// Centre of mass (m).
+    pub position: [f32; 2],
+    /// (cos θ, sin θ)
+    pub rotation: [f32; 2],
+    /// Of the centre of mass (m/s).
+    pub velocity: [f32; 2],
+    /// rad/s
+    pub angular_velocity: f32,
+}
+
+/// Parts of a step that all three engines have in some form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Bounds and new pairs. Box2D: `pairs`, `transforms` (poses and bounds), `refit`.
+    Pairs,
+    /// Narrow phase and impulse matching.
+    Collide,
+    /// Colours, lanes or islands. Box2D: `solverSetup`, as its colours are kept up in `Collide`.
+    Color,
+    /// Constraint records.
+    Prepare,
+    /// Warm starting.
+    WarmStart,
+    /// Sweeps with position feedback.
+    Solve,
+    /// Sweeps without, and restitution.
+    Relax,
+    /// Velocities and positions of bodies.
+    Integrate,
+    /// The four stages above together: all that rapier tells of them.
+    Stages,
+    /// Impulses kept, poses written back.
+    Store,
+}
+
+impl Stage {
+    /// Every stage, in the order of a step.
+    pub const ALL: [Stage; 10] = [
+        Stage::Pairs,
+        Stage::Collide,
+        Stage::Color,
+        Stage::Prepare,
+        Stage::WarmStart,
+        Stage::Solve,
+        Stage::Relax,
+        Stage::Integrate,
+        Stage::Stages,
+        Stage::Store,
+    ];
+
+    /// Head of its column.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Pairs => "pairs",
+            Stage::Collide => "collide",
+            Stage::Color => "color",
+            Stage::Prepare => "prepare",
+            Stage::WarmStart => "warm start",
+            Stage::Solve => "solve",
+            Stage::Relax => "relax",
+            Stage::Integrate => "integrate",
+            Stage::Stages => "= stages",
+            Stage::Store => "store",
+        }
+    }
+}
+
+/// Which engine, in which build of its lanes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Maker {
+    /// Eight lanes (AVX2).
+    Box2d,
+    /// Eight lanes.
+    Rapier,
+    /// `soft_step` at a width of ours.
+    Simpulse(LaneWidth, BroadPhaseKind),
+}
+
+/// An engine and what it is set to. Everything else is at its defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contender {
+    /// Which engine.
+    pub maker: Maker,
+    /// Substeps, which rapier calls solver iterations.
+    pub substeps: u32,
+    /// Stiffness of contacts (Hz); 30 is the default of all three.
+    pub hertz: f32,
+}
+
+impl Contender {
+    /// Name in tables.
+    pub fn name(&self) -> String {
+        match self.maker {
+            Maker::Box2d => "Box2D x8".into(),
+            Maker::Rapier => "rapier x8".into(),
+            Maker::Simpulse(width, BroadPhaseKind::Tree) => format!("simpulse x{} tree", width.lanes()),
+            Maker::Simpulse(width, _) => format!("simpulse x{}", width.lanes()),
+        }
+    }
+
+    /// Settings in tables.
+    pub fn setting(&self) -> String {
+        let stiff = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
+        format!("n = {}{stiff}", self.substeps)
+    }
+
+    /// The scene in this engine. Errors: what the engine cannot hold.
+    pub fn build(&self, scene: &Scene) -> Result<Box<dyn Engine>, String> {
+        Ok(match self.maker {
+            Maker::Box2d => Box::new(crate::box2d::Box2d::new(scene, self)?),
+            Maker::Rapier => Box::new(crate::rapier::Rapier::new(scene, self)?),
+            Maker::Simpulse(width, pairs) => Box::new(crate::ours::Simpulse::new(scene, self, width, pairs)?),
+        })
+    }
+}
+
+/// Who races: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps and
+/// with contacts twice as stiff at 8, the stiffest that Box2D's clamp allows there. Our other
+/// widths and broad phase run too.
+pub fn contenders(quick: bool) -> Vec<Contender> {
+    let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
+    let mut all = Vec::new();
+    let mut add = |maker, settings: &[(u32, f32)]| {
+        all.extend(settings.iter().map(|&(substeps, hertz)| Contender { maker, substeps, hertz }));
+    };
+    let default = [(4, 30.0)];
+    let every = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0)];
+    let main = if quick { &default[..] } else { &every[..] };
+    add(Maker::Box2d, main);
+    add(Maker::Rapier, main);
+    add(ours(LaneWidth::W16), main);
+    let widths = if quick { &default[..] } else { &every[..3] };
+    add(ours(LaneWidth::W8), widths);
+    add(ours(LaneWidth::W4), widths);
+    add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::Tree), &default);
+    all
+}

@@ -1,0 +1,93 @@
+//! The same scenes on Box2D, rapier and simpulse, interleaved in one process:
+//! `cargo run --profile peers -p peers`.
+//!
+//! One thread, no sleeping, no continuous collision; every engine at its defaults and at other
+//! settings, its errors read from body poses by one [`check`], and its time told only if the
+//! check passed. What differs by design: Box2D and rapier keep a manifold whose bodies hardly
+//! moved (contact recycling), rapier solves the two points of a manifold together (block solver).
+
+mod box2d;
+mod check;
+mod engine;
+mod ours;
+mod race;
+mod rapier;
+mod table;
+
+use clap::Parser;
+use std::path::PathBuf;
+
+/// What is raced, for how many steps, and whether nothing in it may fall.
+const SCENES: &[(&str, u32, bool)] = &[
+    ("large_pyramid", 500, true),
+    ("many_pyramids", 200, true),
+    ("circle_pile:2000", 500, false),
+    ("tumbler", 750, false),
+    ("washer", 500, false),
+    ("smash", 300, false),
+    ("junkyard", 800, false),
+    ("compounds", 500, false),
+    ("stack:20", 2000, true),
+];
+
+/// Steps of a `--quick` run: two seconds and the second of the check.
+const QUICK_STEPS: u32 = 180;
+
+/// Box2D, rapier and simpulse side by side: time, and error beside it.
+#[derive(Parser)]
+struct Args {
+    /// Scenes, separated by commas; all where none is given
+    #[arg(long, value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// Steps of each scene, at least 90; the last 60 are not timed
+    #[arg(long, value_parser = clap::value_parser!(u32).range(90..))]
+    steps: Option<u32>,
+    /// How often every scene is run
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// Default settings only, 180 steps
+    #[arg(long)]
+    quick: bool,
+    /// Folder for peers.csv
+    #[arg(long, default_value = "results")]
+    out: PathBuf,
+}
+
+fn main() {
+    if let Err(message) = run(&Args::parse()) {
+        eprintln!("error: {message}");
+        std::process::exit(1);
+    }
+}
+
+fn run(args: &Args) -> Result<(), String> {
+    let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
+    let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
+        [] => SCENES.to_vec(),
+        // Any other scene of the catalogue may fall as it likes.
+        names => names.iter().map(|name| row(name).unwrap_or((name, 300, false))).collect(),
+    };
+    let contenders = engine::contenders(args.quick);
+    std::fs::create_dir_all(&args.out).map_err(|e| format!("{}: {e}", args.out.display()))?;
+    let path = args.out.join("peers.csv");
+    let failed = |e: csv::Error| format!("{}: {e}", path.display());
+    let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
+    for (name, steps, stands) in scenes {
+        let steps = args.steps.unwrap_or(if args.quick { QUICK_STEPS } else { steps });
+        let outcomes = race::race(name, steps, args.repeats, stands, &contenders)?;
+        println!("\n{name}: {} bodies, {steps} steps", outcomes[0].counts.0);
+        println!("{}", table::comparison(&outcomes));
+        println!("ms per step by stage, four substeps, clocks on");
+        println!("{}", table::stages(&outcomes));
+        println!("fastest with errors no larger than those of Box2D at its defaults:");
+        for line in table::equal_errors(&outcomes, stands) {
+            println!("  {line}");
+        }
+        for outcome in &outcomes {
+            csv.serialize(table::Row::new(name, outcome)).map_err(failed)?;
+        }
+        csv.flush().map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    println!("\n{}", path.display());
+    Ok(())
+}

@@ -1,0 +1,203 @@
+//! The race: all contenders in one process, block by block, in rotated order.
+//!
+//! A block is [`BLOCK`] steps of one contender; its first step meets cold caches and is not
+//! counted. Contenders take turns, so that a machine that slows down slows all of them, and each
+//! ratio is between blocks of the same round. The last second of every run is not timed: it
+//! belongs to the check.
+
+use crate::check::{Checker, Errors, WINDOW};
+use crate::engine::{Contender, Engine, Maker, Stage};
+use simpulse::lanes::LaneWidth;
+use simpulse::scenes;
+use std::time::Instant;
+
+/// Steps of a block.
+const BLOCK: u32 = 10;
+
+/// In every fourth round the clocks inside the steps run, and whole steps are not counted.
+const CLOCKED_ROUND: u32 = 4;
+
+/// Quartiles of a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Quartiles {
+    /// A quarter is below.
+    pub low: f64,
+    /// Half is below.
+    pub median: f64,
+    /// A quarter is above.
+    pub high: f64,
+}
+
+impl Quartiles {
+    /// Of a sample that has a value.
+    pub fn of(mut sample: Vec<f64>) -> Option<Self> {
+        sample.sort_by(f64::total_cmp);
+        let at = |share: f64| sample.get((share * (sample.len() - 1) as f64).round() as usize).copied();
+        if sample.is_empty() {
+            return None;
+        }
+        Some(Quartiles { low: at(0.25)?, median: at(0.5)?, high: at(0.75)? })
+    }
+}
+
+/// What one contender did in one scene.
+pub struct Outcome {
+    /// Who.
+    pub contender: Contender,
+    /// Bodies and contact points in the engine at the end.
+    pub counts: (usize, usize),
+    /// Its errors; what failed, if the check did.
+    pub errors: Result<Errors, String>,
+    /// ms per step.
+    pub step: Option<Quartiles>,
+    /// ms per step and stage.
+    pub stages: [Option<f64>; Stage::ALL.len()],
+    /// Time of a step against simpulse's widest lanes at as many substeps.
+    pub ratio: Option<Quartiles>,
+    /// The same of warm start, solve, relax and integrate alone.
+    pub stages_ratio: Option<Quartiles>,
+}
+
+/// A contender in the race.
+struct Runner {
+    contender: Contender,
+    engine: Box<dyn Engine>,
+    failed: Option<String>,
+    /// ms per step, the median of each block; all repeats.
+    blocks: Vec<f64>,
+    /// ms per clocked step and stage, the median of each block.
+    stages: [Vec<f64>; Stage::ALL.len()],
+}
+
+/// Runs a scene of the catalogue for `steps` steps, `repeats` times; `stands` tells the check that
+/// nothing may fall. Errors: an unknown scene, or one that an engine cannot hold.
+pub fn race(
+    name: &str,
+    steps: u32,
+    repeats: u32,
+    stands: bool,
+    contenders: &[Contender],
+) -> Result<Vec<Outcome>, String> {
+    let load = || scenes::load(name).map_err(|e| e.to_string());
+    let scene = load()?.scene;
+    let rounds = steps.saturating_sub(WINDOW) / BLOCK;
+    let mut runners = Vec::new();
+    for &contender in contenders {
+        let engine = contender.build(&scene).map_err(|e| format!("{}: {e}", contender.name()))?;
+        runners.push(Runner {
+            contender,
+            engine,
+            failed: None,
+            blocks: Vec::new(),
+            stages: Default::default(),
+        });
+    }
+    let mut errors = Vec::new();
+    let mut counts = Vec::new();
+    for repeat in 0..repeats {
+        if repeat > 0 {
+            for runner in &mut runners {
+                runner.engine = runner.contender.build(&scene)?;
+            }
+        }
+        for round in 0..rounds {
+            for turn in 0..runners.len() {
+                let place = (turn + (round + repeat) as usize) % runners.len();
+                runners[place].block(round);
+            }
+        }
+        // Runs repeat to the bit, so one check is enough; it comes before any time is looked at.
+        if repeat == 0 {
+            for runner in &mut runners {
+                errors.push(runner.check(Checker::new(load()?)?, steps - rounds * BLOCK, stands));
+                counts.push((runner.engine.bodies(), runner.engine.points()));
+            }
+        }
+    }
+    let rivals: Vec<Option<usize>> = contenders.iter().map(|c| rival(contenders, c)).collect();
+    let outcome = |(i, (errors, counts)): (usize, (Result<Errors, String>, (usize, usize)))| {
+        let runner = &runners[i];
+        let against = |of: fn(&Runner) -> &[f64]| {
+            let rival = &runners[rivals[i]?];
+            if rival.failed.is_some() || errors.is_err() {
+                return None;
+            }
+            Quartiles::of(of(runner).iter().zip(of(rival)).map(|(a, b)| a / b).collect())
+        };
+        let timed = errors.is_ok();
+        Outcome {
+            contender: runner.contender,
+            counts,
+            step: Quartiles::of(runner.blocks.clone()).filter(|_| timed),
+            stages: std::array::from_fn(|k| {
+                Some(Quartiles::of(runner.stages[k].clone()).filter(|_| timed)?.median)
+            }),
+            ratio: against(|r| &r.blocks),
+            stages_ratio: against(|r| &r.stages[Stage::Stages as usize]),
+            errors,
+        }
+    };
+    Ok(errors.into_iter().zip(counts).enumerate().map(outcome).collect())
+}
+
+/// Simpulse's widest lanes at the same settings, without options.
+fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
+    let maker = Maker::Simpulse(LaneWidth::W16, Default::default());
+    contenders.iter().position(|c| *c == Contender { maker, ..*of })
+}
+
+impl Runner {
+    fn block(&mut self, round: u32) {
+        if self.failed.is_some() {
+            return;
+        }
+        let clocked = round % CLOCKED_ROUND == CLOCKED_ROUND - 1;
+        self.engine.set_timed(clocked);
+        let mut times = Vec::with_capacity(BLOCK as usize);
+        let mut stages: [Vec<f64>; Stage::ALL.len()] = Default::default();
+        for _ in 0..BLOCK {
+            let start = Instant::now();
+            let result = self.engine.step();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+            if let Err(message) = result {
+                self.failed = Some(message);
+                return;
+            }
+            if clocked {
+                for (times, ms) in stages.iter_mut().zip(self.engine.stages()) {
+                    times.extend(ms);
+                }
+            }
+        }
+        let median = |times: &[f64]| Some(Quartiles::of(times.get(1..)?.to_vec())?.median);
+        if clocked {
+            for (blocks, times) in self.stages.iter_mut().zip(&stages) {
+                blocks.extend(median(times));
+            }
+        } else if round > 0 {
+            // The first block begins with the step that finds all contacts.
+            self.blocks.extend(median(&times));
+        }
+    }
+
+    /// The last `left` steps, those of the last second under the checker's eyes.
+    fn check(&mut self, mut checker: Checker, left: u32, stands: bool) -> Result<Errors, String> {
+        self.engine.set_timed(false);
+        let run = || {
+            if let Some(message) = self.failed.take() {
+                return Err(message);
+            }
+            for left in (0..left).rev() {
+                self.engine.step()?;
+                if left < WINDOW {
+                    checker.observe(&*self.engine, left)?;
+                }
+            }
+            let errors = checker.finish();
+            errors.verdict(stands).map(|()| errors)
+        };
+        let result = run();
+        self.failed = result.as_ref().err().cloned();
+        result
+    }
+}

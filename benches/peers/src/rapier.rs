@@ -1,0 +1,148 @@
+//! rapier2d.
+
+use crate::engine::{Contender, Engine, Stage, State};
+use rapier2d::prelude::*;
+use simpulse::bodies::BodyKind;
+use simpulse::scenes::{Geometry, Scene, SceneShape};
+
+/// A scene in rapier. Its default mixing is by averages; here friction mixes by the geometric
+/// mean and restitution by the maximum, as in the scene's terms.
+pub struct Rapier {
+    world: PhysicsWorld,
+    bodies: Vec<RigidBodyHandle>,
+}
+
+impl Rapier {
+    /// Errors: more groups than rapier has, or a shape that it refuses.
+    pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
+        let mut world = PhysicsWorld { gravity: vector(scene.gravity), ..PhysicsWorld::default() };
+        let p = &mut world.integration_parameters;
+        p.dt = scene.dt as f32;
+        p.num_solver_iterations = contender.substeps as usize;
+        p.contact_softness.natural_frequency = contender.hertz;
+        p.static_contact_softness.natural_frequency = 2.0 * contender.hertz;
+        p.max_ccd_substeps = 0;
+        let mut groups: Vec<i32> = Vec::new();
+        let mut bodies = Vec::with_capacity(scene.bodies.len());
+        for body in &scene.bodies {
+            let kind = match body.kind {
+                BodyKind::Static => RigidBodyType::Fixed,
+                BodyKind::Kinematic => RigidBodyType::KinematicVelocityBased,
+                BodyKind::Dynamic => RigidBodyType::Dynamic,
+            };
+            let rigid = RigidBodyBuilder::new(kind)
+                .translation(vector(body.position))
+                .rotation(body.angle as f32)
+                .linvel(vector(body.velocity))
+                .angvel(body.angular_velocity as f32)
+                .gravity_scale(body.gravity_scale as f32)
+                .linear_damping(body.linear_damping as f32)
+                .angular_damping(body.angular_damping as f32)
+                .can_sleep(false);
+            let handle = world.bodies.insert(rigid);
+            let filter = groups_of(body.group, &mut groups)?;
+            for shape in &body.shapes {
+                let collider = collider(shape)?.collision_groups(filter);
+                world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+            }
+            bodies.push(handle);
+        }
+        Ok(Rapier { world, bodies })
+    }
+}
+
+/// Bodies of the same non-zero group do not collide: each group is a bit that filters itself out.
+fn groups_of(group: i32, known: &mut Vec<i32>) -> Result<InteractionGroups, String> {
+    if group == 0 {
+        return Ok(InteractionGroups::default());
+    }
+    let index = known.iter().position(|&g| g == group).unwrap_or_else(|| {
+        known.push(group);
+        known.len() - 1
+    });
+    // Bit 0 is that of bodies without a group.
+    let bit = 1_u32.checked_shl(index as u32 + 1).ok_or("more than 31 groups")?;
+    let own = Group::from_bits_truncate(bit);
+    Ok(InteractionGroups::new(own, Group::ALL.difference(own), InteractionTestMode::And))
+}
+
+fn collider(shape: &SceneShape) -> Result<ColliderBuilder, String> {
+    let builder = match &shape.geometry {
+        Geometry::Circle(c) => ColliderBuilder::ball(c.radius as f32).translation(vector(c.center)),
+        Geometry::Box(b) => {
+            let [w, h] = b.half.map(|x| x as f32);
+            let builder = match b.radius {
+                0.0 => ColliderBuilder::cuboid(w, h),
+                radius => ColliderBuilder::round_cuboid(w, h, radius as f32),
+            };
+            builder.translation(vector(b.center)).rotation(b.angle as f32)
+        }
+        Geometry::Polygon(p) => {
+            let points: Vec<Vector> = p.points.iter().map(|&v| vector(v)).collect();
+            let hull = match p.radius {
+                0.0 => ColliderBuilder::convex_hull(&points),
+                radius => ColliderBuilder::round_convex_hull(&points, radius as f32),
+            };
+            hull.ok_or("a polygon without a hull")?
+        }
+        Geometry::Capsule(c) => {
+            ColliderBuilder::capsule_from_endpoints(vector(c.a), vector(c.b), c.radius as f32)
+        }
+        Geometry::Segment(s) => ColliderBuilder::segment(vector(s.a), vector(s.b)),
+    };
+    Ok(builder
+        .density(shape.density as f32)
+        .friction(shape.friction as f32)
+        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+        .restitution(shape.restitution as f32)
+        .restitution_combine_rule(CoefficientCombineRule::Max))
+}
+
+fn vector(v: [f64; 2]) -> Vector {
+    Vector::new(v[0] as f32, v[1] as f32)
+}
+
+impl Engine for Rapier {
+    fn step(&mut self) -> Result<(), String> {
+        self.world.step();
+        Ok(())
+    }
+
+    fn state(&self, body: usize) -> State {
+        let body = &self.world.bodies[self.bodies[body]];
+        let (center, rotation, velocity) = (body.center_of_mass(), body.rotation(), body.linvel());
+        State {
+            position: [center.x, center.y],
+            rotation: [rotation.cos(), rotation.sin()],
+            velocity: [velocity.x, velocity.y],
+            angular_velocity: body.angvel(),
+        }
+    }
+
+    fn bodies(&self) -> usize {
+        self.world.bodies.len()
+    }
+
+    fn points(&self) -> usize {
+        let pairs = self.world.narrow_phase.contact_pairs();
+        pairs.flat_map(|p| p.solver_manifolds()).map(|m| m.data.solver_contacts.len()).sum()
+    }
+
+    fn stages(&self) -> [Option<f64>; Stage::ALL.len()] {
+        let c = &self.world.physics_pipeline.counters;
+        Stage::ALL.map(|stage| {
+            let ms = match stage {
+                Stage::Pairs => c.cd.broad_phase_time.time_ms() + c.cd.final_broad_phase_time.time_ms(),
+                Stage::Collide => c.cd.narrow_phase_time.time_ms(),
+                Stage::Color => c.stages.island_construction_time.time_ms(),
+                Stage::Prepare => c.solver.velocity_assembly_time.time_ms(),
+                Stage::Stages => c.solver.velocity_resolution_time.time_ms(),
+                _ => return None,
+            };
+            cfg!(feature = "rapier-phases").then_some(ms)
+        })
+    }
+
+    /// Chosen when it is compiled.
+    fn set_timed(&mut self, _: bool) {}
+}

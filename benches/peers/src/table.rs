@@ -1,0 +1,195 @@
+//! Tables for people, rows for programs.
+
+use crate::engine::{Maker, Stage};
+use crate::race::{Outcome, Quartiles};
+use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
+use serde::Serialize;
+
+const NONE: &str = "–";
+
+/// A mean this much above Box2D's is still called no larger: chaotic scenes scatter so.
+const ALLOWED: f64 = 1.1;
+
+/// Times and errors, one row per contender.
+pub fn comparison(outcomes: &[Outcome]) -> Table {
+    let mut table = head(&[
+        "engine",
+        "setting",
+        "ms/step",
+        "spread",
+        "× simpulse",
+        "stages ×",
+        "pen. mean mm",
+        "pen. max mm",
+        "rms v mm/s",
+        "top m",
+        "pairs",
+        "points",
+        "truth",
+    ]);
+    for o in outcomes {
+        let mut row = vec![o.contender.name(), o.contender.setting()];
+        match &o.errors {
+            Err(message) => row.push(format!("failed: {message}")),
+            Ok(e) => row.extend([
+                o.step.map_or(NONE.into(), |q| significant(q.median)),
+                o.step.map_or(NONE.into(), |q| format!("{}–{}", significant(q.low), significant(q.high))),
+                factor(&o.ratio),
+                factor(&o.stages_ratio),
+                significant(e.penetration_mean * 1e3),
+                significant(e.penetration_max * 1e3),
+                significant(e.rms_velocity * 1e3),
+                format!("{:.3}", e.top),
+                e.pairs.to_string(),
+                o.counts.1.to_string(),
+                e.truth.map_or(NONE.into(), |(_, unit, error)| format!("{} {unit}", significant(error))),
+            ]),
+        }
+        table.add_row(row);
+    }
+    table
+}
+
+/// ms per step by stage at four substeps.
+pub fn stages(outcomes: &[Outcome]) -> Table {
+    let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
+    let mut table = head(&[&["engine"], &names[..], &["rest", "step"]].concat());
+    for o in outcomes.iter().filter(|o| o.contender.substeps == 4 && o.errors.is_ok()) {
+        let mut row = vec![o.contender.name()];
+        row.extend(o.stages.map(|ms| ms.map_or(NONE.into(), significant)));
+        let step = o.step.map(|q| q.median);
+        // The stages add up to `Stages`, which is itself among them.
+        let apart = [Stage::WarmStart, Stage::Solve, Stage::Relax, Stage::Integrate];
+        let counted = Stage::ALL.iter().filter(|s| !apart.contains(s));
+        let told: f64 = counted.filter_map(|&s| o.stages[s as usize]).sum();
+        let tells = o.stages[Stage::Stages as usize].is_some();
+        row.push(step.filter(|_| tells).map_or(NONE.into(), |s| format!("{:.3}", s - told)));
+        row.push(step.map_or(NONE.into(), significant));
+        table.add_row(row);
+    }
+    table
+}
+
+/// The fastest setting of every engine whose errors are no larger than those of Box2D at its
+/// defaults: the mean overlap, and where things rest also the velocity that is left.
+pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
+    let default = |o: &&Outcome| {
+        o.contender.maker == Maker::Box2d && o.contender.substeps == 4 && o.contender.hertz == 30.0
+    };
+    let Some(bound) = outcomes.iter().find(default).and_then(|o| o.errors.as_ref().ok()) else {
+        return Vec::new();
+    };
+    let mut lines = Vec::new();
+    for family in ["Box2D", "rapier", "simpulse"] {
+        let fits = |o: &&Outcome| {
+            o.contender.name().starts_with(family)
+                && o.errors.as_ref().is_ok_and(|e| {
+                    e.penetration_mean <= ALLOWED * bound.penetration_mean
+                        && (!stands || e.rms_velocity <= ALLOWED * bound.rms_velocity)
+                })
+        };
+        let time = |o: &&Outcome| o.step.map_or(f64::INFINITY, |q| q.median);
+        let best = outcomes.iter().filter(fits).min_by(|a, b| time(a).total_cmp(&time(b)));
+        lines.push(match best {
+            Some(o) => {
+                format!("{}, {}: {} ms", o.contender.name(), o.contender.setting(), significant(time(&o)))
+            }
+            None => format!("{family}: no setting"),
+        });
+    }
+    lines
+}
+
+/// A row of `peers.csv`.
+#[derive(Serialize)]
+pub struct Row {
+    scene: String,
+    engine: String,
+    substeps: u32,
+    contact_hertz: f32,
+    failed: String,
+    step_ms: Option<f64>,
+    step_ms_low: Option<f64>,
+    step_ms_high: Option<f64>,
+    ratio: Option<f64>,
+    ratio_low: Option<f64>,
+    ratio_high: Option<f64>,
+    stages_ratio: Option<f64>,
+    pairs_ms: Option<f64>,
+    collide_ms: Option<f64>,
+    color_ms: Option<f64>,
+    prepare_ms: Option<f64>,
+    warm_start_ms: Option<f64>,
+    solve_ms: Option<f64>,
+    relax_ms: Option<f64>,
+    integrate_ms: Option<f64>,
+    stages_ms: Option<f64>,
+    store_ms: Option<f64>,
+    bodies: usize,
+    points: usize,
+    pairs: Option<usize>,
+    penetration_mean_m: Option<f64>,
+    penetration_max_m: Option<f64>,
+    rms_velocity: Option<f64>,
+    top_m: Option<f64>,
+    truth: &'static str,
+    truth_error: Option<f64>,
+}
+
+impl Row {
+    /// Everything of an outcome; no times where the check failed.
+    pub fn new(scene: &str, o: &Outcome) -> Self {
+        let e = o.errors.as_ref().ok();
+        let [pairs, collide, color, prepare, warm_start, solve, relax, integrate, stages, store] = o.stages;
+        let truth = e.and_then(|e| e.truth);
+        Row {
+            scene: scene.into(),
+            engine: o.contender.name(),
+            substeps: o.contender.substeps,
+            contact_hertz: o.contender.hertz,
+            failed: o.errors.as_ref().err().cloned().unwrap_or_default(),
+            step_ms: o.step.map(|q| q.median),
+            step_ms_low: o.step.map(|q| q.low),
+            step_ms_high: o.step.map(|q| q.high),
+            ratio: o.ratio.map(|q| q.median),
+            ratio_low: o.ratio.map(|q| q.low),
+            ratio_high: o.ratio.map(|q| q.high),
+            stages_ratio: o.stages_ratio.map(|q| q.median),
+            pairs_ms: pairs,
+            collide_ms: collide,
+            color_ms: color,
+            prepare_ms: prepare,
+            warm_start_ms: warm_start,
+            solve_ms: solve,
+            relax_ms: relax,
+            integrate_ms: integrate,
+            stages_ms: stages,
+            store_ms: store,
+            bodies: o.counts.0,
+            points: o.counts.1,
+            pairs: e.map(|e| e.pairs),
+            penetration_mean_m: e.map(|e| e.penetration_mean),
+            penetration_max_m: e.map(|e| e.penetration_max),
+            rms_velocity: e.map(|e| e.rms_velocity),
+            top_m: e.map(|e| e.top),
+            truth: truth.map_or("", |t| t.0),
+            truth_error: truth.map(|t| t.2),
+        }
+    }
+}
+
+fn head(names: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED).set_header(names.to_vec());
+    table
+}
+
+/// Three digits.
+fn significant(x: f64) -> String {
+    let digits = if x == 0.0 { 0 } else { (2 - x.abs().log10().floor() as i32).clamp(0, 6) };
+    format!("{x:.*}", digits as usize)
+}
+
+fn factor(q: &Option<Quartiles>) -> String {
+    q.map_or(NONE.into(), |q| format!("{:.2} [{:.2}, {:.2}]", q.median, q.low, q.high))
+}
