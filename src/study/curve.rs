@@ -114,7 +114,8 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve> {
 }
 
 impl Curve {
-    /// The least error that the curve has at this time (ns), see [`Self::cross`].
+    /// The least error that the curve has at this time (ns); none outside its budgets. Between
+    /// neighbouring budgets it is a line of the logarithms.
     pub fn error_at(&self, time: f64) -> Option<f64> {
         self.cross(time, |s| [s.time, s.error]).map(|(error, _)| error)
     }
