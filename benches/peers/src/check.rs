@@ -17,7 +17,11 @@ use simpulse::world::{Settings, World};
 pub const WINDOW: u32 = 60;
 
 /// Overlaps are measured every this many steps of the window: they change slowly.
-const STRIDE: u32 = 20;
+const STRIDE: u32 = 10;
+
+/// Without continuous collision a box at 10 m/s enters a wall by 0.17 m in one step, in any engine:
+/// this share of pairs may be past the middle of a body for a moment.
+const MOST_LOST: f64 = 1e-3;
 
 /// How wrong a run was over its last second.
 #[derive(Clone, Debug, Default)]
@@ -28,14 +32,14 @@ pub struct Errors {
     pub penetration_mean: f64,
     /// Deepest overlap (m).
     pub penetration_max: f64,
-    /// The same in half the width of the thinnest dynamic shape.
-    pub penetration_relative: f64,
+    /// Share of pairs that overlap by more than half the width of the thinnest dynamic shape.
+    pub lost: f64,
     /// Root mean square of √(2 E_kin/M) (m/s).
     pub rms_velocity: f64,
     /// Highest centre of a dynamic body at the end (m).
     pub top: f64,
-    /// How far the highest centre is below where it started (m).
-    pub sunk: f64,
+    /// Farthest that a dynamic body is from where it started (m).
+    pub moved: f64,
     /// What is known about the scene: the quantity, its unit, its error.
     pub truth: Option<(&'static str, &'static str, f64)>,
 }
@@ -48,10 +52,11 @@ pub struct Checker {
     broadphase: BroadPhase,
     proxies: Vec<Proxy>,
     half_extent: f64,
-    top_at_start: f64,
+    start: Vec<[f64; 2]>,
     squares: f64,
     observed: u32,
-    overlaps: (f64, usize),
+    /// Sum of overlaps (m), pairs, and those of them past the middle of a body.
+    overlaps: (f64, usize, usize),
     errors: Errors,
 }
 
@@ -72,7 +77,7 @@ impl Checker {
             .filter(|&(_, &body)| mirror.bodies.is_dynamic(body as usize))
             .map(|(shape, _)| f64::from(shape.min_half_extent()))
             .fold(f64::INFINITY, f64::min);
-        let top_at_start = top(&mirror);
+        let start = centers(&mirror).collect();
         Ok(Checker {
             mirror,
             truth,
@@ -80,10 +85,10 @@ impl Checker {
             broadphase: BroadPhase::new(BroadPhaseKind::HashGrid),
             proxies,
             half_extent,
-            top_at_start,
+            start,
             squares: 0.0,
             observed: 0,
-            overlaps: (0.0, 0),
+            overlaps: (0.0, 0, 0),
             errors: Errors::default(),
         })
     }
@@ -140,7 +145,9 @@ impl Checker {
             if separation < f64::from(SPECULATIVE_DISTANCE) {
                 let depth = (-separation).max(0.0);
                 self.errors.pairs += 1;
-                self.overlaps = (self.overlaps.0 + depth, self.overlaps.1 + 1);
+                self.overlaps.0 += depth;
+                self.overlaps.1 += 1;
+                self.overlaps.2 += usize::from(depth > self.half_extent);
                 self.errors.penetration_max = self.errors.penetration_max.max(depth);
             }
         }
@@ -149,24 +156,25 @@ impl Checker {
     /// The errors of what was seen.
     pub fn finish(self) -> Errors {
         let truth = self.truth.and_then(|t| Some((t.quantity, t.unit, t.observer.error()?)));
-        let top = top(&self.mirror);
+        let top = centers(&self.mirror).map(|c| c[1]).fold(f64::NEG_INFINITY, f64::max);
+        let moves = centers(&self.mirror).zip(&self.start).map(|(c, s)| (c[0] - s[0]).hypot(c[1] - s[1]));
         Errors {
             penetration_mean: self.overlaps.0 / self.overlaps.1.max(1) as f64,
-            penetration_relative: self.errors.penetration_max / self.half_extent,
+            lost: self.overlaps.2 as f64 / self.overlaps.1.max(1) as f64,
             rms_velocity: (self.squares / f64::from(self.observed.max(1))).sqrt(),
             top,
-            sunk: self.top_at_start - top,
+            moved: moves.fold(0.0, f64::max),
             truth,
             ..self.errors
         }
     }
 }
 
-/// Highest centre of a dynamic body (m).
-fn top(world: &World) -> f64 {
+/// Centres of the dynamic bodies (m).
+fn centers(world: &World) -> impl Iterator<Item = [f64; 2]> {
     let bodies = &world.bodies;
     let dynamic = (0..bodies.len()).filter(|&i| bodies.is_dynamic(i));
-    dynamic.map(|i| f64::from(bodies.position_y[i])).fold(f64::NEG_INFINITY, f64::max)
+    dynamic.map(|i| [f64::from(bodies.position_x[i]), f64::from(bodies.position_y[i])])
 }
 
 impl Errors {
@@ -177,11 +185,12 @@ impl Errors {
         {
             return Err(format!("{error} {quantity}"));
         }
-        if self.penetration_relative > 1.0 {
-            return Err(format!("overlap of {:.3} m: past the middle of a body", self.penetration_max));
+        if self.lost > MOST_LOST {
+            return Err(format!("{:.2} % of the pairs are past the middle of a body", 100.0 * self.lost));
         }
-        if stands && self.sunk > 0.5 {
-            return Err(format!("collapsed: the top sank by {:.2} m", self.sunk));
+        // Soft contacts let a hundred rows sag by 0.7 m; a box that left its place is farther.
+        if stands && self.moved > 1.0 {
+            return Err(format!("fell: a body moved by {:.2} m", self.moved));
         }
         Ok(())
     }

@@ -46,16 +46,40 @@ pub struct Outcome {
     pub contender: Contender,
     /// Bodies and contact points in the engine at the end.
     pub counts: (usize, usize),
-    /// Its errors; what failed, if the check did.
-    pub errors: Result<Errors, String>,
+    /// Its errors, unless it did not come to its end.
+    pub errors: Option<Errors>,
+    /// What failed, if the check did. Then there are no times.
+    pub failed: Option<String>,
     /// ms per step.
     pub step: Option<Quartiles>,
-    /// ms per step and stage.
-    pub stages: [Option<f64>; Stage::ALL.len()],
+    /// ms per step and stage with the clocks on, and of the whole step.
+    pub stages: Option<Breakdown>,
     /// Time of a step against simpulse's widest lanes at as many substeps.
     pub ratio: Option<Quartiles>,
     /// The same of warm start, solve, relax and integrate alone.
     pub stages_ratio: Option<Quartiles>,
+}
+
+/// Times of steps taken apart (ms), all of the same steps, so that they add up.
+#[derive(Clone, Copy, Debug)]
+pub struct Breakdown {
+    /// By [`Stage`]; none where the engine does not tell.
+    pub stages: [Option<f64>; Stage::ALL.len()],
+    /// Of the whole step.
+    pub step: f64,
+}
+
+impl Breakdown {
+    /// Mean of the faster half of a sample: what interrupted a step is no stage of it.
+    fn of(mut sample: Vec<Self>) -> Option<Self> {
+        sample.sort_by(|a, b| a.step.total_cmp(&b.step));
+        sample.truncate(sample.len().div_ceil(2));
+        let count = sample.len() as f64;
+        let mean =
+            |of: &dyn Fn(&Self) -> Option<f64>| Some(sample.iter().map(of).sum::<Option<f64>>()? / count);
+        let stages = std::array::from_fn(|k| mean(&|b| b.stages[k]));
+        Some(Breakdown { stages, step: mean(&|b| Some(b.step)).filter(|_| count > 0.0)? })
+    }
 }
 
 /// A contender in the race.
@@ -65,8 +89,8 @@ struct Runner {
     failed: Option<String>,
     /// ms per step, the median of each block; all repeats.
     blocks: Vec<f64>,
-    /// ms per clocked step and stage, the median of each block.
-    stages: [Vec<f64>; Stage::ALL.len()],
+    /// Of each clocked block.
+    clocked: Vec<Breakdown>,
 }
 
 /// Runs a scene of the catalogue for `steps` steps, `repeats` times; `stands` tells the check that
@@ -84,13 +108,7 @@ pub fn race(
     let mut runners = Vec::new();
     for &contender in contenders {
         let engine = contender.build(&scene).map_err(|e| format!("{}: {e}", contender.name()))?;
-        runners.push(Runner {
-            contender,
-            engine,
-            failed: None,
-            blocks: Vec::new(),
-            stages: Default::default(),
-        });
+        runners.push(Runner { contender, engine, failed: None, blocks: Vec::new(), clocked: Vec::new() });
     }
     let mut errors = Vec::new();
     let mut counts = Vec::new();
@@ -115,26 +133,26 @@ pub fn race(
         }
     }
     let rivals: Vec<Option<usize>> = contenders.iter().map(|c| rival(contenders, c)).collect();
-    let outcome = |(i, (errors, counts)): (usize, (Result<Errors, String>, (usize, usize)))| {
+    let outcome = |(i, (errors, counts)): (usize, (Option<Errors>, (usize, usize)))| {
         let runner = &runners[i];
-        let against = |of: fn(&Runner) -> &[f64]| {
+        let timed = runner.failed.is_none();
+        let against = |of: fn(&Runner) -> Vec<f64>| {
             let rival = &runners[rivals[i]?];
-            if rival.failed.is_some() || errors.is_err() {
+            if rival.failed.is_some() || !timed {
                 return None;
             }
             Quartiles::of(of(runner).iter().zip(of(rival)).map(|(a, b)| a / b).collect())
         };
-        let timed = errors.is_ok();
+        let stages = |r: &Runner| r.clocked.iter().filter_map(|b| b.stages[Stage::Stages as usize]).collect();
         Outcome {
             contender: runner.contender,
             counts,
             step: Quartiles::of(runner.blocks.clone()).filter(|_| timed),
-            stages: std::array::from_fn(|k| {
-                Some(Quartiles::of(runner.stages[k].clone()).filter(|_| timed)?.median)
-            }),
-            ratio: against(|r| &r.blocks),
-            stages_ratio: against(|r| &r.stages[Stage::Stages as usize]),
+            stages: Breakdown::of(runner.clocked.clone()).filter(|_| timed),
+            ratio: against(|r| r.blocks.clone()),
+            stages_ratio: against(stages),
             errors,
+            failed: runner.failed.clone(),
         }
     };
     Ok(errors.into_iter().zip(counts).enumerate().map(outcome).collect())
@@ -154,7 +172,7 @@ impl Runner {
         let clocked = round % CLOCKED_ROUND == CLOCKED_ROUND - 1;
         self.engine.set_timed(clocked);
         let mut times = Vec::with_capacity(BLOCK as usize);
-        let mut stages: [Vec<f64>; Stage::ALL.len()] = Default::default();
+        let mut clocked_steps = Vec::new();
         for _ in 0..BLOCK {
             let start = Instant::now();
             let result = self.engine.step();
@@ -164,40 +182,39 @@ impl Runner {
                 return;
             }
             if clocked {
-                for (times, ms) in stages.iter_mut().zip(self.engine.stages()) {
-                    times.extend(ms);
-                }
+                clocked_steps
+                    .extend(times.last().map(|&step| Breakdown { stages: self.engine.stages(), step }));
             }
         }
-        let median = |times: &[f64]| Some(Quartiles::of(times.get(1..)?.to_vec())?.median);
+        times.remove(0);
         if clocked {
-            for (blocks, times) in self.stages.iter_mut().zip(&stages) {
-                blocks.extend(median(times));
-            }
+            clocked_steps.remove(0);
+            self.clocked.extend(Breakdown::of(clocked_steps));
         } else if round > 0 {
             // The first block begins with the step that finds all contacts.
-            self.blocks.extend(median(&times));
+            self.blocks.extend(Quartiles::of(times).map(|q| q.median));
         }
     }
 
-    /// The last `left` steps, those of the last second under the checker's eyes.
-    fn check(&mut self, mut checker: Checker, left: u32, stands: bool) -> Result<Errors, String> {
+    /// The last `left` steps, those of the last second under the checker's eyes; its errors,
+    /// unless the engine diverges.
+    fn check(&mut self, mut checker: Checker, left: u32, stands: bool) -> Option<Errors> {
+        if self.failed.is_some() {
+            return None;
+        }
         self.engine.set_timed(false);
-        let run = || {
-            if let Some(message) = self.failed.take() {
-                return Err(message);
+        for left in (0..left).rev() {
+            let seen = match self.engine.step() {
+                Ok(()) if left < WINDOW => checker.observe(&*self.engine, left),
+                stepped => stepped,
+            };
+            if let Err(message) = seen {
+                self.failed = Some(message);
+                return None;
             }
-            for left in (0..left).rev() {
-                self.engine.step()?;
-                if left < WINDOW {
-                    checker.observe(&*self.engine, left)?;
-                }
-            }
-            let errors = checker.finish();
-            errors.verdict(stands).map(|()| errors)
-        };
-        let result = run();
-        self.failed = result.as_ref().err().cloned();
-        result
+        }
+        let errors = checker.finish();
+        self.failed = errors.verdict(stands).err();
+        Some(errors)
     }
 }

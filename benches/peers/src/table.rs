@@ -25,25 +25,32 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
         "top m",
         "pairs",
         "points",
-        "truth",
+        "off by",
     ]);
     for o in outcomes {
-        let mut row = vec![o.contender.name(), o.contender.setting()];
-        match &o.errors {
-            Err(message) => row.push(format!("failed: {message}")),
-            Ok(e) => row.extend([
-                o.step.map_or(NONE.into(), |q| significant(q.median)),
-                o.step.map_or(NONE.into(), |q| format!("{}–{}", significant(q.low), significant(q.high))),
-                factor(&o.ratio),
-                factor(&o.stages_ratio),
+        let mut row = vec![
+            o.contender.name(),
+            o.contender.setting(),
+            o.step.map_or(NONE.into(), |q| significant(q.median)),
+            o.step.map_or(NONE.into(), |q| format!("{}–{}", significant(q.low), significant(q.high))),
+            factor(&o.ratio),
+            factor(&o.stages_ratio),
+        ];
+        if let Some(e) = &o.errors {
+            let truth = |(_, unit, error)| format!("{} {unit}", significant(error));
+            row.extend([
                 significant(e.penetration_mean * 1e3),
                 significant(e.penetration_max * 1e3),
                 significant(e.rms_velocity * 1e3),
                 format!("{:.3}", e.top),
                 e.pairs.to_string(),
                 o.counts.1.to_string(),
-                e.truth.map_or(NONE.into(), |(_, unit, error)| format!("{} {unit}", significant(error))),
-            ]),
+                e.truth.map_or(NONE.into(), truth),
+            ]);
+        }
+        if let Some(message) = &o.failed {
+            row.resize(table.column_count() - 1, NONE.into());
+            row.push(format!("FAILED: {message}"));
         }
         table.add_row(row);
     }
@@ -54,17 +61,17 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
 pub fn stages(outcomes: &[Outcome]) -> Table {
     let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
     let mut table = head(&[&["engine"], &names[..], &["rest", "step"]].concat());
-    for o in outcomes.iter().filter(|o| o.contender.substeps == 4 && o.errors.is_ok()) {
+    for o in outcomes.iter().filter(|o| o.contender.substeps == 4) {
+        let Some(b) = &o.stages else { continue };
         let mut row = vec![o.contender.name()];
-        row.extend(o.stages.map(|ms| ms.map_or(NONE.into(), significant)));
-        let step = o.step.map(|q| q.median);
+        row.extend(b.stages.map(|ms| ms.map_or(NONE.into(), significant)));
         // The stages add up to `Stages`, which is itself among them.
         let apart = [Stage::WarmStart, Stage::Solve, Stage::Relax, Stage::Integrate];
         let counted = Stage::ALL.iter().filter(|s| !apart.contains(s));
-        let told: f64 = counted.filter_map(|&s| o.stages[s as usize]).sum();
-        let tells = o.stages[Stage::Stages as usize].is_some();
-        row.push(step.filter(|_| tells).map_or(NONE.into(), |s| format!("{:.3}", s - told)));
-        row.push(step.map_or(NONE.into(), significant));
+        let told: f64 = counted.filter_map(|&s| b.stages[s as usize]).sum();
+        let tells = b.stages[Stage::Stages as usize].is_some();
+        row.push(if tells { significant(b.step - told) } else { NONE.into() });
+        row.push(significant(b.step));
         table.add_row(row);
     }
     table
@@ -76,14 +83,15 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     let default = |o: &&Outcome| {
         o.contender.maker == Maker::Box2d && o.contender.substeps == 4 && o.contender.hertz == 30.0
     };
-    let Some(bound) = outcomes.iter().find(default).and_then(|o| o.errors.as_ref().ok()) else {
+    let Some(bound) = outcomes.iter().find(default).and_then(|o| o.errors.as_ref()) else {
         return Vec::new();
     };
     let mut lines = Vec::new();
     for family in ["Box2D", "rapier", "simpulse"] {
         let fits = |o: &&Outcome| {
             o.contender.name().starts_with(family)
-                && o.errors.as_ref().is_ok_and(|e| {
+                && o.failed.is_none()
+                && o.errors.as_ref().is_some_and(|e| {
                     e.penetration_mean <= ALLOWED * bound.penetration_mean
                         && (!stands || e.rms_velocity <= ALLOWED * bound.rms_velocity)
                 })
@@ -115,6 +123,7 @@ pub struct Row {
     ratio_low: Option<f64>,
     ratio_high: Option<f64>,
     stages_ratio: Option<f64>,
+    clocked_step_ms: Option<f64>,
     pairs_ms: Option<f64>,
     collide_ms: Option<f64>,
     color_ms: Option<f64>,
@@ -139,15 +148,16 @@ pub struct Row {
 impl Row {
     /// Everything of an outcome; no times where the check failed.
     pub fn new(scene: &str, o: &Outcome) -> Self {
-        let e = o.errors.as_ref().ok();
-        let [pairs, collide, color, prepare, warm_start, solve, relax, integrate, stages, store] = o.stages;
+        let e = o.errors.as_ref();
+        let [pairs, collide, color, prepare, warm_start, solve, relax, integrate, stages, store] =
+            o.stages.map_or([None; Stage::ALL.len()], |b| b.stages);
         let truth = e.and_then(|e| e.truth);
         Row {
             scene: scene.into(),
             engine: o.contender.name(),
             substeps: o.contender.substeps,
             contact_hertz: o.contender.hertz,
-            failed: o.errors.as_ref().err().cloned().unwrap_or_default(),
+            failed: o.failed.clone().unwrap_or_default(),
             step_ms: o.step.map(|q| q.median),
             step_ms_low: o.step.map(|q| q.low),
             step_ms_high: o.step.map(|q| q.high),
@@ -155,6 +165,7 @@ impl Row {
             ratio_low: o.ratio.map(|q| q.low),
             ratio_high: o.ratio.map(|q| q.high),
             stages_ratio: o.stages_ratio.map(|q| q.median),
+            clocked_step_ms: o.stages.map(|b| b.step),
             pairs_ms: pairs,
             collide_ms: collide,
             color_ms: color,
@@ -186,7 +197,7 @@ fn head(names: &[&str]) -> Table {
 
 /// Three digits.
 fn significant(x: f64) -> String {
-    let digits = if x == 0.0 { 0 } else { (2 - x.abs().log10().floor() as i32).clamp(0, 6) };
+    let digits = if x == 0.0 { 0 } else { (2 - x.abs().log10().floor() as i32).clamp(0, 5) };
     format!("{x:.*}", digits as usize)
 }
 
