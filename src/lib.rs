@@ -59,6 +59,7 @@ pub mod constraints;
 pub mod contacts;
 pub mod converge;
 pub mod error;
+pub mod files;
 pub mod lanes;
 pub mod metrics;
 pub mod narrowphase;

@@ -3,10 +3,10 @@
 use crate::cli::{RunArgs, order, width};
 use simpulse::clock::{Phase, Timings};
 use simpulse::error::Error;
+use simpulse::files::Pending;
 use simpulse::lanes::LaneWidth;
 use simpulse::metrics::Observation;
 use simpulse::params::Budget;
-use simpulse::report::files::Pending;
 use simpulse::report::table::error_list;
 use simpulse::report::units::{digits, si};
 use simpulse::solvers::find;

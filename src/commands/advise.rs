@@ -3,9 +3,9 @@
 use crate::advise::limits::{Limits, quantity};
 use crate::advise::{Advice, Plan, Setting, Trial, advise};
 use crate::error::Error;
+use crate::files::Pending;
 use crate::lanes::LaneWidth;
 use crate::report::environment::Environment;
-use crate::report::files::Pending;
 use crate::report::table::error_list;
 use crate::report::units::{digits, ratio, si, si_short};
 use crate::solvers::{VARIANTS, find};

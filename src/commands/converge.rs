@@ -1,9 +1,9 @@
 //! `simpulse converge`: every solver on exactly the same contact problem.
 
 use super::capture::{RunArgs, freeze};
-use super::{make_folder, write_whole};
 use crate::converge::{Options, converge, plot, table};
 use crate::error::Error;
+use crate::files;
 use crate::lanes::LaneWidth;
 use crate::params::CONTACT_HERTZ;
 use crate::solvers::{self, VARIANTS};
@@ -104,7 +104,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     };
     let report = converge(&frozen.problem, frozen.reference.as_ref(), &options)?;
     print!("{}", table::text(&report));
-    make_folder(&args.out)?;
+    files::prepare_folder(&args.out)?;
     let files = [
         ("converge.csv", table::csv(&report)?),
         ("converge.json", table::json(&report)?),
@@ -112,7 +112,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     ];
     for (name, text) in files {
         let path = args.out.join(name);
-        write_whole(&path, &text)?;
+        files::write(&path, text.as_bytes())?;
         println!("{}", path.display());
     }
     Ok(ExitCode::SUCCESS)

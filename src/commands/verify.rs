@@ -1,6 +1,7 @@
 //! `simpulse verify`: hard cases with known truths, against every solver.
 
 use crate::error::Error;
+use crate::files::Pending;
 use crate::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::verify::{
     self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
@@ -54,7 +55,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
         false => args.solvers.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?,
     };
     // Before the long wait, not after it.
-    let file = args.json.as_deref().map(temporary).transpose()?;
+    let file = args.json.as_deref().map(Pending::new).transpose()?;
     let bar = ProgressBar::new(0);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -281,19 +282,9 @@ fn json(matrix: &Matrix) -> Value {
     })
 }
 
-/// A temporary file beside `path`, so that it is replaced as a whole or not at all.
-fn temporary(path: &Path) -> Result<tempfile::NamedTempFile, Error> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Not only for the owner, as temporary files are by default.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-    builder.tempfile_in(folder).map_err(Error::io(path))
-}
-
-fn write(mut file: tempfile::NamedTempFile, path: &Path, value: &Value) -> Result<(), Error> {
+fn write(mut file: Pending, path: &Path, value: &Value) -> Result<(), Error> {
     writeln!(file, "{value:#}").map_err(Error::io(path))?;
-    file.persist(path).map_err(|e| Error::io(path)(e.error)).map(drop)
+    file.commit()
 }
 
 /// To standard output; a reader that has left is not an error.
@@ -348,11 +339,11 @@ mod tests {
         let path = folder.path().join("verify.json");
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
         let matrix = verify::run(cases, VARIANTS.iter().collect(), 1, Lab::new, &|_| ());
-        write(temporary(&path).unwrap(), &path, &json(&matrix)).unwrap();
+        write(Pending::new(&path).unwrap(), &path, &json(&matrix)).unwrap();
         let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
         assert_eq!(read["broken_promises"], json!([]));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(temporary(&folder.path().join("missing/verify.json")).is_err());
+        assert!(Pending::new(&folder.path().join("missing/verify.json")).is_err());
     }
 }

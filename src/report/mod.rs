@@ -3,7 +3,6 @@
 mod axes;
 pub mod environment;
 pub mod export;
-pub mod files;
 pub mod plot;
 pub mod profiles;
 pub mod reading;
@@ -11,6 +10,7 @@ pub mod table;
 pub mod units;
 
 use crate::error::Error;
+use crate::files;
 use crate::study::ablation::NeedCost;
 use crate::study::{Record, StudyPlan};
 use environment::Environment;
