@@ -7,11 +7,11 @@
 //! 2. refines what is good enough: each part is lowered by bisection towards its half;
 //! 3. races the best few again, side by side and several times, and lets that decide.
 //!
-//! Left out is what can only cost more than something known: a budget that contains, in
+//! Left out is what should only cost more than something known: a budget that contains, in
 //! every part, one of the same solver, order and stiffness that is good enough already; or one
-//! of the same solver and order that is too slow already, or slower than the fastest that is
-//! good enough. Errors need not fall when a budget grows, so a setting that is left out might
-//! be more exact; it would not be cheaper.
+//! of the same solver and order that took far longer than is allowed, or than the fastest
+//! that is good enough. Errors need not fall when a budget grows, so a setting that is left
+//! out might be more exact; it should not be cheaper.
 
 pub mod limits;
 mod search;
@@ -145,7 +145,7 @@ pub struct Advice {
     pub finalists: Vec<Trial>,
     /// Everything that was tried, in that order, with the times of the trials.
     pub trials: Vec<Trial>,
-    /// Settings left out because they can only cost more.
+    /// Settings left out because they should not be cheaper.
     pub left_out: usize,
     /// Whether the time was up before the grid was done.
     pub is_cut_short: bool,

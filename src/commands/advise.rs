@@ -22,7 +22,7 @@ use std::process::ExitCode;
 /// Find the cheapest setting within given tolerances on a scene
 ///
 /// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
-/// of doublings first, then values in between. What can only cost more than something known is
+/// of doublings first, then values in between. What should only cost more than something known is
 /// left out. The best few are raced again side by side, and the fastest of those that keep every
 /// limit is printed with all its errors, and with those that come next.
 ///
@@ -186,7 +186,7 @@ fn text(plan: &Plan, advice: &Advice) -> String {
     }
     text += &format!("\n{}", finalists(advice));
     text += &format!(
-        "\ntried {} settings; left out {} that can only cost more{}\n",
+        "\ntried {} settings; left out {} that should not be cheaper{}\n",
         advice.trials.len(),
         advice.left_out,
         if advice.is_cut_short { "; the time was up before the rest" } else { "" }
