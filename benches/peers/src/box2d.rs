@@ -39,6 +39,9 @@ impl Box2d {
             if !b2World_IsValid(world) {
                 return Err("no world left".into());
             }
+            if !contender.recycling {
+                b2World_SetContactRecycleDistance(world, 0.0);
+            }
             let mut engine =
                 Box2d { world, bodies: Vec::new(), dt: scene.dt as f32, substeps: contender.substeps as i32 };
             for body in &scene.bodies {

@@ -114,6 +114,9 @@ pub struct Contender {
     pub substeps: u32,
     /// Stiffness of contacts (Hz); 30 is the default of all three.
     pub hertz: f32,
+    /// Whether manifolds whose bodies hardly moved are kept, the default where there is such
+    /// a thing: not in simpulse.
+    pub recycling: bool,
 }
 
 impl Contender {
@@ -130,7 +133,8 @@ impl Contender {
     /// Settings in tables.
     pub fn setting(&self) -> String {
         let stiff = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
-        format!("n = {}{stiff}", self.substeps)
+        let anew = if self.recycling { "" } else { ", no recycling" };
+        format!("n = {}{stiff}{anew}", self.substeps)
     }
 
     /// The scene in this engine. Errors: what the engine cannot hold.
@@ -145,12 +149,13 @@ impl Contender {
 
 /// Who races: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps and
 /// with contacts twice as stiff at 8, the stiffest that Box2D's clamp allows there. Our other
-/// widths and broad phase run too.
+/// widths and broad phase run too, and the other engines without contact recycling.
 pub fn contenders(quick: bool) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
     let mut all = Vec::new();
     let mut add = |maker, settings: &[(u32, f32)]| {
-        all.extend(settings.iter().map(|&(substeps, hertz)| Contender { maker, substeps, hertz }));
+        let contender = |&(substeps, hertz)| Contender { maker, substeps, hertz, recycling: true };
+        all.extend(settings.iter().map(contender));
     };
     let default = [(4, 30.0)];
     let every = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0)];
@@ -162,5 +167,7 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     add(ours(LaneWidth::W8), widths);
     add(ours(LaneWidth::W4), widths);
     add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::Tree), &default);
+    let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false };
+    all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all
 }

@@ -3,8 +3,15 @@
 //!
 //! One thread, no sleeping, no continuous collision; every engine at its defaults and at other
 //! settings, its errors read from body poses by one [`check`], and its time told only if the
-//! check passed. What differs by design: Box2D and rapier keep a manifold whose bodies hardly
-//! moved (contact recycling), rapier solves the two points of a manifold together (block solver).
+//! check passed. A block of steps of one engine is followed by one of the next, and every ratio
+//! is between blocks of the same round.
+//!
+//! What differs by design: Box2D and rapier keep a manifold whose bodies hardly moved (contact
+//! recycling), and so keep points that a fresh manifold leaves out as too far apart: in piles
+//! they solve up to a third more points for the same pairs. A column of soft contacts has a
+//! height at which it buckles, and recycling is what lets Box2D's 20 boxes stand at 30 Hz.
+//! Rapier solves the two points of a manifold together (block solver), and friction, like
+//! Box2D, in the relaxing sweeps only. All three look 0.02 m ahead.
 
 mod box2d;
 mod check;

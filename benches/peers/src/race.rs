@@ -70,15 +70,19 @@ pub struct Breakdown {
 }
 
 impl Breakdown {
-    /// Mean of the faster half of a sample: what interrupted a step is no stage of it.
-    fn of(mut sample: Vec<Self>) -> Option<Self> {
-        sample.sort_by(|a, b| a.step.total_cmp(&b.step));
-        sample.truncate(sample.len().div_ceil(2));
+    /// Mean of a sample; none of an empty one.
+    fn mean(sample: &[Self]) -> Option<Self> {
         let count = sample.len() as f64;
         let mean =
             |of: &dyn Fn(&Self) -> Option<f64>| Some(sample.iter().map(of).sum::<Option<f64>>()? / count);
         let stages = std::array::from_fn(|k| mean(&|b| b.stages[k]));
         Some(Breakdown { stages, step: mean(&|b| Some(b.step)).filter(|_| count > 0.0)? })
+    }
+
+    /// Mean of the faster half of a block: what interrupted a step is no stage of it.
+    fn of_block(mut sample: Vec<Self>) -> Option<Self> {
+        sample.sort_by(|a, b| a.step.total_cmp(&b.step));
+        Self::mean(&sample[..sample.len().div_ceil(2)])
     }
 }
 
@@ -148,7 +152,7 @@ pub fn race(
             contender: runner.contender,
             counts,
             step: Quartiles::of(runner.blocks.clone()).filter(|_| timed),
-            stages: Breakdown::of(runner.clocked.clone()).filter(|_| timed),
+            stages: Breakdown::mean(&runner.clocked).filter(|_| timed),
             ratio: against(|r| r.blocks.clone()),
             stages_ratio: against(stages),
             errors,
@@ -161,7 +165,7 @@ pub fn race(
 /// Simpulse's widest lanes at the same settings, without options.
 fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
     let maker = Maker::Simpulse(LaneWidth::W16, Default::default());
-    contenders.iter().position(|c| *c == Contender { maker, ..*of })
+    contenders.iter().position(|c| *c == Contender { maker, recycling: true, ..*of })
 }
 
 impl Runner {
@@ -189,7 +193,7 @@ impl Runner {
         times.remove(0);
         if clocked {
             clocked_steps.remove(0);
-            self.clocked.extend(Breakdown::of(clocked_steps));
+            self.clocked.extend(Breakdown::of_block(clocked_steps));
         } else if round > 0 {
             // The first block begins with the step that finds all contacts.
             self.blocks.extend(Quartiles::of(times).map(|q| q.median));

@@ -22,6 +22,7 @@ impl Rapier {
         p.contact_softness.natural_frequency = contender.hertz;
         p.static_contact_softness.natural_frequency = 2.0 * contender.hertz;
         p.max_ccd_substeps = 0;
+        p.contact_recycling = contender.recycling;
         let mut groups: Vec<i32> = Vec::new();
         let mut bodies = Vec::with_capacity(scene.bodies.len());
         for body in &scene.bodies {

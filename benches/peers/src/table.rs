@@ -63,7 +63,8 @@ pub fn stages(outcomes: &[Outcome]) -> Table {
     let mut table = head(&[&["engine"], &names[..], &["rest", "step"]].concat());
     for o in outcomes.iter().filter(|o| o.contender.substeps == 4) {
         let Some(b) = &o.stages else { continue };
-        let mut row = vec![o.contender.name()];
+        let anew = if o.contender.recycling { "" } else { ", no recycling" };
+        let mut row = vec![o.contender.name() + anew];
         row.extend(b.stages.map(|ms| ms.map_or(NONE.into(), significant)));
         // The stages add up to `Stages`, which is itself among them.
         let apart = [Stage::WarmStart, Stage::Solve, Stage::Relax, Stage::Integrate];
@@ -81,7 +82,8 @@ pub fn stages(outcomes: &[Outcome]) -> Table {
 /// defaults: the mean overlap, and where things rest also the velocity that is left.
 pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     let default = |o: &&Outcome| {
-        o.contender.maker == Maker::Box2d && o.contender.substeps == 4 && o.contender.hertz == 30.0
+        let c = &o.contender;
+        c.maker == Maker::Box2d && c.substeps == 4 && c.hertz == 30.0 && c.recycling
     };
     let Some(bound) = outcomes.iter().find(default).and_then(|o| o.errors.as_ref()) else {
         return Vec::new();
@@ -115,6 +117,7 @@ pub struct Row {
     engine: String,
     substeps: u32,
     contact_hertz: f32,
+    recycling: bool,
     failed: String,
     step_ms: Option<f64>,
     step_ms_low: Option<f64>,
@@ -157,6 +160,7 @@ impl Row {
             engine: o.contender.name(),
             substeps: o.contender.substeps,
             contact_hertz: o.contender.hertz,
+            recycling: o.contender.recycling,
             failed: o.failed.clone().unwrap_or_default(),
             step_ms: o.step.map(|q| q.median),
             step_ms_low: o.step.map(|q| q.low),
