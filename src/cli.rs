@@ -1,8 +1,13 @@
 //! The command line: what can be asked for.
 
 use clap::{Args, Parser, Subcommand};
+use simpulse::commands::advise::AdviseArgs;
+use simpulse::commands::capture::CaptureArgs;
+use simpulse::commands::converge::ConvergeArgs;
+use simpulse::commands::verify::VerifyArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
+use simpulse::params::CONTACT_HERTZ;
 use simpulse::solvers::{VARIANTS, Variant, find};
 use simpulse::study::StudyPlan;
 use simpulse::study::budget::BudgetGrid;
@@ -12,32 +17,54 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   simpulse                                       the default study, into results/
-  simpulse study --quick                         a look at everything, in seconds
+  simpulse --quick                               a look at everything, in seconds
   simpulse study --scenes stack:40,arch --solvers soft_step,pgs --lanes 1,8 --substeps 2,4,8
   simpulse run pyramid:50 --solver soft_step --lanes 16
   simpulse scene arch --json > my.json           a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
 
+const STUDY_EXAMPLES: &str = "\
+Without any budget option, each solver runs at half its standard budget, at that budget,
+and at its double. With some, every combination runs; what a solver ignores is left out.
+
+Examples:
+  simpulse study --quick
+  simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
+  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
+
 /// A laboratory for 2D contact solvers: how fast are they, and how wrong?
 ///
 /// Without a command, runs the default study: every solver on scenes whose truth is known
 /// or that are hard, at lane widths 1, 4, 8 and 16 and three budgets each. It prints a table
-/// per scene and writes study.csv, study.json and speed_vs_error.svg.
+/// per scene and writes study.csv, study.json, speed_vs_error.svg and
+/// profiles.svg.
 #[derive(Parser, Debug)]
-#[command(version, after_help = EXAMPLES, max_term_width = 100)]
+#[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to do; a study where none is given.
     #[command(subcommand)]
     pub command: Option<Command>,
+    /// Choices for the study that runs without a command.
+    #[command(flatten)]
+    pub study: StudyArgs,
 }
 
 /// What to do.
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
+    #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
+    /// Find the cheapest setting within given tolerances on a scene
+    Advise(AdviseArgs),
+    /// Freeze the contact problem of one step in a file
+    Capture(CaptureArgs),
+    /// Count the iterations every solver needs on one frozen problem
+    Converge(ConvergeArgs),
+    /// Run the hard cases whose truth is known
+    Verify(VerifyArgs),
     /// List the scenes
     Scenes,
     /// List the solvers
@@ -48,14 +75,6 @@ pub enum Command {
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Without any budget option, each solver runs at half its standard budget, at that budget,
-and at its double. With some, every combination runs; what a solver ignores is left out.
-
-Examples:
-  simpulse study --quick
-  simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
-  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack")]
 pub struct StudyArgs {
     /// Scenes (`simpulse scenes` lists them), with a size after a colon, or .json files
     #[arg(long, value_delimiter = ',', value_name = "SCENE,…")]
@@ -81,6 +100,10 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
@@ -132,6 +155,10 @@ pub struct RunArgs {
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
+    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
+    /// substep rate acts
+    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
+    pub contact_hertz: f32,
     /// Step in seconds [default: that of the scene]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
@@ -181,6 +208,7 @@ impl StudyArgs {
                 relax_iterations: self.relax_iterations.clone(),
                 position_iterations: self.position_iterations.clone(),
             },
+            contact_hertz: self.contact_hertz,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),

@@ -48,13 +48,18 @@
 //! # Ok::<(), simpulse::error::Error>(())
 //! ```
 
+pub mod advise;
 pub mod bodies;
 pub mod broadphase;
+pub mod capture;
 pub mod clock;
 pub mod coloring;
+pub mod commands;
 pub mod constraints;
 pub mod contacts;
+pub mod converge;
 pub mod error;
+pub mod files;
 pub mod lanes;
 pub mod metrics;
 pub mod narrowphase;
@@ -65,4 +70,5 @@ pub mod shapes;
 pub mod solvers;
 pub mod study;
 pub mod truth;
+pub mod verify;
 pub mod world;

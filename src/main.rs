@@ -8,8 +8,10 @@ mod run;
 use clap::Parser;
 use cli::{Cli, Command, SceneArgs, StudyArgs};
 use indicatif::{ProgressBar, ProgressStyle};
+use simpulse::commands;
 use simpulse::error::Error;
-use simpulse::report::{self, files};
+use simpulse::files;
+use simpulse::report;
 use simpulse::scenes::CATALOG;
 use simpulse::solvers::VARIANTS;
 use simpulse::study::{self, Progress, ablation, budget, open_scene};
@@ -41,13 +43,7 @@ fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => {
-            let default = Cli::parse_from(["simpulse", "study"]);
-            match default.command {
-                Some(Command::Study(args)) => study(&args),
-                _ => Ok(ExitCode::SUCCESS),
-            }
-        }
+        None => study(&cli.study),
         Some(Command::Study(args)) => study(&args),
         Some(Command::Run(args)) => match run::run(&args)? {
             run::Ending::Finished(text) => print(&text),
@@ -56,6 +52,10 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
                 Ok(ExitCode::FAILURE)
             }
         },
+        Some(Command::Advise(args)) => commands::advise::run(&args),
+        Some(Command::Capture(args)) => commands::capture::run(&args),
+        Some(Command::Converge(args)) => commands::converge::run(&args),
+        Some(Command::Verify(args)) => commands::verify::run(&args),
         Some(Command::Scenes) => print(&scenes()),
         Some(Command::Solvers) => print(&solvers()),
         Some(Command::Scene(args)) => print(&scene(&args)?),
@@ -96,7 +96,7 @@ fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
     print(&text)
 }
 
-/// A bar that says what has just run.
+/// A bar that says what runs.
 fn with_bar<T>(work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
     let bar = ProgressBar::new(1);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");

@@ -3,10 +3,10 @@
 use crate::cli::{RunArgs, order, width};
 use simpulse::clock::{Phase, Timings};
 use simpulse::error::Error;
+use simpulse::files::Pending;
 use simpulse::lanes::LaneWidth;
 use simpulse::metrics::Observation;
 use simpulse::params::Budget;
-use simpulse::report::files::Pending;
 use simpulse::report::table::error_list;
 use simpulse::report::units::{digits, si};
 use simpulse::solvers::find;
@@ -55,6 +55,9 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         }
         times.add(&world.timings);
         observation.observe(&world);
+        if let Some(blow_up) = observation.blown_up() {
+            return Ok(Ending::Diverged(blow_up.into()));
+        }
         if let Some(truth) = &mut loaded.truth {
             truth.observer.observe(&world);
         }
@@ -98,10 +101,12 @@ fn settings(args: &RunArgs) -> Result<Settings, Error> {
         position_iterations: args.position_iterations.unwrap_or(own.position_iterations),
     };
     budget::check(&chosen, solver)?;
+    budget::check_hertz(args.contact_hertz)?;
     Ok(Settings {
         width: lanes,
         order,
         budget: chosen,
+        contact_hertz: args.contact_hertz,
         record_impulses: true,
         timed: true,
         ..Settings::new(solver)
@@ -230,7 +235,7 @@ fn write_state(sheet: &mut Sheet, world: &World, dt: f64) -> Result<(), Error> {
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
         let omega = world.bodies.angular_velocity[i];
-        let pose = (origin.x, origin.y, world.bodies.angle(i));
+        let pose = (origin[0], origin[1], world.bodies.angle(i));
         sheet.row((world.step_index, time, i, pose, velocity.x, velocity.y, omega))?;
     }
     Ok(())

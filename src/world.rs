@@ -9,6 +9,7 @@ use crate::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::coloring::{Coloring, EXEMPT};
 use crate::constraints::motion::{self, Integrator, MotionInput, RotationUpdate};
+use crate::constraints::observe::ObservedRule;
 use crate::constraints::restitution::Bounces;
 use crate::constraints::{Layout, Needs, OppositeKind, StepInput, Workspace};
 use crate::contacts::Contact;
@@ -48,6 +49,8 @@ pub struct Settings {
     pub contact_hertz: f32,
     /// Sum impulses over the substeps into [`Contact::step_impulse`].
     pub record_impulses: bool,
+    /// Keep the rule of each step's last velocity sweep, see [`World::observed_rule`].
+    pub observe_rule: bool,
     /// Read the clock around every phase.
     pub timed: bool,
     /// How candidate pairs are found.
@@ -72,6 +75,7 @@ impl Settings {
             dt: 1.0 / 60.0,
             contact_hertz: CONTACT_HERTZ,
             record_impulses: false,
+            observe_rule: false,
             timed: false,
             broadphase: BroadPhaseKind::HashGrid,
             integrator: Integrator::default(),
@@ -124,7 +128,12 @@ pub struct Divergence {
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} has speed {} m/s", self.step, self.body, self.speed)
+        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
+        if self.speed.is_finite() {
+            write!(f, "moves at {:.3e} m/s", self.speed)
+        } else {
+            write!(f, "has no finite speed")
+        }
     }
 }
 
@@ -208,6 +217,9 @@ impl World {
         let mass = combine(&parts);
         let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
         let index = self.bodies.push(body, &mass);
+        self.bodies.round[index] = body.shapes.iter().all(|part| {
+            matches!(part.shape.translated(-center), Shape::Circle { center, .. } if center == Vec2::ZERO)
+        });
         for part in &body.shapes {
             let shape = part.shape.translated(-center);
             let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
@@ -233,17 +245,10 @@ impl World {
         let count = bodies.len();
         let mut rubs = vec![false; count];
         let mut has_corner = vec![false; count];
-        let mut is_disc = vec![true; count];
         for (i, shape) in self.shapes.iter().enumerate() {
             let body = self.shape_body[i] as usize;
             rubs[body] |= self.surfaces[i].friction > 0.0;
-            match shape {
-                Shape::Circle { center, .. } => is_disc[body] &= *center == Vec2::ZERO,
-                _ => {
-                    has_corner[body] = true;
-                    is_disc[body] = false;
-                }
-            }
+            has_corner[body] |= !matches!(shape, Shape::Circle { .. });
         }
         // A pair has the property if both bodies have it and one of them is dynamic.
         let pair_of = |has: &[bool]| {
@@ -251,7 +256,7 @@ impl World {
         };
         let friction = pair_of(&rubs);
         let spins = (0..count).any(|i| bodies.angular_velocity[i] != 0.0 || bodies.torque[i] != 0.0);
-        let discs = (0..count).all(|i| !bodies.is_dynamic(i) || is_disc[i]);
+        let discs = (0..count).all(|i| !bodies.is_dynamic(i) || bodies.round[i]);
         Needs {
             rotation: friction || spins || !discs,
             friction,
@@ -265,6 +270,7 @@ impl World {
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
+        self.work.motion.finish(&mut self.work.rows);
         motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
         clock.lap(Phase::Store);
         self.step_index += 1;
@@ -279,6 +285,19 @@ impl World {
         self.pairs_are_stale = true;
         self.solve(&mut clock);
         self.timings = clock.stop();
+    }
+
+    /// Finds the contacts of the coming step, with the impulses that it would start from, and
+    /// solves nothing. The step finds the same contacts again.
+    pub fn find_contacts(&mut self) {
+        self.update_pairs();
+        self.update_contacts();
+    }
+
+    /// The rule of the last step's last velocity sweep: none without one, or without
+    /// `Settings::observe_rule`.
+    pub fn observed_rule(&self) -> Option<&ObservedRule> {
+        self.work.last_rule.as_ref()
     }
 
     /// The constraint records and body rows of the last step, for benches of single kernels.
@@ -312,6 +331,7 @@ impl World {
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
         };
+        (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
         (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
     }
@@ -369,8 +389,8 @@ impl World {
         let mut points = 0;
         for candidate in &self.candidates {
             let (a, b) = (candidate.shape_a as usize, candidate.shape_b as usize);
-            let pose_a = self.bodies.pose(candidate.body_a as usize);
-            let pose_b = self.bodies.pose(candidate.body_b as usize);
+            let [pose_a, pose_b] =
+                self.bodies.relative_poses(candidate.body_a as usize, candidate.body_b as usize);
             let mut manifold =
                 collide(&self.shapes[a], &pose_a, &self.shapes[b], &pose_b, SPECULATIVE_DISTANCE);
             if manifold.count == 0 {
@@ -479,6 +499,8 @@ impl World {
         let arrays = [
             &b.position_x,
             &b.position_y,
+            &b.position_x_rest,
+            &b.position_y_rest,
             &b.rotation_cos,
             &b.rotation_sin,
             &b.velocity_x,

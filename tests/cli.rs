@@ -55,6 +55,9 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
+        (&["run", "stack:2", "--contact-hertz", "-3"], &["contact_hertz", "-3"]),
+        (&["study", "--contact-hertz", "nan"], &["contact_hertz", "NaN"]),
+        (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
         (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
         (
@@ -154,7 +157,7 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
 }
 
 #[test]
-fn a_small_study_leaves_three_whole_files() {
+fn a_small_study_leaves_whole_files() {
     let folder = tempfile::tempdir().unwrap();
     let args = [
         "study",
@@ -172,7 +175,7 @@ fn a_small_study_leaves_three_whole_files() {
     let output = simpulse(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let out = folder.path().join("a/b");
-    assert_eq!(entries(&out), ["speed_vs_error.svg", "study.csv", "study.json"]);
+    assert_eq!(entries(&out), ["profiles.svg", "speed_vs_error.svg", "study.csv", "study.json"]);
 
     let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();
     let header = reader.headers().unwrap().clone();

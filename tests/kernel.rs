@@ -155,8 +155,8 @@ fn by_the_book(setup: &Setup, order: &[u32]) -> (Vec<Body>, Vec<[[f64; 2]; 2]>) 
     };
     for &i in order {
         let c = &setup.contacts[i as usize];
-        for p in 0..c.manifold.count as usize {
-            for (axis, impulse) in axes(c).into_iter().zip(impulses[i as usize][p]) {
+        for (p, point) in impulses[i as usize].iter().enumerate().take(c.manifold.count as usize) {
+            for (axis, &impulse) in axes(c).into_iter().zip(point) {
                 push(&mut bodies, c, p, axis, impulse);
             }
         }
@@ -164,9 +164,10 @@ fn by_the_book(setup: &Setup, order: &[u32]) -> (Vec<Body>, Vec<[[f64; 2]; 2]>) 
     for _ in 0..3 {
         for &i in order {
             let c = &setup.contacts[i as usize];
-            for row in 0..2 {
-                for p in 0..c.manifold.count as usize {
-                    let (axis, q) = (axes(c)[row], &c.manifold.points[p]);
+            let points = c.manifold.count as usize;
+            for (row, axis) in axes(c).into_iter().enumerate() {
+                for (p, impulse) in impulses[i as usize].iter_mut().enumerate().take(points) {
+                    let q = &c.manifold.points[p];
                     let (a, b) = (&bodies[c.body_a as usize], &bodies[c.body_b as usize]);
                     let arm = |r: Vec2| r.as_dvec2().perp_dot(axis);
                     let (arm_a, arm_b) = (arm(q.anchor_a), arm(q.anchor_b));
@@ -175,7 +176,7 @@ fn by_the_book(setup: &Setup, order: &[u32]) -> (Vec<Body>, Vec<[[f64; 2]; 2]>) 
                         + b.inv_mass
                         + a.inv_inertia * arm_a * arm_a
                         + b.inv_inertia * arm_b * arm_b;
-                    let [normal, tangent] = &mut impulses[i as usize][p];
+                    let [normal, tangent] = impulse;
                     let delta = if row == 0 {
                         let bias = (q.separation as f64).max(0.0) * INV_H as f64;
                         let new = (*normal - (jv + bias) / k).max(0.0);
@@ -234,9 +235,7 @@ proptest! {
     fn padding_is_inert(setup in setup()) {
         let (rows, _, batches) = in_lanes::<wide::f32x16>(&setup);
         prop_assert_eq!(rows[BODIES], BodyRow::default());
-        for body in 0..STATIC as usize {
-            prop_assert_eq!(rows[body], BodyRow::default());
-        }
+        prop_assert_eq!(&rows[..STATIC as usize], &[BodyRow::default(); STATIC as usize]);
         let floats: &[f32] = bytemuck::cast_slice(&batches.slab);
         for segment in &batches.segments {
             let layout = Layout::for_needs(&Needs::FULL, segment.opposite);

@@ -7,7 +7,8 @@ use simpulse::solvers::{VARIANTS, find};
 use simpulse::world::{Settings, World};
 
 fn build(scene: &Scene, solver: &str) -> World {
-    let settings = Settings { record_impulses: true, ..Settings::new(find(solver).unwrap()) };
+    let settings =
+        Settings { record_impulses: true, observe_rule: true, ..Settings::new(find(solver).unwrap()) };
     scene.build(settings).unwrap()
 }
 
@@ -146,5 +147,96 @@ fn errors_do_not_depend_on_the_lane_width() {
     assert!(one.penetration_max > 0.0 && one.law_rms > 0.0);
     for width in LaneWidth::ALL {
         assert_eq!(of(width), one, "{width:?}");
+    }
+}
+
+#[test]
+fn a_soft_contact_rests_at_its_analytic_floor() {
+    let scene = scenes::load("stack:1").unwrap().scene;
+    let errors = observe(&mut build(&scene, "soft_step"), 180);
+    // 1 kg and 1/6 kg·m² on two corners 0.5 m off the middle: m = 1/(1 + 6/4) kg, 5 N each,
+    // ω = 2 · 2π · 30 Hz against the ground.
+    let omega = 120.0 * std::f64::consts::PI;
+    let floor = 5.0 / (0.4 * omega * omega);
+    // The last bits of a height of 0.5 m are 3e-8 m, and a soft box hardly moves: 1 µm.
+    assert!((errors.soft_floor.unwrap() - floor).abs() < 0.01 * floor, "{errors:?}");
+    assert!((errors.penetration_max - floor).abs() < 1e-6, "{errors:?}");
+    assert!(errors.penetration_excess.unwrap() < 1e-6, "{errors:?}");
+    assert_eq!(observe(&mut build(&scene, "pgs"), 3).penetration_excess, None);
+}
+
+#[test]
+fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
+    let scene = json(
+        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[5,1]}}]},
+           {"type":"dynamic","position":[0,0.4],"shapes":[{"circle":{"radius":0.5}}]}"#,
+        -10.0,
+    );
+    let errors = observe(&mut build(&scene, "pgs"), 1);
+    // The bias wants 0.3 · (0.1 − 0.005) m · 60/s = 1.71 m/s, and the disc gets it. The rigid
+    // law wants it to stand: in m · 10 m/s² / 60, weight × step, 10.26 are too many.
+    assert!((errors.law_normal_max - 10.26).abs() < 0.01, "{errors:?}");
+    // One row that is solved exactly: rounding.
+    assert!(errors.own_max.unwrap() < 1e-5, "{errors:?}");
+
+    // Warm starts in one sweep leave a stack unsolved.
+    let mut world = build(&scenes::load("stack:10").unwrap().scene, "pgs");
+    world.settings.budget.velocity_iterations = 1;
+    assert!(observe(&mut world, 5).own_rms.unwrap() > 1e-3);
+    // Not asked for, and after bounces: none.
+    world.settings.observe_rule = false;
+    assert_eq!(observe(&mut world, 5).own_rms, None);
+    assert_eq!(observe(&mut build(&scenes::load("bounce").unwrap().scene, "pgs"), 90).own_rms, None);
+}
+
+#[test]
+fn friction_takes_the_energy_of_a_slide() {
+    // 1 kg at 1 m/s, µ = 0.5: stops after 0.2 s. Scale: ½ J + 10 N · √(1/6) m.
+    let scene = json(
+        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[9,1]},"friction":0.5}]},
+           {"type":"dynamic","position":[0,0.5],"velocity":[1,0],
+            "shapes":[{"box":{"half":[0.5,0.5]},"friction":0.5}]}"#,
+        -10.0,
+    );
+    let mut world = build(&scene, "pgs");
+    world.settings.budget.velocity_iterations = 100;
+    let errors = observe(&mut world, 120);
+    let scale = 0.5 + 10.0 / 6.0_f64.sqrt();
+    // The box tips by what 100 sweeps leave: per mille of its energy.
+    assert!((errors.friction_loss - 0.5 / scale).abs() < 1e-3, "{errors:?}");
+    assert!((errors.energy_change + 0.5 / scale).abs() < 1e-3, "{errors:?}");
+    assert!(errors.impact_loss.abs() < 1e-3 && errors.energy_unexplained < 1e-5, "{errors:?}");
+    // It stopped for good after 0.2 s, to a step or two.
+    assert!((errors.settled.unwrap() - 0.2).abs() < 0.04, "{errors:?}");
+    assert!(errors.creep < 1e-4, "{errors:?}");
+}
+
+#[test]
+fn a_box_without_friction_creeps_down_a_slope() {
+    let mut world = build(&scenes::load("incline_slip").unwrap().scene, "projection");
+    let errors = observe(&mut world, 60);
+    // x_n = a h² n (n + 1)/2 with a = g sin 0.25 rad; a fit to n² + n over n = 1 … 60 has the
+    // slope 2 · 30.5 + 1, so x has a h/2 · 62. Rounding of positions below 1.3 m.
+    let expected = 10.0 * 0.25_f64.sin() * 31.0 / 60.0;
+    assert!((errors.creep - expected).abs() < 1e-5, "{expected} {errors:?}");
+    // A parabola is no line: its slope is uncertain.
+    assert!(errors.creep_half_width > 0.01, "{errors:?}");
+    assert_eq!(errors.settled, None);
+}
+
+#[test]
+fn speed_from_nowhere_is_a_blow_up() {
+    let mut world = build(&scenes::load("stack:3").unwrap().scene, "pgs");
+    let mut observation = Observation::new(&world);
+    for step in 1..=10 {
+        if step == 5 {
+            world.bodies.velocity_y[2] = 200.0;
+        }
+        world.step().unwrap();
+        observation.observe(&world);
+        let seen = observation.blown_up().map(|d| (d.step, d.body));
+        // It throws the box above it, and one of the two is the fastest.
+        assert_eq!(seen.is_some(), step >= 5, "{seen:?}");
+        assert!(seen.is_none_or(|(at, body)| at == 5 && body >= 2), "{seen:?}");
     }
 }

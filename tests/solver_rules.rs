@@ -111,23 +111,55 @@ fn a_falling_disc_stops_at_the_ground() {
     }
 }
 
-/// e = 0.5 from a fall of 2 m: the ball leaves with half of what it came with.
+/// A ball returns to e² of its height, whatever the step and the substeps: the rebound keeps the
+/// energy that semi-implicit Euler keeps in flight. The highest of the sampled positions is
+/// within g h²/8 of the apex of the discrete orbit, 0.35 mm at 1/60 s.
 #[test]
-fn a_bounce_returns_its_share_of_the_speed() {
+fn a_ball_returns_to_e_squared_of_its_height() {
     for variant in &VARIANTS {
-        let text = format!(
-            r#"{{"name":"bounce","bodies":[{GROUND},{{"type":"dynamic","position":[0,2.5],
-            "shapes":[{{"circle":{{"radius":0.5}},"restitution":0.5}}]}}]}}"#
-        );
-        let mut world = build(&text, variant.name);
-        let mut fastest = (0.0_f32, 0.0_f32);
-        for _ in 0..60 {
-            world.step().unwrap();
-            fastest.0 = fastest.0.min(world.bodies.velocity_y[1]);
-            fastest.1 = fastest.1.max(world.bodies.velocity_y[1]);
+        for (e, steps_per_second) in [(0.5, 60.0), (0.8, 60.0), (1.0, 60.0), (1.0, 97.0)] {
+            let dt = 1.0 / steps_per_second;
+            let text = format!(
+                r#"{{"name":"bounce","dt":{dt},"bodies":[{GROUND},{{"type":"dynamic","position":[0,2.5],
+                "shapes":[{{"circle":{{"radius":0.5}},"restitution":{e}}}]}}]}}"#
+            );
+            let mut world = build(&text, variant.name);
+            let (mut rising, mut apex) = (false, 0.0_f64);
+            for _ in 0..(1.9 * steps_per_second) as usize {
+                world.step().unwrap();
+                rising |= world.bodies.velocity_y[1] > 0.0;
+                if rising {
+                    apex = apex.max(world.bodies.position_y[1] as f64);
+                }
+            }
+            let truth = 0.5 + 2.0 * e * e;
+            assert!((apex - truth).abs() < 4e-4, "{} e {e} dt {dt}: {apex} for {truth}", variant.name);
         }
-        // The approach is read at the start of the step that touches: up to one step of
-        // gravity, 1/6 m/s, may be missing.
-        assert!((fastest.1 + 0.5 * fastest.0).abs() < 0.09, "{}: {fastest:?}", variant.name);
     }
+}
+
+/// The contact point of a disc stays below its centre however fast it rolls: a disc at 20 rad/s
+/// rolls as deep as it rests. (An anchor that turned with the disc, as a corner's does, would rise by
+/// r (1 − cos ω h) within a step, 12 mm here in the last of four substeps, and the disc would follow.)
+#[test]
+fn a_rolling_disc_rolls_as_deep_as_it_rests() {
+    let text = format!(
+        r#"{{"name":"roll","bodies":[{GROUND},{{"type":"dynamic","position":[-20,0.5],"velocity":[10,0],
+        "angular_velocity":-20,"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "soft_step");
+    let omega = 2.0 * std::f64::consts::PI * 60.0;
+    let rest = 0.5 - 10.0 / (omega * omega);
+    for step in 0..180 {
+        world.step().unwrap();
+        if step >= 60 {
+            let depth = (world.bodies.position_y[1] as f64 - rest).abs();
+            assert!(depth < 2e-6, "step {step}: {depth}");
+        }
+    }
+    assert!((world.bodies.velocity_x[1] - 10.0).abs() < 1e-3);
+    // Its pose has turned all the same, by 20 rad/s over 3 s.
+    let angle = world.bodies.angle(1) as f64;
+    let truth = (-60.0_f64).rem_euclid(std::f64::consts::TAU);
+    assert!((angle.rem_euclid(std::f64::consts::TAU) - truth).abs() < 1e-2, "{angle} for {truth}");
 }

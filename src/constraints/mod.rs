@@ -8,6 +8,7 @@
 pub mod batches;
 pub mod motion;
 pub mod needs;
+pub mod observe;
 pub mod prepare;
 pub mod problem;
 pub mod restitution;

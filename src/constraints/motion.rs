@@ -13,6 +13,7 @@
 use super::needs::Needs;
 use crate::bodies::{Bodies, BodyKind};
 use crate::lanes::BodyRow;
+use glam::Vec2;
 use wide::{f32x4, f32x8};
 
 /// How velocities and positions follow each other.
@@ -59,6 +60,8 @@ pub struct Motion {
     damp: Vec<[f32; 4]>,
     /// Velocity before constraints acted in this substep.
     free: Vec<[f32; 4]>,
+    /// Round bodies, and how far each has turned in this step (rad).
+    round: Vec<(u32, f32)>,
     /// Substep (s).
     h: f32,
     integrator: Integrator,
@@ -75,7 +78,11 @@ impl Motion {
         rows.clear();
         self.kick.clear();
         self.damp.clear();
+        self.round.clear();
         for i in 0..count {
+            if bodies.round[i] && bodies.kind[i] != BodyKind::Static {
+                self.round.push((i as u32, 0.0));
+            }
             let inv_mass = bodies.inv_mass[i];
             // Where nothing can turn a body, it is to be seen that nothing does.
             let inv_inertia = if needs.rotation { bodies.inv_inertia[i] } else { 0.0 };
@@ -107,6 +114,11 @@ impl Motion {
             self.damp.push([1.0; 4]);
         }
         self.free.resize(count + 1, [0.0; 4]);
+    }
+
+    /// Changes of velocity in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.
+    pub fn kicks(&self) -> &[[f32; 4]] {
+        &self.kick
     }
 
     /// v ← v/(1 + h c) + h a, for every row.
@@ -147,36 +159,50 @@ impl Motion {
         }
     }
 
-    fn explicit_positions(&self, rows: &mut [BodyRow]) {
+    fn explicit_positions(&mut self, rows: &mut [BodyRow]) {
         if self.integrator == Integrator::ExplicitEuler {
             self.advance(rows);
         }
     }
 
     /// Δx ← Δx + h v and Δθ ← Δθ + h ω, for every row.
-    pub fn integrate_positions(&self, rows: &mut [BodyRow]) {
+    pub fn integrate_positions(&mut self, rows: &mut [BodyRow]) {
         if self.integrator == Integrator::SemiImplicitEuler {
             self.advance(rows);
         }
     }
 
-    fn advance(&self, rows: &mut [BodyRow]) {
+    fn advance(&mut self, rows: &mut [BodyRow]) {
         let h = f32x4::from([self.h, self.h, self.h, 0.0]);
         match self.rotation {
             RotationUpdate::Exact => {
-                for row in rows {
+                for row in rows.iter_mut() {
                     let delta = f32x4::from(row.velocity).mul_add(h, f32x4::from(row.delta));
                     row.delta = delta.to_array();
                 }
             }
             RotationUpdate::Normalized => {
-                for row in rows {
+                for row in rows.iter_mut() {
                     let turn = row.delta[2] + (self.h * row.velocity[2]).atan();
                     let delta = f32x4::from(row.velocity).mul_add(h, f32x4::from(row.delta));
                     row.delta = delta.to_array();
                     row.delta[2] = turn;
                 }
             }
+        }
+        // A contact's anchor turns with its body, as a corner does. The contact point of a disc
+        // does not: it stays on the line of centres however the disc rolls. So sweeps are
+        // not shown the turn of a round body; it is kept here for its pose. Without this a disc
+        // that rolls at 7 rad/s and 60 Hz seems to lift off by 3 mm in the course of a step.
+        for (body, turned) in &mut self.round {
+            *turned += std::mem::take(&mut rows[*body as usize].delta[2]);
+        }
+    }
+
+    /// Puts the turns of round bodies back into their rows, at the end of a step.
+    pub fn finish(&self, rows: &mut [BodyRow]) {
+        for &(body, turned) in &self.round {
+            rows[body as usize].delta[2] += turned;
         }
     }
 }
@@ -194,8 +220,7 @@ pub fn store(bodies: &mut Bodies, rows: &[BodyRow], rotation: bool) {
         bodies.velocity_x[i] = row.velocity[0];
         bodies.velocity_y[i] = row.velocity[1];
         bodies.angular_velocity[i] = row.velocity[2];
-        bodies.position_x[i] += row.delta[0];
-        bodies.position_y[i] += row.delta[1];
+        bodies.advance(i, Vec2::new(row.delta[0], row.delta[1]));
     }
     if !rotation {
         return;

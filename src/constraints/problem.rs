@@ -3,6 +3,7 @@
 use super::batches::Batches;
 use super::motion::Motion;
 use super::needs::{KernelNeeds, Needs};
+use super::observe::ObservedRule;
 use super::prepare;
 use super::restitution::{self, Bounces};
 use super::sweep::{self, NormalRule};
@@ -27,6 +28,10 @@ pub struct Workspace {
     pub lane_bounces: Bounces,
     /// Bounces of `serial`.
     pub serial_bounces: Bounces,
+    /// Keep the rule of the last velocity sweep in `last_rule`.
+    pub observe: bool,
+    /// See `observe`.
+    pub last_rule: Option<ObservedRule>,
 }
 
 /// One step's problem at one width and with one set of needs.
@@ -89,12 +94,13 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             assert!(batches.width == width || batches.segments.is_empty());
             assert!(batches.row_a.iter().chain(&batches.row_b).all(|&row| row < rows));
         }
-        let Workspace { rows, lanes, serial, lane_bounces, serial_bounces, .. } = work;
+        let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = work;
         prepare::prepare::<L, N>(rows, lanes, contacts);
         prepare::prepare::<f32, N>(rows, serial, contacts);
         if input.needs.restitution {
-            restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts);
-            restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts);
+            let (kicks, h) = (motion.kicks(), input.h);
+            restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts, kicks, h);
+            restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts, kicks, h);
         }
         clock.lap(Phase::Prepare);
         let contacts_points = contacts.iter().map(|c| c.manifold.count as usize).sum();
@@ -175,6 +181,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         sweep::sweep::<L, N, _>(&mut self.work.rows, &mut self.work.lanes, rule);
         sweep::sweep::<f32, N, _>(&mut self.work.rows, &mut self.work.serial, rule);
         self.count_sweep(if N::FRICTION && R::FRICTION { 2 } else { 1 });
+        if self.work.observe {
+            self.work.last_rule = Some(ObservedRule::of(rule, &self.work.rows));
+        }
         self.clock.lap(phase);
     }
 
@@ -198,8 +207,8 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             restitution::track::<L, N>(rows, lanes, lane_bounces);
             restitution::track::<f32, N>(rows, serial, serial_bounces);
             if substep + 1 == self.budget.substeps {
-                restitution::apply::<L, N>(rows, lanes, lane_bounces);
-                restitution::apply::<f32, N>(rows, serial, serial_bounces);
+                restitution::apply::<L, N>(rows, lanes, lane_bounces, self.h);
+                restitution::apply::<f32, N>(rows, serial, serial_bounces, self.h);
                 self.count_sweep(1);
             }
             self.clock.lap(Phase::Restitution);

@@ -1,22 +1,42 @@
 //! Bouncing: one pass at the end of a step, and its own side records.
 //!
-//! Newton's law wants v_n⁺ = −e v_n⁻ for a point that came in faster than the
-//! threshold. The approach speed v_n⁻ is read when the step begins; at its end, when
-//! the sweeps have stopped the approach, every point that pushed at all is given the
-//! impulse λ = −m_eff (v_n + e v_n⁻), clamped on the accumulated impulse.
+//! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the
+//! speed is known at its start, some way s₀ above (or below) the surface, and the bounce is
+//! applied at its end, at a separation s. In between, the relative normal acceleration a of
+//! free flight changes the speed. Semi-implicit Euler of substep h keeps, in flight, not
+//! v²/2 + a s but the shadow energy
 //!
-//! Scenes in which nothing bounces have neither the pass nor the side records.
-//! Source: `catto2024solver2d` for the placement after the sweeps.
+//! ```text
+//! E = v²/2 + a (s − v h/2)          (v' = v − a h, s' = s + h v'  ⇒  E' = E)
+//! ```
+//!
+//! so with E₀ from the start of the step, the rebound v > 0 that has e² E₀ at separation s is
+//!
+//! ```text
+//! v = a h/2 + √((a h/2)² + 2 (e² E₀ − a s))
+//! ```
+//!
+//! which is e |v₀| without acceleration. A ball that falls on the ground then returns to e² of
+//! its height whatever the step. Between two bodies that fall together a is zero, also where one
+//! of them is held up from below: what others do to them is not seen.
+//!
+//! Every point that came in faster than the threshold and pushed at all is given the impulse
+//! λ = −m_eff (v_n − v), clamped on the accumulated impulse. Scenes in which nothing bounces have
+//! neither the pass nor the side records.
+//!
+//! Source: `catto2024solver2d` for the placement after the sweeps and for the threshold; the
+//! rebound speed is *derived* here.
 
 use super::batches::{Batches, PADDING, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::sweep::over_segments;
+use super::sweep::{arms, over_segments, turn, with_arms};
 use crate::contacts::Contact;
 use crate::lanes::{Block, BodyRow, Lanes};
 use crate::params::RESTITUTION_THRESHOLD;
+use glam::Vec2;
 
-/// Side records: per batch, restitution e, then per point the approach velocity v_n⁻
-/// (m/s) and the largest normal impulse so far (N·s).
+/// Side records: per batch, the acceleration a of approach (m/s²), then per point the energy e² E₀
+/// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
 #[derive(Debug, Default)]
 pub struct Bounces {
     slab: Vec<Block>,
@@ -37,17 +57,20 @@ impl Bounces {
     }
 }
 
-/// Reads the approach velocities before anything moves.
+/// Reads energies before anything moves. `kicks` are the changes of velocity in free flight per
+/// substep `h` (s), a row per body.
 #[inline(never)]
 pub fn prepare<L: Lanes, N: KernelNeeds>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     bounces: &mut Bounces,
     contacts: &[Contact],
+    kicks: &[[f32; 4]],
+    h: f32,
 ) {
     let floats = batches.contact.len() * stride::<N>();
     bounces.slab.resize(floats.div_ceil(16), Block::default());
-    over_segments!(prepare_segment, L, N; rows, batches, bounces, contacts);
+    over_segments!(prepare_segment, L, N; rows, batches, bounces, contacts, kicks, h);
 }
 
 fn prepare_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
@@ -56,31 +79,44 @@ fn prepare_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
     segment: &Segment,
     bounces: &mut Bounces,
     contacts: &[Contact],
+    kicks: &[[f32; 4]],
+    h: f32,
 ) {
     let first = segment.first_lane / L::WIDTH;
     for batch in 0..segment.batches {
-        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
         let record = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
         let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
-        for (lane, &contact) in batches.contact[lanes].iter().enumerate() {
-            floats[lane] = if contact == PADDING { 0.0 } else { contacts[contact as usize].restitution };
+        for lane in 0..L::WIDTH {
+            let at = segment.first_lane + batch * L::WIDTH + lane;
+            let contact = batches.contact[at];
+            // Lanes without a contact have e = 0 and so no energy.
+            let (e, n) = match contact {
+                PADDING => (0.0, Vec2::ZERO),
+                _ => (contacts[contact as usize].restitution, contacts[contact as usize].manifold.normal),
+            };
+            let kick = |row: u32| Vec2::new(kicks[row as usize][0], kicks[row as usize][1]);
+            floats[lane] = -n.dot(kick(batches.row_b[at]) - kick(batches.row_a[at])) / h;
+            floats[L::WIDTH + lane] = e;
         }
-        let vn = normal_velocities::<L, N, O>(rows, batches, segment, batch);
-        for p in 0..N::POINTS {
-            record[1 + 2 * p] = vn[p];
+        let points = points::<L, N, O>(rows, batches, segment, batch);
+        let (a, e) = (record[0], record[1]);
+        for (p, [v, s]) in points.into_iter().enumerate().take(N::POINTS) {
+            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+            let fast = (L::splat(-RESTITUTION_THRESHOLD) - v).select_positive(energy, L::zero());
+            record[1 + 2 * p] = e * e * fast;
             record[2 + 2 * p] = L::zero();
         }
     }
 }
 
-/// Normal velocity of each point of a batch.
+/// Normal velocity (m/s) and separation (m) of each point of a batch, as bodies now are.
 #[inline(always)]
-fn normal_velocities<L: Lanes, N: KernelNeeds, O: Opposite>(
+fn points<L: Lanes, N: KernelNeeds, O: Opposite>(
     rows: &[BodyRow],
     batches: &Batches,
     segment: &Segment,
     batch: usize,
-) -> [L; 2] {
+) -> [[L; 2]; 2] {
     let layout = const { Layout::of::<N, O>() };
     let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
     let slab: &[L] = bytemuck::cast_slice(&batches.slab);
@@ -93,13 +129,19 @@ fn normal_velocities<L: Lanes, N: KernelNeeds, O: Opposite>(
     } else {
         [L::zero(); 8]
     };
-    let along_n = record[0].mul_add(b[0] - a[0], record[1] * (b[1] - a[1]));
+    let along_n = |at: usize| record[0].mul_add(b[at] - a[at], record[1] * (b[at + 1] - a[at + 1]));
+    let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[6]), turn(b[6]));
     std::array::from_fn(|p| {
-        if p >= N::POINTS || !N::ROTATION {
-            return along_n;
+        if p >= N::POINTS {
+            return [L::zero(); 2];
         }
-        let v = b[2].mul_add(record[layout.at(p, layout.arm_b)], along_n);
-        if O::HAS_ROW { a[2].neg_mul_add(record[layout.at(p, layout.arm_a)], v) } else { v }
+        let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+        let separation = record[layout.at(p, layout.separation)] + along_n(4);
+        let separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+        [
+            with_arms::<L, N, O>(along_n(0), [a[2], b[2]], arm_n),
+            with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t),
+        ]
     })
 }
 
@@ -129,8 +171,13 @@ fn track_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
 
 /// The bounce itself, contact after contact in sweep order.
 #[inline(never)]
-pub fn apply<L: Lanes, N: KernelNeeds>(rows: &mut [BodyRow], batches: &mut Batches, bounces: &mut Bounces) {
-    over_segments!(apply_segment, L, N; rows, batches, bounces);
+pub fn apply<L: Lanes, N: KernelNeeds>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    bounces: &mut Bounces,
+    h: f32,
+) {
+    over_segments!(apply_segment, L, N; rows, batches, bounces, h);
 }
 
 fn apply_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
@@ -138,6 +185,7 @@ fn apply_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
     batches: &mut Batches,
     segment: &Segment,
     bounces: &mut Bounces,
+    h: f32,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let first = segment.first_lane / L::WIDTH;
@@ -145,14 +193,17 @@ fn apply_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
         let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
         let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
         for p in 0..N::POINTS {
-            let vn = normal_velocities::<L, N, O>(rows, batches, segment, batch)[p];
+            let [vn, separation] = points::<L, N, O>(rows, batches, segment, batch)[p];
             let slab: &mut [L] = bytemuck::cast_slice_mut(&mut batches.slab);
             let record = &mut slab[segment.first_vector + batch * layout.stride..][..layout.stride];
-            let (e, approach, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
+            let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
+            let half = a * L::splat(0.5 * h);
+            let left = half * half + L::splat(2.0) * (energy - a * separation);
+            let rebound = half + left.max(L::zero()).sqrt();
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
-            let target = mass.neg_mul_add(e.mul_add(approach, vn), old).max(L::zero());
-            let new = bounced(e, approach, peak, target, old);
+            let target = mass.neg_mul_add(vn - rebound, old).max(L::zero());
+            let new = bounced(energy, peak, target, old);
             record[layout.at(p, layout.normal_impulse)] = new;
             let delta = new - old;
             let n = [record[0], record[1]];
@@ -177,11 +228,10 @@ fn apply_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
     }
 }
 
-/// `yes` where a point with these values bounces, else `no`.
+/// `yes` where a point with this energy and this largest impulse bounces, else `no`.
 #[inline(always)]
-fn bounced<L: Lanes>(e: L, approach: L, peak: L, yes: L, no: L) -> L {
-    let fast = (L::splat(-RESTITUTION_THRESHOLD) - approach).select_positive(yes, no);
-    e.select_positive(peak.select_positive(fast, no), no)
+fn bounced<L: Lanes>(energy: L, peak: L, yes: L, no: L) -> L {
+    energy.select_positive(peak.select_positive(yes, no), no)
 }
 
 /// Forgets the impulses of points that bounced: they say nothing about the next step.
@@ -205,7 +255,7 @@ fn forget_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
         for p in 0..N::POINTS {
             let mut forget = |at: usize| {
                 let at = layout.at(p, at);
-                record[at] = bounced(bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p], L::zero(), record[at]);
+                record[at] = bounced(bounce[1 + 2 * p], bounce[2 + 2 * p], L::zero(), record[at]);
             };
             forget(layout.normal_impulse);
             if N::FRICTION {

@@ -32,7 +32,7 @@
 //! s = s₀ + n·(Δx_b − Δx_a) + σ_b (r_b × n) + κ_b (r_b × t) − σ_a (r_a × n) − κ_a (r_a × t)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ (see [`turn`]).
+//! with σ = sin Δθ and κ = 1 − cos Δθ, both from their Taylor series.
 //!
 //! # Effective mass
 //!
@@ -51,7 +51,7 @@ use crate::params::MAX_POSITION_CORRECTION;
 ///
 /// A rule is the whole difference between sequential-impulse solvers; the sweep around
 /// it is shared. `stiff` tells that body a is static or kinematic.
-pub trait NormalRule: Copy {
+pub trait NormalRule: Copy + 'static {
     /// Whether the sweep solves the friction rows as well.
     const FRICTION: bool;
     /// Whether the rule reads the separation.
@@ -67,7 +67,7 @@ pub trait NormalRule: Copy {
 /// The first two Taylor terms of each: the error is below θ⁵/120 and θ⁶/720, so below
 /// 3e-8 for a turn of 0.05 rad (3 rad/s at 60 Hz) and 2.6e-4 at half a radian.
 #[inline(always)]
-fn turn<L: Lanes>(angle: L) -> (L, L) {
+pub(super) fn turn<L: Lanes>(angle: L) -> (L, L) {
     let square = angle * angle;
     let sine = angle * square.neg_mul_add(L::splat(1.0 / 6.0), L::splat(1.0));
     let versine = square * square.neg_mul_add(L::splat(1.0 / 24.0), L::splat(0.5));
@@ -111,7 +111,7 @@ fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
 
 /// `base + ω_b arm_b − ω_a arm_a`, where the needs have arms.
 #[inline(always)]
-fn with_arms<L: Lanes, N: KernelNeeds, O: Opposite>(base: L, w: [L; 2], arm: [L; 2]) -> L {
+pub(super) fn with_arms<L: Lanes, N: KernelNeeds, O: Opposite>(base: L, w: [L; 2], arm: [L; 2]) -> L {
     let mut v = base;
     if N::ROTATION {
         v = w[1].mul_add(arm[1], v);
@@ -221,7 +221,7 @@ fn apply<L: Lanes, O: Opposite>(a: &mut [L; 8], b: &mut [L; 8], n: [L; 2], sum: 
 
 /// Arms of bodies a and b at point `p`: `axis` 0 is r × n, 1 is r × t.
 #[inline(always)]
-fn arms<L: Lanes, N: KernelNeeds, O: Opposite>(
+pub(super) fn arms<L: Lanes, N: KernelNeeds, O: Opposite>(
     record: &[L],
     layout: &Layout,
     p: usize,

@@ -114,6 +114,9 @@ pub trait Lanes:
     /// `self < other ? self : other`.
     fn min(self, other: Self) -> Self;
 
+    /// Square root (an IEEE operation).
+    fn sqrt(self) -> Self;
+
     /// `self > 0 ? positive : otherwise`.
     fn select_positive(self, positive: Self, otherwise: Self) -> Self;
 
@@ -171,6 +174,11 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+
+    #[inline(always)]
     fn select_positive(self, positive: Self, otherwise: Self) -> Self {
         if self > 0.0 { positive } else { otherwise }
     }
@@ -222,6 +230,11 @@ macro_rules! wide_lanes {
             #[inline(always)]
             fn min(self, other: Self) -> Self {
                 self.fast_min(other)
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$type>::sqrt(self)
             }
 
             #[inline(always)]
@@ -287,7 +300,8 @@ mod tests {
     fn agrees_with_scalar<L: Lanes>(x: &[f32], y: &[f32], z: &[f32]) -> Result<(), TestCaseError> {
         let (a, b, c) = (load::<L>(x), load::<L>(y), load::<L>(z));
         type Scalar = fn(f32, f32, f32) -> f32;
-        let cases: [(&str, L, Scalar); 9] = [
+        let cases: [(&str, L, Scalar); 10] = [
+            ("sqrt", Lanes::sqrt(a), |a, _, _| Lanes::sqrt(a)),
             ("add", a + b, |a, b, _| a + b),
             ("sub", a - b, |a, b, _| a - b),
             ("mul", a * b, |a, b, _| a * b),

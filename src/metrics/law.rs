@@ -75,7 +75,7 @@ impl PointStep {
     }
 
     /// 1/(J M⁻¹ Jᵀ) along `direction` (kg); zero if nothing can move.
-    fn effective_mass(&self, direction: DVec2, a: &BodyState, b: &BodyState) -> f64 {
+    pub fn effective_mass(&self, direction: DVec2, a: &BodyState, b: &BodyState) -> f64 {
         let k = a.inv_mass
             + b.inv_mass
             + a.inv_inertia * self.anchor_a.perp_dot(direction).powi(2)
@@ -83,45 +83,59 @@ impl PointStep {
         if k > 0.0 { 1.0 / k } else { 0.0 }
     }
 
-    /// The natural map (r_n, r_t) of the module (N·s).
-    pub fn residual(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> [f64; 2] {
-        let (n, t) = (self.normal, tangent(self.normal));
-        let [normal_impulse, tangent_impulse] = self.impulse;
-        let relative =
-            |a: &BodyState, b: &BodyState| b.velocity_at(self.anchor_b) - a.velocity_at(self.anchor_a);
-        let end = relative(&a.after, &b.after);
-        let approach = relative(&a.before, &b.before).dot(n);
+    /// Velocity of b's material point against a's, in the contact frame (m/s).
+    pub fn relative_velocity(&self, a: &BodyState, b: &BodyState) -> [f64; 2] {
+        let relative = b.velocity_at(self.anchor_b) - a.velocity_at(self.anchor_a);
+        [relative.dot(self.normal), relative.dot(tangent(self.normal))]
+    }
+
+    /// (u_n, u_t) of the module (m/s).
+    pub fn velocities(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> [f64; 2] {
+        let [end, slip] = self.relative_velocity(&a.after, &b.after);
+        let [approach, _] = self.relative_velocity(&a.before, &b.before);
         let bounces =
-            self.restitution > 0.0 && normal_impulse > 0.0 && approach < -(RESTITUTION_THRESHOLD as f64);
+            self.restitution > 0.0 && self.impulse[0] > 0.0 && approach < -(RESTITUTION_THRESHOLD as f64);
         let un = if bounces {
-            end.dot(n) + self.restitution * approach
+            end + self.restitution * approach
         } else if self.gap > 0.0 {
             let moved = b.displacement_at(self.anchor_b) - a.displacement_at(self.anchor_a);
-            (self.gap + moved.dot(n)) / dt
+            (self.gap + moved.dot(self.normal)) / dt
         } else {
-            end.dot(n)
+            end
         };
-        let rho_n = self.effective_mass(n, &a.before, &b.before);
-        let rho_t = self.effective_mass(t, &a.before, &b.before);
-        let cone = self.friction * normal_impulse.max(0.0);
-        [
-            normal_impulse - (normal_impulse - rho_n * un).max(0.0),
-            tangent_impulse - (tangent_impulse - rho_t * end.dot(t)).clamp(-cone, cone),
-        ]
+        [un, slip]
+    }
+
+    /// The natural map (r_n, r_t) of the module (N·s).
+    pub fn residual(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> [f64; 2] {
+        let velocities = self.velocities(a, b, dt);
+        let axes = [self.normal, tangent(self.normal)];
+        let rho = axes.map(|axis| self.effective_mass(axis, &a.before, &b.before));
+        natural_map(self.impulse, velocities, rho, self.friction)
     }
 }
 
+/// (r_n, r_t) of impulses (N·s), velocities (m/s), ρ (kg) and the friction coefficient.
+pub fn natural_map(impulse: [f64; 2], velocity: [f64; 2], rho: [f64; 2], friction: f64) -> [f64; 2] {
+    let [normal, tangent] = impulse;
+    let limit = friction * normal.max(0.0);
+    [
+        normal - (normal - rho[0] * velocity[0]).max(0.0),
+        tangent - (tangent - rho[1] * velocity[1]).clamp(-limit, limit),
+    ]
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::state::tests::{body, fixed};
     use super::*;
     use crate::bodies::BodyKind;
 
-    const DT: f64 = 0.1;
+    pub const DT: f64 = 0.1;
 
     /// A 2 kg body on a fixed floor, the contact below its centre of mass, in its centre
     /// so that nothing turns: both effective masses are 2 kg.
-    fn point(gap: f64, impulse: [f64; 2]) -> PointStep {
+    pub fn point(gap: f64, impulse: [f64; 2]) -> PointStep {
         PointStep {
             normal: DVec2::Y,
             anchor_a: DVec2::ZERO,
@@ -133,13 +147,22 @@ mod tests {
         }
     }
 
-    fn residual(point: PointStep, before: DVec2, after: DVec2) -> [f64; 2] {
+    /// A floor over a step.
+    pub fn standing() -> BodyStep {
         let floor = fixed(BodyKind::Static);
-        let b = BodyStep {
+        BodyStep { before: floor, after: floor }
+    }
+
+    /// The body over a step, from one velocity to another.
+    pub fn moving(before: DVec2, after: DVec2) -> BodyStep {
+        BodyStep {
             before: BodyState { velocity: before, ..body() },
             after: BodyState { velocity: after, position: DT * after, ..body() },
-        };
-        point.residual(&BodyStep { before: floor, after: floor }, &b, DT)
+        }
+    }
+
+    fn residual(point: PointStep, before: DVec2, after: DVec2) -> [f64; 2] {
+        point.residual(&standing(), &moving(before, after), DT)
     }
 
     #[test]

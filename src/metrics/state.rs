@@ -35,7 +35,7 @@ impl BodyState {
             kind: bodies.kind[i],
             inv_mass: bodies.inv_mass[i] as f64,
             inv_inertia: bodies.inv_inertia[i] as f64,
-            position: wide(pose.position),
+            position: DVec2::from(bodies.center(i)),
             rotation: wide(pose.rotation),
             velocity: wide(bodies.velocity(i)),
             angular_velocity: bodies.angular_velocity[i] as f64,

@@ -35,16 +35,29 @@ struct Line<'a> {
     penetration_rms: Option<f64>,
     penetration_p99: Option<f64>,
     penetration_relative: Option<f64>,
+    penetration_excess: Option<f64>,
+    soft_floor: Option<f64>,
     law_rms: Option<f64>,
     law_normal_rms: Option<f64>,
     law_normal_max: Option<f64>,
     law_tangent_rms: Option<f64>,
     law_tangent_max: Option<f64>,
+    complementarity: Option<f64>,
+    cone: Option<f64>,
+    dissipation: Option<f64>,
+    own_rms: Option<f64>,
+    own_max: Option<f64>,
     momentum: Option<f64>,
     angular_momentum: Option<f64>,
     energy_change: Option<f64>,
     energy_created: Option<f64>,
+    friction_loss: Option<f64>,
+    impact_loss: Option<f64>,
+    energy_unexplained: Option<f64>,
     rest_velocity: Option<f64>,
+    creep: Option<f64>,
+    creep_half_width: Option<f64>,
+    settled: Option<f64>,
     truth: Option<&'a str>,
     truth_unit: Option<&'a str>,
     truth_expected: Option<f64>,
@@ -93,16 +106,29 @@ impl<'a> Line<'a> {
             penetration_rms: errors.map(|e| e.penetration_rms),
             penetration_p99: errors.map(|e| e.penetration_p99),
             penetration_relative: errors.map(|e| e.penetration_relative),
+            penetration_excess: errors.and_then(|e| e.penetration_excess),
+            soft_floor: errors.and_then(|e| e.soft_floor),
             law_rms: errors.map(|e| e.law_rms),
             law_normal_rms: errors.map(|e| e.law_normal_rms),
             law_normal_max: errors.map(|e| e.law_normal_max),
             law_tangent_rms: errors.map(|e| e.law_tangent_rms),
             law_tangent_max: errors.map(|e| e.law_tangent_max),
+            complementarity: errors.map(|e| e.complementarity),
+            cone: errors.map(|e| e.cone),
+            dissipation: errors.map(|e| e.dissipation),
+            own_rms: errors.and_then(|e| e.own_rms),
+            own_max: errors.and_then(|e| e.own_max),
             momentum: errors.map(|e| e.momentum),
             angular_momentum: errors.map(|e| e.angular_momentum),
             energy_change: errors.map(|e| e.energy_change),
             energy_created: errors.map(|e| e.energy_created),
+            friction_loss: errors.map(|e| e.friction_loss),
+            impact_loss: errors.map(|e| e.impact_loss),
+            energy_unexplained: errors.map(|e| e.energy_unexplained),
             rest_velocity: errors.map(|e| e.rest_velocity),
+            creep: errors.map(|e| e.creep),
+            creep_half_width: errors.map(|e| e.creep_half_width),
+            settled: errors.and_then(|e| e.settled),
             truth: truth.map(|t| t.quantity),
             truth_unit: truth.map(|t| t.unit),
             truth_expected: truth.map(|t| t.expected),
@@ -150,6 +176,11 @@ pub fn json(
     serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
 }
 
+/// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
+fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
 /// Everything that was chosen, by the caller or by a constant.
 fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
@@ -171,7 +202,7 @@ fn settings(plan: &StudyPlan) -> Value {
             "broadphase": format!("{:?}", s.broadphase),
             "integrator": s.integrator,
             "rotation": s.rotation,
-            "contact_hertz": s.contact_hertz,
+            "contact_hertz": decimal(s.contact_hertz),
         })
     });
     json!({
@@ -183,19 +214,20 @@ fn settings(plan: &StudyPlan) -> Value {
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,
         "repeats": plan.repeats,
+        "contact_hertz": plan.contact_hertz,
         "seed": plan.seed,
         "world": standard,
         "constants": {
-            "linear_slop_m": params::LINEAR_SLOP,
-            "speculative_distance_m": params::SPECULATIVE_DISTANCE,
-            "aabb_margin_m": params::AABB_MARGIN,
-            "baumgarte": params::BAUMGARTE,
-            "contact_hertz_fraction": params::CONTACT_HERTZ_FRACTION,
-            "contact_damping_ratio": params::CONTACT_DAMPING_RATIO,
-            "max_push_speed_m_s": params::MAX_PUSH_SPEED,
-            "restitution_threshold_m_s": params::RESTITUTION_THRESHOLD,
-            "max_position_correction_m": params::MAX_POSITION_CORRECTION,
-            "diverged_speed_m_s": params::DIVERGED_SPEED,
+            "linear_slop_m": decimal(params::LINEAR_SLOP),
+            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
+            "aabb_margin_m": decimal(params::AABB_MARGIN),
+            "baumgarte": decimal(params::BAUMGARTE),
+            "contact_hertz_fraction": decimal(params::CONTACT_HERTZ_FRACTION),
+            "contact_damping_ratio": decimal(params::CONTACT_DAMPING_RATIO),
+            "max_push_speed_m_s": decimal(params::MAX_PUSH_SPEED),
+            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
+            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
+            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
         },
     })
 }

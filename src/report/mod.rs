@@ -1,14 +1,16 @@
 //! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
 
+mod axes;
 pub mod environment;
 pub mod export;
-pub mod files;
 pub mod plot;
+pub mod profiles;
 pub mod reading;
 pub mod table;
 pub mod units;
 
 use crate::error::Error;
+use crate::files;
 use crate::study::ablation::NeedCost;
 use crate::study::{Record, StudyPlan};
 use environment::Environment;
@@ -26,12 +28,15 @@ pub fn text(records: &[Record], ablation: &[NeedCost]) -> String {
     if !ablation.is_empty() {
         text += &format!("\n{ablation}");
     }
-    text + "\n" + &reading::reading(records)
+    let slices = profiles::slice_tables(records);
+    let profiles = profiles::profile_table(records);
+    text + "\n" + &slices + "\n" + &profiles + "\n" + &reading::reading(records)
 }
 
-/// Writes `study.csv`, `study.json` and `speed_vs_error.svg` into `folder`; returns their paths.
+/// Writes `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into `folder`;
+/// returns their paths.
 ///
-/// All three are made before the first is written.
+/// All are made before the first is written.
 pub fn write_study(
     folder: &Path,
     plan: &StudyPlan,
@@ -43,6 +48,7 @@ pub fn write_study(
         ("study.csv", export::csv(records)?),
         ("study.json", export::json(&environment, plan, records, ablation)?),
         ("speed_vs_error.svg", plot::svg(records)?.into_bytes()),
+        ("profiles.svg", profiles::svg(records)?.into_bytes()),
     ];
     files::prepare_folder(folder)?;
     let mut paths = Vec::new();

@@ -10,14 +10,14 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 /// What the columns of [`scene_table`] are, once for the whole study.
 pub const LEGEND: &str = "\
 lanes: nat is one after the other in natural order, numbers are lanes in coloured order.  ± is the median
-deviation of a repeat.  ns/row: passes over constraints per row and sweep.  ×: times faster than 1 lane.
+deviation of a repeat.  ns/row: a sweep, per row that it solves.  ×: times faster than 1 lane.
 law: contact-law residual in the scene's weight × step.  energy, moment.: gained or lost, relative.  rest:
 rms speed of the last second.  occ.: lanes that hold a contact.  front: on the front of time against
 p penetration, l law residual, t truth; errors are the same for all coloured widths of a budget.
 ";
 
 /// Lines of a table without the frame.
-fn table(header: &[&str]) -> Table {
+pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header(header.to_vec());
@@ -25,7 +25,7 @@ fn table(header: &[&str]) -> Table {
 }
 
 /// Every column but the first `left` to the right, and two blanks between columns.
-fn finish(mut table: Table, left: usize) -> String {
+pub(super) fn finish(mut table: Table, left: usize) -> String {
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));
         if i >= left {
@@ -153,23 +153,58 @@ pub fn ablation_table(costs: &[NeedCost]) -> String {
     text
 }
 
-/// The errors of one run, a line each.
+/// The errors of one run, a line each; what is absent has none.
 pub fn error_list(errors: &Errors) -> String {
+    let e = errors;
+    let length = |value: f64| si(value, "m");
     let lines = [
-        ("penetration max", si(errors.penetration_max, "m")),
-        ("penetration mean", si(errors.penetration_mean, "m")),
-        ("penetration rms", si(errors.penetration_rms, "m")),
-        ("penetration 99 %", si(errors.penetration_p99, "m")),
-        ("penetration max / half-extent", ratio(errors.penetration_relative)),
-        ("law residual, normal, rms", ratio(errors.law_normal_rms)),
-        ("law residual, normal, max", ratio(errors.law_normal_max)),
-        ("law residual, tangential, rms", ratio(errors.law_tangent_rms)),
-        ("law residual, tangential, max", ratio(errors.law_tangent_max)),
-        ("momentum out of balance", ratio(errors.momentum)),
-        ("angular momentum out of balance", ratio(errors.angular_momentum)),
-        ("energy change", ratio(errors.energy_change)),
-        ("energy created, worst step", ratio(errors.energy_created)),
-        ("rest velocity, last second", si(errors.rest_velocity, "m/s")),
+        ("penetration max", Some(length(e.penetration_max))),
+        ("penetration mean", Some(length(e.penetration_mean))),
+        ("penetration rms", Some(length(e.penetration_rms))),
+        ("penetration 99 %", Some(length(e.penetration_p99))),
+        ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
+        ("soft contacts give way, last second", e.soft_floor.map(length)),
+        ("penetration beyond that", e.penetration_excess.map(length)),
+        ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
+        ("law residual, normal, max", Some(ratio(e.law_normal_max))),
+        ("law residual, tangential, rms", Some(ratio(e.law_tangent_rms))),
+        ("law residual, tangential, max", Some(ratio(e.law_tangent_max))),
+        ("complementarity violated, max", Some(ratio(e.complementarity))),
+        ("friction cone violated, max", Some(ratio(e.cone))),
+        ("gap to maximal dissipation, max", Some(ratio(e.dissipation))),
+        ("residual of its own law, rms", e.own_rms.map(ratio)),
+        ("residual of its own law, max", e.own_max.map(ratio)),
+        ("momentum out of balance", Some(ratio(e.momentum))),
+        ("angular momentum out of balance", Some(ratio(e.angular_momentum))),
+        ("energy change", Some(ratio(e.energy_change))),
+        ("energy created, worst step", Some(ratio(e.energy_created))),
+        ("energy unexplained, worst step", Some(ratio(e.energy_unexplained))),
+        ("energy taken by friction", Some(ratio(e.friction_loss))),
+        ("energy taken by normal impulses", Some(ratio(e.impact_loss))),
+        ("rest velocity, last second", Some(si(e.rest_velocity, "m/s"))),
+        (
+            "creep, last second, with 95 %",
+            Some(format!("{} ± {}", si(e.creep, "m/s"), si(e.creep_half_width, "m/s"))),
+        ),
+        ("settled after", Some(e.settled.map_or("never".to_string(), |t| si(t, "s")))),
     ];
-    lines.iter().map(|(name, value)| format!("  {name:<34}{value:>12}\n")).collect()
+    let shown = lines.into_iter().filter_map(|(name, value)| Some((name, value?)));
+    shown.map(|(name, value)| format!("  {name:<36}{value:>12}\n")).collect()
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::record::tests::{failed, record};
+
+    #[test]
+    fn errors_stand_once_per_budget_and_failures_below() {
+        let mut wrong = record(8, 1, 10.0, 1.234e-3);
+        wrong.bits_equal = Some(false);
+        let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1)]);
+        assert_eq!(text.matches("1.23 mm").count(), 1, "{text}");
+        assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
+        assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
+        assert!(text.lines().all(|line| line.chars().count() <= 160));
+        assert!(scene_table(&[]).is_empty());
+    }
 }

@@ -66,9 +66,8 @@ impl Observer for Twin {
 /// Greatest distance of a body from its twin's place (m); infinite where one is NaN.
 fn distance(near: &Bodies, far: &Bodies, shift: [f64; 2]) -> f64 {
     let off = |i: usize| {
-        let x = f64::from(far.position_x[i]) - shift[0] - f64::from(near.position_x[i]);
-        let y = f64::from(far.position_y[i]) - shift[1] - f64::from(near.position_y[i]);
-        x.hypot(y)
+        let (far, near) = (far.center(i), near.center(i));
+        (far[0] - shift[0] - near[0]).hypot(far[1] - shift[1] - near[1])
     };
     largest((0..near.len().min(far.len())).map(off))
 }

@@ -98,7 +98,7 @@ impl<'a> View<'a> {
 
     /// Centre of mass of body `i` (m).
     pub fn center(&self, i: usize) -> [f64; 2] {
-        [f64::from(self.bodies.position_x[i]), f64::from(self.bodies.position_y[i])]
+        self.bodies.center(i)
     }
 
     /// m/s
@@ -235,6 +235,8 @@ pub(super) mod by_hand {
         for &[x, y] in centers {
             bodies.position_x.push(x);
             bodies.position_y.push(y);
+            bodies.position_x_rest.push(0.0);
+            bodies.position_y_rest.push(0.0);
             bodies.rotation_cos.push(1.0);
             bodies.rotation_sin.push(0.0);
             bodies.velocity_x.push(0.0);

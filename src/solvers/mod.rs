@@ -1,6 +1,7 @@
 //! Solver variants, one file each; [`VARIANTS`] is the table that everything iterates.
 //!
-//! A variant is a schedule of passes over a [`Problem`] and a [`NormalRule`] or two.
+//! A variant is a schedule of passes over a [`Problem`] and a
+//! [`NormalRule`](crate::constraints::NormalRule) or two.
 //! Variants never import one another. `pgs.rs` is the tutorial: it explains the whole
 //! method, the others only what differs.
 
@@ -45,6 +46,10 @@ pub struct Variant {
     pub budget: Budget,
     /// The budget fields it reads, besides `substeps`.
     pub uses: Uses,
+    /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
+    /// others, from the stiffness asked for (Hz) and the substep (s); none if its contacts are
+    /// not springs. At rest such a contact gives way, and metrics tell that from error.
+    pub softness: Option<fn(f32, f32) -> [f32; 2]>,
     run: Run,
 }
 
@@ -58,6 +63,7 @@ pub static VARIANTS: [Variant; 3] = [
         summary: "positions pushed apart, then approach velocities removed; no memory, no friction",
         budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
         uses: Uses { velocity: true, relax: false, position: true },
+        softness: None,
         run: dispatch::<projection::Projection>,
     },
     Variant {
@@ -66,6 +72,7 @@ pub static VARIANTS: [Variant; 3] = [
         summary: "sequential impulses with warm starting and Baumgarte stabilisation",
         budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
         uses: Uses { velocity: true, relax: false, position: false },
+        softness: None,
         run: dispatch::<pgs::Pgs>,
     },
     Variant {
@@ -74,6 +81,7 @@ pub static VARIANTS: [Variant; 3] = [
         summary: "substeps, soft contacts and a relaxing sweep without position feedback",
         budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
         uses: Uses { velocity: true, relax: true, position: false },
+        softness: Some(soft_step::angular_frequencies),
         run: dispatch::<soft_step::SoftStep>,
     },
 ];

@@ -61,6 +61,13 @@ impl Solver for SoftStep {
     }
 }
 
+/// ω of contacts between dynamic bodies and of those with others (rad/s), where `hertz` (Hz) is
+/// asked for and the substep is `h` (s): capped by the substep rate, and twice as much with others.
+pub fn angular_frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = std::f32::consts::TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
 /// The implicit spring's coefficients.
 #[derive(Clone, Copy)]
 struct Softness {
@@ -73,8 +80,7 @@ struct Softness {
 }
 
 impl Softness {
-    fn new(hertz: f32, damping_ratio: f32, h: f32) -> Self {
-        let omega = std::f32::consts::TAU * hertz;
+    fn new(omega: f32, damping_ratio: f32, h: f32) -> Self {
         let denominator = 2.0 * damping_ratio + h * omega;
         let a = h * omega * denominator;
         Softness { bias_rate: omega / denominator, mass_scale: a / (1.0 + a), impulse_scale: 1.0 / (1.0 + a) }
@@ -90,14 +96,13 @@ pub struct SoftRule {
 }
 
 impl SoftRule {
-    /// Contacts of `hertz` (Hz) between dynamic bodies, in substeps of `h` (s). The frequency is
-    /// capped by the substep rate; contacts with other bodies have twice as much.
+    /// Contacts of `hertz` (Hz) between dynamic bodies, in substeps of `h` (s).
     pub fn new(hertz: f32, h: f32) -> Self {
-        let hertz = hertz.min(CONTACT_HERTZ_FRACTION / h);
+        let [dynamic, stiff] = angular_frequencies(hertz, h);
         SoftRule {
             inv_h: 1.0 / h,
-            dynamic: Softness::new(hertz, CONTACT_DAMPING_RATIO, h),
-            stiff: Softness::new(2.0 * hertz, CONTACT_DAMPING_RATIO, h),
+            dynamic: Softness::new(dynamic, CONTACT_DAMPING_RATIO, h),
+            stiff: Softness::new(stiff, CONTACT_DAMPING_RATIO, h),
         }
     }
 }

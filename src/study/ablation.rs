@@ -1,12 +1,17 @@
 //! What it costs to model what a scene does not need.
 //!
 //! A scene's needs choose the kernel. Here each need that a scene is without is forced on,
-//! alone and all together, and the race tells what that would have cost.
+//! alone and all together, and the race tells what that would have cost. Since few scenes are
+//! without friction, each one also runs smooth, with every friction coefficient zero.
+//!
+//! Scenes of few contacts are left out: what their sweeps cost is the cost of starting them.
 
 use super::race::{Lap, race};
 use super::{StudyPlan, timing_steps};
+use crate::clock::Phase;
 use crate::constraints::Needs;
 use crate::error::Error;
+use crate::scenes::Scene;
 use crate::world::Settings;
 
 /// The cost of one need that a scene does not have.
@@ -40,6 +45,17 @@ const NEEDS: [(&str, Needs); 4] = [
     ("restitution", Needs { restitution: true, ..Needs::NONE }),
 ];
 
+/// Contacts that a scene must have on average to be worth a line.
+const FEWEST_CONTACTS: f64 = 100.0;
+
+/// The scene with every friction coefficient zero.
+fn smooth(scene: &Scene) -> Scene {
+    let mut smooth = scene.clone();
+    smooth.name += " smooth";
+    smooth.bodies.iter_mut().flat_map(|b| &mut b.shapes).for_each(|shape| shape.friction = 0.0);
+    smooth
+}
+
 /// The costs, for every scene of the plan, of each need that it is without, with the
 /// plan's last solver at its widest lanes and standard budget.
 pub fn ablation(plan: &StudyPlan) -> Result<Vec<NeedCost>, Error> {
@@ -47,8 +63,12 @@ pub fn ablation(plan: &StudyPlan) -> Result<Vec<NeedCost>, Error> {
         return Ok(Vec::new());
     };
     let mut costs = Vec::new();
+    let mut scenes = Vec::new();
     for name in &plan.scenes {
         let scene = plan.open(name)?.scene;
+        scenes.extend([smooth(&scene), scene]);
+    }
+    for scene in scenes {
         let base = Settings { width, ..Settings::new(solver) };
         let has = scene.build(base.clone())?.needs();
         let lacks = |need: &Needs| has.union(*need) != has;
@@ -63,7 +83,7 @@ pub fn ablation(plan: &StudyPlan) -> Result<Vec<NeedCost>, Error> {
         settings.extend(forced.iter().map(|&(_, extra_needs)| Settings { extra_needs, ..base.clone() }));
         let laps = race(&scene, &settings, timing_steps(plan, &scene), plan.repeats, plan.seed)?;
         let Some(Ok(own)) = laps.first() else { continue };
-        if own.load.contacts == 0.0 {
+        if own.load.contacts < FEWEST_CONTACTS {
             continue;
         }
         for ((need, _), lap) in forced.iter().zip(&laps[1..]) {
@@ -85,8 +105,9 @@ pub fn ablation(plan: &StudyPlan) -> Result<Vec<NeedCost>, Error> {
     Ok(costs)
 }
 
-/// ns per contact and sweep, from the median times of the passes over constraints.
+/// ns per contact and sweep, from the median times of the phases that sweep.
 fn per_contact(lap: &Lap) -> f64 {
-    let rows_per_contact = lap.load.rows / lap.load.contacts.max(1.0);
-    lap.row_sweep_ns * rows_per_contact
+    let sweeps = Phase::ALL.iter().zip(lap.phase_ns).filter(|(phase, _)| phase.is_sweep());
+    let ns: f64 = sweeps.map(|(_, ns)| ns).sum();
+    ns / (lap.load.contacts * lap.load.sweeps).max(1.0)
 }

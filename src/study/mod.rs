@@ -7,19 +7,23 @@
 
 pub mod ablation;
 pub mod budget;
+pub mod curve;
 pub mod pareto;
+pub mod profile;
 pub mod race;
+pub mod record;
+pub mod slices;
 
 use crate::error::Error;
 use crate::lanes::LaneWidth;
 use crate::metrics::{Errors, Observation};
-use crate::params::Budget;
-use crate::scenes::{self, Loaded, Scene, Truth};
+use crate::params::{Budget, CONTACT_HERTZ};
+use crate::scenes::{self, Loaded, Scene};
 use crate::solvers::{VARIANTS, Variant};
 use crate::world::{Divergence, Order, Settings};
 use budget::BudgetGrid;
-use pareto::Point;
-use race::{Lap, race, speed_up};
+use race::{race, speed_up};
+pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -51,6 +55,8 @@ pub struct StudyPlan {
     pub orders: Vec<Order>,
     /// Work per step.
     pub budgets: BudgetGrid,
+    /// Stiffness of soft contacts (Hz), for solvers that have them.
+    pub contact_hertz: f32,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
     /// Most steps of a timing run.
@@ -69,6 +75,7 @@ impl Default for StudyPlan {
             widths: LaneWidth::ALL.to_vec(),
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
+            contact_hertz: CONTACT_HERTZ,
             steps: None,
             timing_steps: 200,
             repeats: 3,
@@ -94,6 +101,7 @@ impl StudyPlan {
         if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
             return Err(Error::invalid(name, "none given"));
         }
+        budget::check_hertz(self.contact_hertz)?;
         let counts = [("steps", self.steps.unwrap_or(1)), ("repeats", self.repeats)];
         if let Some((name, _)) = counts.into_iter().find(|c| c.1 == 0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
@@ -148,108 +156,14 @@ pub fn open_scene(
     Ok(loaded)
 }
 
-/// One row of the study: a scene, a solver, a budget, an order and a lane width.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Record {
-    /// Name with size.
-    pub scene: String,
-    /// Bodies in it.
-    pub bodies: usize,
-    /// Step (s).
-    pub dt: f64,
-    /// Name of the solver.
-    pub solver: &'static str,
-    /// Constraint order.
-    pub order: Order,
-    /// Lanes per instruction.
-    pub lanes: usize,
-    /// Work per step.
-    pub budget: Budget,
-    /// The same, for tables.
-    pub budget_text: String,
-    /// Times and counts; none if the run failed.
-    pub lap: Option<Lap>,
-    /// Times faster than one coloured lane; none without that run.
-    pub speed_up: Option<f64>,
-    /// Errors, the same for all widths; none if the run failed.
-    pub errors: Option<Errors>,
-    /// Distance to what is known about the scene.
-    pub truth: Option<TruthError>,
-    /// Whether this width ended in the same bits as the error run.
-    pub bits_equal: Option<bool>,
-    /// Fronts that the setting is on; only its fastest width is.
-    pub front: Fronts,
-    /// Why there is no result.
-    pub failure: Option<Failure>,
-}
-
-/// How far a run was from a known truth.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct TruthError {
-    /// What is known.
-    pub quantity: &'static str,
-    /// Of both numbers.
-    pub unit: &'static str,
-    /// The truth.
-    pub expected: f64,
-    /// Distance to it; none where the run never came to it.
-    pub error: Option<f64>,
-}
-
-impl TruthError {
-    /// What the observer found; an infinite distance is none.
-    pub fn of(truth: &Truth) -> Self {
-        let error = truth.observer.error().filter(|e| e.is_finite());
-        TruthError { quantity: truth.quantity, unit: truth.unit, expected: truth.expected, error }
-    }
-}
-
-/// Membership in the fronts of time against three errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Fronts {
-    /// Against the deepest penetration.
-    pub penetration: bool,
-    /// Against the contact-law residual (root mean square).
-    pub law: bool,
-    /// Against the distance to the truth.
-    pub truth: bool,
-}
-
-/// Where and when a run left all bounds.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Failure {
-    /// Step, from 1.
-    pub step: u64,
-    /// Body index.
-    pub body: usize,
-    /// m/s or rad/s; none where it is not a finite number.
-    pub speed: Option<f32>,
-}
-
-impl From<Divergence> for Failure {
-    fn from(d: Divergence) -> Self {
-        Failure { step: d.step, body: d.body, speed: Some(d.speed).filter(|s| s.is_finite()) }
-    }
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
-        match self.speed {
-            Some(speed) => write!(f, "moves at {speed:.3e} m/s"),
-            None => write!(f, "has no finite speed"),
-        }
-    }
-}
-
 /// What a study is at, for a progress bar.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// Runs finished.
+    /// Runs begun before this one.
     pub done: usize,
     /// Runs in all.
     pub total: usize,
-    /// What has just been finished.
+    /// What runs now.
     pub what: String,
 }
 
@@ -263,11 +177,13 @@ struct Cell<'a> {
 
 /// What an error run found.
 #[derive(Clone)]
-struct Outcome {
-    errors: Result<Errors, Divergence>,
-    truth: Option<TruthError>,
+pub struct Outcome {
+    /// Those of the whole run; where it failed, by what.
+    pub errors: Result<Errors, Divergence>,
+    /// Distance to what is known about the scene.
+    pub truth: Option<TruthError>,
     /// Hash after the steps of a timing run.
-    hash: u64,
+    pub hash: u64,
 }
 
 /// Runs the plan; one record per scene, solver, budget, order and width, in that order.
@@ -288,7 +204,7 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
     let done = AtomicUsize::new(0);
     let total = cells.len() * (plan.orders.len() + 1);
     let tell = |verb: &str, cell: &Cell| {
-        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        let done = done.fetch_add(1, Ordering::Relaxed);
         let budget = budget::brief(&cell.budget, cell.solver);
         progress(Progress {
             done,
@@ -299,16 +215,17 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
     let outcomes = error_runs(plan, &cells, &tell)?;
     let mut records = Vec::new();
     for (cell, outcomes) in cells.iter().zip(&outcomes) {
-        records.extend(timed_records(plan, &scenes[cell.scene], cell, outcomes)?);
         tell("times", cell);
+        records.extend(timed_records(plan, &scenes[cell.scene], cell, outcomes)?);
     }
     mark_fronts(&mut records);
     Ok(records)
 }
 
 /// Settings of a cell in one order at one width.
-fn settings(cell: &Cell, order: Order, width: LaneWidth) -> Settings {
-    Settings { width, order, budget: cell.budget, ..Settings::new(cell.solver) }
+fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
+    let contact_hertz = plan.contact_hertz;
+    Settings { width, order, budget: cell.budget, contact_hertz, ..Settings::new(cell.solver) }
 }
 
 /// Steps of a timing run.
@@ -330,11 +247,11 @@ fn error_runs(
         loop {
             let job = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(cell, order)) = jobs.get(job) else { return Ok(()) };
+            tell("errors", &cells[cell]);
             let outcome = error_run(plan, &cells[cell], order)?;
             if let Ok(mut found) = found.lock() {
                 found[job] = Some(outcome);
             }
-            tell("errors", &cells[cell]);
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(jobs.len());
@@ -350,23 +267,33 @@ fn error_runs(
 }
 
 fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Error> {
-    let Loaded { scene, mut truth } = plan.open(cell.name)?;
+    let loaded = plan.open(cell.name)?;
     let width = match order {
         Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
     };
-    let mut world = scene.build(Settings { record_impulses: true, ..settings(cell, order, width) })?;
+    let timed = timing_steps(plan, &loaded.scene);
+    observe(loaded, settings(plan, cell, order, width), timed)
+}
+
+/// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
+pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
+    let Loaded { scene, mut truth } = loaded;
+    let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
     let mut observation = Observation::new(&world);
-    let (mut hash, timed) = (0, timing_steps(plan, &scene));
+    let mut hash = 0;
     for step in 1..=scene.steps {
         if let Err(divergence) = world.step() {
             return Ok(Outcome { errors: Err(divergence), truth: None, hash });
         }
         observation.observe(&world);
+        if let Some(blow_up) = observation.blown_up() {
+            return Ok(Outcome { errors: Err(blow_up), truth: None, hash });
+        }
         if let Some(truth) = &mut truth {
             truth.observer.observe(&world);
         }
-        if step == timed {
+        if step == hash_at {
             hash = world.state_hash();
         }
     }
@@ -390,7 +317,7 @@ fn timed_records(
     let racing: Vec<Settings> = rows
         .iter()
         .filter(|row| row.2.errors.is_ok())
-        .map(|&(order, width, _)| settings(cell, order, width))
+        .map(|&(order, width, _)| settings(plan, cell, order, width))
         .collect();
     let mut laps = race(scene, &racing, timing_steps(plan, scene), plan.repeats, plan.seed)?.into_iter();
     let mut records: Vec<Record> = Vec::new();
@@ -426,39 +353,4 @@ fn timed_records(
         }
     }
     Ok(records)
-}
-
-/// Marks, scene by scene, the settings on each front. A setting is a solver, a budget and
-/// an order, at its fastest width.
-pub fn mark_fronts(records: &mut [Record]) {
-    for group in records.chunk_by_mut(|a, b| a.scene == b.scene) {
-        let fastest: Vec<usize> = (0..group.len()).filter(|&i| is_fastest(group, i)).collect();
-        let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
-            let (indices, points): (Vec<usize>, Vec<Point>) = fastest
-                .iter()
-                .filter_map(|&i| {
-                    let (lap, error) = (group[i].lap.as_ref()?, error(&group[i])?);
-                    Some((i, Point { time: lap.median_ns, spread: lap.spread_ns, error }))
-                })
-                .unzip();
-            for (i, on_front) in indices.into_iter().zip(pareto::front(&points)) {
-                *flag(&mut group[i].front) = on_front;
-            }
-        };
-        mark(|r| Some(r.errors?.penetration_max), |f| &mut f.penetration);
-        mark(|r| Some(r.errors?.law_rms), |f| &mut f.law);
-        mark(|r| r.truth?.error, |f| &mut f.truth);
-    }
-}
-
-/// Whether record `i` is the fastest width of its setting.
-fn is_fastest(group: &[Record], i: usize) -> bool {
-    let own = &group[i];
-    let time = |r: &Record| r.lap.as_ref().map(|lap| lap.median_ns);
-    let Some(own_time) = time(own) else { return false };
-    let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
-    group.iter().enumerate().all(|(j, r)| {
-        let faster = time(r).is_some_and(|t| t < own_time || (t == own_time && j < i));
-        !(same(r) && faster)
-    })
 }

@@ -19,14 +19,16 @@ pub struct Point {
     pub error: f64,
 }
 
-impl Point {
-    fn ties(&self, other: &Point) -> bool {
-        let noise = 2.0 * self.spread.max(other.spread);
-        (self.time - other.time).abs() <= (TIE * self.time.min(other.time)).max(noise)
-    }
+/// Whether two times with their spreads differ by no more than noise; all in one unit.
+pub fn tie(one: [f64; 2], other: [f64; 2]) -> bool {
+    let noise = 2.0 * one[1].max(other[1]);
+    (one[0] - other[0]).abs() <= (TIE * one[0].min(other[0])).max(noise)
+}
 
+impl Point {
     fn dominates(&self, other: &Point) -> bool {
-        let (tie, earlier) = (self.ties(other), self.time < other.time);
+        let tie = tie([self.time, self.spread], [other.time, other.spread]);
+        let earlier = self.time < other.time;
         let faster = earlier && !tie;
         (faster && self.error <= other.error) || ((earlier || tie) && self.error < other.error)
     }

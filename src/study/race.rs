@@ -31,7 +31,7 @@ pub struct Lap {
     pub quartiles_ns: [f64; 2],
     /// Median time of each phase (ns), in the order of [`Phase::ALL`].
     pub phase_ns: [f64; Phase::ALL.len()],
-    /// Median time of all passes over constraints, per row and sweep (ns).
+    /// Median time of all sweeps over the rows that they solve (ns).
     pub row_sweep_ns: f64,
     /// Averages over the steps.
     pub load: Load,
@@ -166,7 +166,7 @@ impl Entrant {
         for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
             times.push(ns as f64);
         }
-        let work = world.counts.rows * world.counts.sweeps;
+        let work = world.counts.row_updates;
         if work > 0 {
             self.row_sweep.push(world.timings.sweep_ns() as f64 / work as f64);
         }

@@ -36,9 +36,9 @@
 use super::problem::ContactProblem;
 use super::reference::Reference;
 use crate::error::Error;
+use crate::files;
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 
 /// Value of `format` in the header.
@@ -126,20 +126,7 @@ impl Frozen {
 
     /// Writes the file as a whole: a reader sees the old file or the new one, never a part.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = self.to_text()?;
-        let folder = match path.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        // Temporary files are private by default; this one becomes an ordinary file.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder).map_err(Error::io(path))?;
-        file.write_all(text.as_bytes()).map_err(Error::io(path))?;
-        file.as_file().sync_all().map_err(Error::io(path))?;
-        file.persist(path).map_err(|e| e.error).map_err(Error::io(path))?;
-        Ok(())
+        files::write(path, self.to_text()?.as_bytes())
     }
 
     /// Reads a file.

@@ -11,19 +11,25 @@ const FEWEST_POINTS: usize = 4;
 /// the rounding floor, or its flat end is what gets fitted. None if the tail is shorter than four
 /// (convergence faster than linear) or the last entry is not a positive number.
 pub fn rate(history: &[f64]) -> Option<f64> {
-    let &last = history.last()?;
+    let points: Vec<[f64; 2]> = history.iter().enumerate().map(|(k, &r)| [k as f64, r]).collect();
+    rate_at(&points)
+}
+
+/// As [`rate`], from points (iteration, residual) that need not lie at every iteration.
+pub fn rate_at(history: &[[f64; 2]]) -> Option<f64> {
+    let &[_, last] = history.last()?;
     if last.is_nan() || last <= 0.0 || last.is_infinite() {
         return None;
     }
-    let near = |r: &&f64| **r >= 0.1 * last && **r <= 10.0 * last;
+    let near = |p: &&[f64; 2]| p[1] >= 0.1 * last && p[1] <= 10.0 * last;
     let tail = &history[history.len() - history.iter().rev().take_while(near).count()..];
     if tail.len() < FEWEST_POINTS {
         return None;
     }
     // Slope ∑ (k − k̄) ln r_k / ∑ (k − k̄)².
-    let middle = (tail.len() - 1) as f64 / 2.0;
-    let sums = tail.iter().enumerate().fold([0.0, 0.0], |[xy, xx], (k, r)| {
-        let x = k as f64 - middle;
+    let middle = tail.iter().map(|p| p[0]).sum::<f64>() / tail.len() as f64;
+    let sums = tail.iter().fold([0.0, 0.0], |[xy, xx], [k, r]| {
+        let x = k - middle;
         [xy + x * r.ln(), xx + x * x]
     });
     Some((sums[0] / sums[1]).exp())
@@ -72,6 +78,12 @@ mod tests {
         for r in [0.5, 0.99, 1.5] {
             assert!((rate(&geometric(r, 60)).unwrap() - r).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn uneven_points_give_the_same_ratio() {
+        let points: Vec<[f64; 2]> = [0, 1, 2, 5, 9, 10, 17].map(|k| [k as f64, 0.9f64.powi(k)]).to_vec();
+        assert!((rate_at(&points).unwrap() - 0.9).abs() < 1e-12);
     }
 
     #[test]

@@ -1,0 +1,171 @@
+//! What the pictures share: logarithmic scales, panels with ticks, text, markers, colours.
+//!
+//! Axes are drawn here and not by the chart builder, so that a panel of any range has
+//! readable ticks within tight limits.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+pub const INK: RGBColor = RGBColor(40, 40, 40);
+pub const GRID: RGBColor = RGBColor(222, 222, 222);
+/// Distinct with any colour vision (Okabe and Ito).
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(160, 160, 40),
+];
+
+/// The colour of the solver at this index.
+pub fn color(solver: usize) -> RGBColor {
+    COLORS[solver % COLORS.len()]
+}
+
+/// A logarithmic axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// Lower and upper limit.
+    pub limits: [f64; 2],
+    /// Where it has labels, within the limits.
+    pub ticks: Vec<f64>,
+}
+
+/// Least range of an axis: limits this factor apart.
+const LEAST_RANGE: f64 = 1.3;
+
+impl Scale {
+    /// An axis that holds the values with a little room, at most `most` ticks on it.
+    ///
+    /// Ticks are the coarsest of decades, 1-2-5, single digits and so on that has at least two
+    /// within the limits; if those are too many, every second or third.
+    pub fn of(values: impl Iterator<Item = f64> + Clone, most: usize) -> Scale {
+        let least = values.clone().fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
+        let largest = values.fold(least, f64::max);
+        let widen = (LEAST_RANGE * least / largest).max(1.0).sqrt();
+        let (low, high) = (least / widen, largest * widen);
+        let room = (high / low).powf(0.06);
+        let limits = [low / room, high * room];
+        let digits: [Vec<f64>; 5] = [
+            vec![1.0],
+            vec![1.0, 2.0, 5.0],
+            (1..10).map(f64::from).collect(),
+            (10..100).step_by(5).map(|n| 0.1 * f64::from(n)).collect(),
+            (10..100).map(|n| 0.1 * f64::from(n)).collect(),
+        ];
+        let exponents = limits[0].log10().floor() as i32..=limits[1].log10().ceil() as i32;
+        let within = |digits: &Vec<f64>| -> Vec<f64> {
+            let all = exponents.clone().flat_map(|e| digits.iter().map(move |d| d * 10f64.powi(e)));
+            all.filter(|t| (limits[0]..=limits[1]).contains(t)).collect()
+        };
+        let mut sets = digits.iter().map(within);
+        let ticks = sets.clone().find(|t| t.len() >= 2).or_else(|| sets.next_back()).unwrap_or_default();
+        let stride = ticks.len().div_ceil(most.max(1)).max(1);
+        Scale { limits, ticks: ticks.into_iter().step_by(stride).collect() }
+    }
+
+    /// Where the value is between two pixels.
+    pub fn pixel(&self, value: f64, from: i32, to: i32) -> i32 {
+        let [low, high] = self.limits;
+        from + ((value / low).ln() / (high / low).ln() * (to - from) as f64).round() as i32
+    }
+}
+
+/// Text in ink, anchored at its left, middle or right.
+pub fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
+    let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
+    area.draw(&Text::new(text.to_string(), at, style))?;
+    Ok(())
+}
+
+/// Text that runs upwards, its middle at `at`.
+pub fn write_upwards(area: &Area, text: &str, at: (i32, i32), size: i32) -> Drawn {
+    let font = ("sans-serif", size).into_font().transform(FontTransform::Rotate270);
+    let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
+    area.draw(&Text::new(text.to_string(), at, style))?;
+    Ok(())
+}
+
+/// A name and a stroke per solver, from `x` on; returns where the next thing may stand.
+pub fn solver_legend(
+    area: &Area,
+    solvers: &[&str],
+    mut x: i32,
+    y: i32,
+) -> Result<i32, Box<dyn std::error::Error>> {
+    for (i, name) in solvers.iter().enumerate() {
+        area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], color(i).stroke_width(3)))?;
+        write(area, name, (x + 32, y), 14, HPos::Left)?;
+        x += 56 + 7 * name.chars().count() as i32;
+    }
+    Ok(x)
+}
+
+/// Circle, triangle, square, then crosses.
+pub fn marker(area: &Area, (x, y): (i32, i32), budget: usize, color: &RGBColor) -> Drawn {
+    let filled = color.filled();
+    match budget {
+        0 => area.draw(&Circle::new((x, y), 4, filled))?,
+        1 => area.draw(&TriangleMarker::new((x, y), 6, filled))?,
+        2 => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], filled))?,
+        _ => area.draw(&Cross::new((x, y), 4, color.stroke_width(2)))?,
+    }
+    Ok(())
+}
+
+/// Text in lines of at most `most` characters, broken between words where there are any.
+pub fn wrapped(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_tight_and_ticks_within() {
+        let scale = |values: [f64; 2]| Scale::of(values.into_iter(), 5);
+        assert_eq!(scale([0.9, 1100.0]).ticks, [1.0, 10.0, 100.0, 1000.0]);
+        assert_eq!(scale([3.0, 30.0]).ticks, [5.0, 10.0, 20.0]);
+        assert_eq!(scale([16.0, 19.0]).ticks, [16.0, 17.0, 18.0, 19.0, 20.0]);
+        for values in [[1e-12, 1e3], [9.99, 10.01], [5.0, 5.0], [2e-5, 3e-5], [150.0, 151.0]] {
+            let Scale { limits, ticks } = scale(values);
+            assert!(limits[0] < values[0] && values[1] < limits[1], "{limits:?}");
+            assert!((2..=5).contains(&ticks.len()), "{values:?} {ticks:?}");
+            assert!(limits[1] / limits[0] <= 1.6 * (values[1] / values[0]).powf(1.13), "{limits:?}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_is_where_the_logarithm_is() {
+        let scale = Scale { limits: [1.0, 100.0], ticks: Vec::new() };
+        assert_eq!([1.0, 10.0, 100.0].map(|v| scale.pixel(v, 300, 100)), [300, 200, 100]);
+    }
+
+    #[test]
+    fn long_titles_go_on_in_the_next_line() {
+        assert_eq!(
+            wrapped("error of distance to the same stack", 20),
+            ["error of distance to", "the same stack"]
+        );
+        assert_eq!(wrapped("unbreakable", 4), ["unbreakable"]);
+        assert!(wrapped("", 9).is_empty());
+    }
+}

@@ -1,0 +1,29 @@
+//! B15: the same stack, far from the origin.
+
+use super::lab::*;
+use super::{Failure, Finding, Lab};
+
+/// Spacing of `f32`s at the top of a stack of ten boxes at the origin (m).
+const SPACING: f64 = 1.0 / (1 << 20) as f64;
+
+/// Distance of ten boxes from their twins at the origin, all steps. Positions are kept as sums of
+/// two `f32`s, and contacts see differences of positions, so distance from the origin should not
+/// matter at all: what remains is the rounding of those differences. Each of the two corners of
+/// a contact, a metre apart, may come to rest one spacing off, which tilts everything above by a
+/// spacing per metre: the top of N boxes by 1 + 2 + … + N spacings.
+fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
+    lab.catalog(&format!("far_stack:{exponent}"), 55.0 * SPACING)
+}
+
+/// B15. At a kilometre, where the spacing of `f32`s is 6.1e-5 m.
+pub(super) fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
+    twins(lab, 3)
+}
+
+/// B15. The greatest distance, up to 10⁵ m, at which the trajectory is still the same.
+pub(super) fn distance(lab: &Lab) -> Result<Finding, Failure> {
+    sweep("distance (m)", &[1.0, 10.0, 100.0, 1e3, 1e4, 1e5], |distance| {
+        let found = twins(lab, distance.log10().round() as u32)?;
+        Ok((found.measured, found.passed()))
+    })
+}
