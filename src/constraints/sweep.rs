@@ -90,6 +90,22 @@ impl<L: Lanes> Pair<L> {
         // SAFETY: the caller keeps the indices in bounds.
         Pair { a, b: unsafe { L::gather(rows, row_b) } }
     }
+
+    /// Writes back the velocities of the bodies that answer to impulses.
+    ///
+    /// # Safety
+    /// Both index slices hold `L::WIDTH` entries below `rows.len()`.
+    #[inline(always)]
+    unsafe fn scatter_velocities<O: Opposite>(&self, rows: &mut [BodyRow], row_a: &[u32], row_b: &[u32]) {
+        let (a, b) = (&self.a, &self.b);
+        // SAFETY: the caller keeps the indices in bounds.
+        unsafe {
+            L::scatter_velocity(rows, row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+            if O::MOVES {
+                L::scatter_velocity(rows, row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+            }
+        }
+    }
 }
 
 const VX: usize = 0;
@@ -195,12 +211,7 @@ fn sweep_segment<L: Lanes, N: KernelNeeds, O: Opposite, R: NormalRule>(
 
         apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
         // SAFETY: as above.
-        unsafe {
-            L::scatter_velocity(rows, row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-            if O::MOVES {
-                L::scatter_velocity(rows, row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-            }
-        }
+        unsafe { Pair { a, b }.scatter_velocities::<O>(rows, row_a, row_b) };
     });
 }
 
@@ -262,12 +273,7 @@ fn warm_start_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
         }
         apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
         // SAFETY: as above.
-        unsafe {
-            L::scatter_velocity(rows, row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-            if O::MOVES {
-                L::scatter_velocity(rows, row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-            }
-        }
+        unsafe { Pair { a, b }.scatter_velocities::<O>(rows, row_a, row_b) };
     });
 }
 
