@@ -1,9 +1,11 @@
 //! Contact manifolds and the impulses they carry from step to step.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
-/// One point of a manifold.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// One point of a manifold: two quads of lanes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct ManifoldPoint {
     /// From the centre of mass of body a to the contact point, world axes (m).
     pub anchor_a: Vec2,
@@ -11,28 +13,39 @@ pub struct ManifoldPoint {
     pub anchor_b: Vec2,
     /// Signed gap along the normal (m); negative is overlap.
     pub separation: f32,
+    /// Names the pair of features that touch; the same from step to step while they do.
+    pub feature_id: u32,
     /// Accumulated normal impulse, ≥ 0 (N·s).
     pub normal_impulse: f32,
     /// Accumulated tangential impulse (N·s).
     pub tangent_impulse: f32,
-    /// Names the pair of features that touch; the same from step to step while they do.
-    pub feature_id: u32,
 }
 
 /// Up to two contact points that share a normal.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Manifold {
+    /// The first `count` are used.
+    pub points: [ManifoldPoint; 2],
     /// Unit normal from a to b, world axes.
     pub normal: Vec2,
     /// Number of points in use: 0, 1 or 2.
     pub count: u32,
-    /// The first `count` are used.
-    pub points: [ManifoldPoint; 2],
 }
 
-/// Two shapes close enough to touch.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Two shapes close enough to touch: eight quads, two cache lines.
+///
+/// The narrow phase writes the first five in lanes and preparation reads them in lanes, so their
+/// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub struct Contact {
+    /// Geometry at the start of the step; impulses of its last substep.
+    pub manifold: Manifold,
+    /// Mixed Coulomb coefficient √(µa µb).
+    pub friction: f32,
+    /// Mixed restitution max(ea, eb).
+    pub restitution: f32,
     /// Shape a: the static or kinematic one if there is one, else the lower index.
     pub shape_a: u32,
     /// Shape b, always of a dynamic body.
@@ -41,15 +54,28 @@ pub struct Contact {
     pub body_a: u32,
     /// Body of shape b.
     pub body_b: u32,
-    /// Mixed Coulomb coefficient √(µa µb).
-    pub friction: f32,
-    /// Mixed restitution max(ea, eb).
-    pub restitution: f32,
-    /// Geometry at the start of the step; impulses of its last substep.
-    pub manifold: Manifold,
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
+    /// Fills the last quad.
+    #[doc(hidden)]
+    pub padding: [u32; 3],
+}
+
+/// Quads of a [`Contact`], and which of them holds what.
+pub mod quad {
+    /// Quads per contact.
+    pub const STRIDE: usize = size_of::<super::Contact>() / 16;
+    /// `[anchor_a, anchor_b]` of point 0.
+    pub const ANCHORS_0: usize = 0;
+    /// `[separation, feature_id, normal_impulse, tangent_impulse]` of point 0.
+    pub const STATE_0: usize = 1;
+    /// `[anchor_a, anchor_b]` of point 1.
+    pub const ANCHORS_1: usize = 2;
+    /// `[separation, feature_id, normal_impulse, tangent_impulse]` of point 1.
+    pub const STATE_1: usize = 3;
+    /// `[normal, count, friction]`.
+    pub const HEADER: usize = 4;
 }
 
 impl Contact {

@@ -14,9 +14,11 @@
 //! CPU; [`native_width`] tells the widest that is not emulated.
 
 mod aligned;
+mod quads;
 mod rows;
 
 pub use aligned::{Block, LaneVec};
+pub use quads::Quad;
 pub use rows::BodyRow;
 
 use bytemuck::Pod;
@@ -138,6 +140,35 @@ pub trait Lanes:
     /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
     unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]);
 
+    /// Quad `O` of `WIDTH` records of `S` quads each, transposed.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries i, each with `i * S + O < quads.len()`.
+    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4];
+
+    /// Writes quad `O` of `WIDTH` records of `S` quads each, in lane order.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries i, each with `i * S + O < quads.len()`.
+    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]);
+
+    /// Writes the second half of quad `O` (`v[0]`, `v[1]`) and of quad `P` (`v[2]`, `v[3]`) of
+    /// `WIDTH` records of `S` quads each, in lane order.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries i, each with `i * S + max(O, P) < quads.len()`.
+    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+        quads: &mut [Quad],
+        index: &[u32],
+        v: [Self; 4],
+    );
+
+    /// `self == other ? yes : no`, as floats: −0 equals 0.
+    fn select_equal(self, other: Self, yes: Self, no: Self) -> Self;
+
+    /// The whole number n in [0, 2²³) that `self` holds, as the bits of the integer n.
+    fn integer_bits(self) -> Self;
+
     /// Zero in every lane.
     #[inline(always)]
     fn zero() -> Self {
@@ -200,10 +231,46 @@ impl Lanes for f32 {
         // SAFETY: the caller keeps `index` in bounds.
         unsafe { rows::scatter_1::<1>(rows, index, delta) }
     }
+
+    #[inline(always)]
+    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { quads::gather_1::<S, O>(quads, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { quads::scatter_1::<S, O>(quads, index, v) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+        quads: &mut [Quad],
+        index: &[u32],
+        v: [Self; 4],
+    ) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { quads::scatter_halves_1::<S, O, P>(quads, index, v) }
+    }
+
+    #[inline(always)]
+    fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
+        if self == other { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn integer_bits(self) -> Self {
+        f32::from_bits((self + INTEGERS).to_bits() & MANTISSA)
+    }
 }
 
+/// Floats from 2²³ on are the integers, and their last 23 bits count from there.
+const INTEGERS: f32 = 8_388_608.0;
+const MANTISSA: u32 = 0x007F_FFFF;
+
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, $gather:path, $scatter:ident) => {
+    ($type:ty, $width:literal, $gather:path, $scatter:ident, $gather_quads:ident, $halves:ident) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
@@ -259,14 +326,53 @@ macro_rules! wide_lanes {
                 // SAFETY: the caller keeps `index` in bounds.
                 unsafe { rows::$scatter::<1>(rows, index, delta) }
             }
+
+            #[inline(always)]
+            unsafe fn gather_quads<const S: usize, const O: usize>(
+                quads: &[Quad],
+                index: &[u32],
+            ) -> [Self; 4] {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { quads::$gather_quads::<S, O>(quads, index) }
+            }
+
+            #[inline(always)]
+            unsafe fn scatter_quads<const S: usize, const O: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [Self; 4],
+            ) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { quads::$scatter::<S, O>(quads, index, v) }
+            }
+
+            #[inline(always)]
+            unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [Self; 4],
+            ) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { quads::$halves::<S, O, P>(quads, index, v) }
+            }
+
+            #[inline(always)]
+            fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
+                wide::Select::select(self.simd_eq(other), yes, no)
+            }
+
+            #[inline(always)]
+            fn integer_bits(self) -> Self {
+                (self + <$type>::splat(INTEGERS)) & <$type>::splat(f32::from_bits(MANTISSA))
+            }
         }
     };
 }
 
 use bytemuck::Zeroable;
-wide_lanes!(f32x4, 4, rows::gather_4, scatter_4);
-wide_lanes!(f32x8, 8, rows::gather_8, scatter_8);
-wide_lanes!(f32x16, 16, rows::gather_16, scatter_16);
+wide_lanes!(f32x4, 4, rows::gather_4, scatter_4, gather_4, scatter_halves_4);
+wide_lanes!(f32x8, 8, rows::gather_8, scatter_8, gather_8, scatter_halves_8);
+wide_lanes!(f32x16, 16, rows::gather_16, scatter_16, gather_16, scatter_halves_16);
 
 #[cfg(test)]
 mod tests {

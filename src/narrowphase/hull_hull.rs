@@ -26,15 +26,15 @@ use glam::Vec2;
 /// Between flush faces, b's becomes the reference only if it is better
 /// by this much (m). They tie in exact arithmetic; without a preference their
 /// roles, and with them normal and separations, would follow the rounding.
-const REFERENCE_TOLERANCE: f32 = 0.1 * LINEAR_SLOP;
+pub(super) const REFERENCE_TOLERANCE: f32 = 0.1 * LINEAR_SLOP;
 
 /// Faces are flush if the cosine between their normals is below this (1): 0.01 rad, by
 /// which the preference above then turns the normal at most.
-const FLUSH: f32 = -0.99995;
+pub(super) const FLUSH: f32 = -0.99995;
 
 /// Vertices closer than this (m) do not define a normal: its rounding, about 1e-7 of
 /// the coordinates over this length, would show. Points closer than this are one.
-const VERTEX_TOLERANCE: f32 = 0.01 * LINEAR_SLOP;
+pub(super) const VERTEX_TOLERANCE: f32 = 0.01 * LINEAR_SLOP;
 
 /// Contact of two hulls, each in its body's frame.
 #[inline(always)]

@@ -13,16 +13,21 @@
 //! [`gjk`] and [`epa`] answer the same questions by another road, in `f64`,
 //! to check this one.
 
+pub mod batch;
 mod circle;
+pub mod circles;
 pub mod epa;
 pub mod gjk;
 mod hull;
 mod hull_hull;
+pub mod lanes;
+pub mod rectangles;
 
 use crate::contacts::{Manifold, ManifoldPoint};
 use crate::shapes::{Pose, Shape};
 use glam::Vec2;
 use hull::Hull;
+use lanes::{Pair, ShapeRow};
 
 /// Contact of shape `a` with shape `b`, each in the frame of its body's centre of mass.
 ///
@@ -43,6 +48,13 @@ use hull::Hull;
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
     let frame = Frame::new(pose_a, pose_b);
+    // What lanes do in a step is done here with one lane: the same bits.
+    if let (Some(a), Some(b)) = (ShapeRow::rectangle(a), ShapeRow::rectangle(b)) {
+        return rectangles::collide(&frame.pair(a, b), speculative_distance).manifold();
+    }
+    if let (Some(a), Some(b)) = (ShapeRow::circle(a), ShapeRow::circle(b)) {
+        return circles::collide(&frame.pair(a, b), speculative_distance).manifold();
+    }
     match (a, b) {
         (Shape::Polygon(p), Shape::Polygon(q)) => {
             if p.count.max(q.count) <= 4 {
@@ -92,6 +104,15 @@ impl Frame {
             centers: pose_b.position - pose_a.position,
             rotation_a: pose_a.rotation,
             rotation_b: pose_b.rotation,
+        }
+    }
+
+    fn pair(&self, a: ShapeRow, b: ShapeRow) -> Pair<f32> {
+        Pair {
+            centers: self.centers.into(),
+            rotation: [self.rotation_a.into(), self.rotation_b.into()],
+            place: [a.place, b.place],
+            size: [a.size, b.size],
         }
     }
 

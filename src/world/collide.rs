@@ -1,39 +1,159 @@
-//! From candidate pairs to contacts that remember their impulses.
+//! From candidates to contacts that remember their impulses.
 
 use super::World;
+use super::candidates::Candidate;
 use crate::contacts::Contact;
+use crate::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT};
 use crate::narrowphase::collide;
+use crate::narrowphase::lanes::{PoseRow, ShapeRow};
 use crate::params::SPECULATIVE_DISTANCE;
+
+/// What the narrow phase keeps from step to step.
+#[derive(Default)]
+pub(super) struct Narrow {
+    /// Sorted by shape pair.
+    pub candidates: Vec<Candidate>,
+    pub last_candidates: Vec<Candidate>,
+    /// Candidates by [`Kind`].
+    pub of_kind: [Vec<u32>; 3],
+    /// Shapes as the lane kernels read them.
+    pub shapes: Vec<ShapeRow>,
+    /// The set of contacts is not that of the lanes.
+    pub is_changed: bool,
+    /// The jobs are all candidates, with their present contacts.
+    pub jobs_are_current: bool,
+    poses: Vec<PoseRow>,
+    jobs: [Jobs; 3],
+    /// New contacts, in the order in which they were met.
+    fresh: Vec<Contact>,
+    last_contacts: Vec<Contact>,
+    /// Contacts there were after the last update.
+    count: usize,
+}
+
+/// `Candidate::contact` of a pair that has just begun to touch: this bit and its place in `fresh`.
+const FRESH: u32 = 1 << 31;
 
 impl World {
     /// Collides every candidate and hands the last step's impulses on by feature id.
     ///
-    /// Both lists are sorted by shape pair, so that matching is one walk along both.
+    /// Contacts are updated where they lie, and sorted anew only if one came or went.
     pub(super) fn update_contacts(&mut self) {
-        std::mem::swap(&mut self.contacts, &mut self.last_contacts);
-        self.contacts.clear();
-        let mut last = self.last_contacts.iter().peekable();
+        let narrow = &mut self.narrow;
+        if narrow.count != self.contacts.len() {
+            // Somebody else changed the list: what candidates remember of it means nothing.
+            self.contacts.clear();
+            narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
+            (narrow.is_changed, narrow.jobs_are_current) = (true, false);
+        }
+        if self.settings.record_impulses {
+            self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
+        }
+        let bodies = &self.bodies;
+        narrow.poses.clear();
+        narrow.poses.extend((0..bodies.len()).map(|i| PoseRow {
+            position: [
+                bodies.position_x[i],
+                bodies.position_y[i],
+                bodies.position_x_rest[i],
+                bodies.position_y_rest[i],
+            ],
+            rotation: [bodies.rotation_cos[i], bodies.rotation_sin[i], 0.0, 0.0],
+        }));
+        narrow.list_jobs(self.contacts.len());
+
+        let Narrow { candidates, jobs, fresh, is_changed, poses, shapes, .. } = narrow;
+        fresh.clear();
+        let mut change = |name: u32, contact: &Contact| {
+            let candidate = &mut candidates[name as usize];
+            candidate.contact = if contact.manifold.count == 0 {
+                NO_CONTACT
+            } else {
+                fresh.push(Contact { manifold: contact.manifold, ..candidate.without_manifold() });
+                FRESH | (fresh.len() - 1) as u32
+            };
+            *is_changed = true;
+        };
+        let input = Input { poses, shapes, speculative: SPECULATIVE_DISTANCE };
         let mut points = 0;
-        for candidate in &self.candidates {
-            let (a, b) = (candidate.shape_a as usize, candidate.shape_b as usize);
-            let [pose_a, pose_b] =
-                self.bodies.relative_poses(candidate.body_a as usize, candidate.body_b as usize);
-            let mut manifold =
-                collide(&self.shapes[a], &pose_a, &self.shapes[b], &pose_b, SPECULATIVE_DISTANCE);
-            if manifold.count == 0 {
+        for kind in [Kind::Rectangles, Kind::Circles] {
+            let jobs = &jobs[kind as usize];
+            points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
+        }
+        let others = &jobs[Kind::Other as usize];
+        for (job, &name) in others.name.iter().enumerate() {
+            let [a, b] = [0, 1].map(|side| &self.shapes[others.shapes[side][job] as usize]);
+            let [body_a, body_b] = [0, 1].map(|side| others.bodies[side][job] as usize);
+            let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
+            let mut manifold = collide(a, &pose_a, b, &pose_b, SPECULATIVE_DISTANCE);
+            points += manifold.count as usize;
+            let contact = others.contact[job];
+            if contact == NO_CONTACT {
+                if manifold.count > 0 {
+                    change(name, &Contact { manifold, ..Contact::default() });
+                }
                 continue;
             }
-            points += manifold.count as usize;
-            let key = candidate.key();
-            while last.next_if(|old| old.key() < key).is_some() {}
-            if let Some(old) = last.next_if(|old| old.key() == key) {
-                manifold.take_impulses(&old.manifold);
+            let contact = &mut self.contacts[contact as usize];
+            manifold.take_impulses(&contact.manifold);
+            contact.manifold = manifold;
+            if manifold.count == 0 {
+                change(name, contact);
             }
-            self.contacts.push(Contact { manifold, ..*candidate });
         }
-        self.counts.pairs = self.candidates.len();
+        if narrow.is_changed {
+            narrow.sort_contacts(&mut self.contacts);
+        }
+        narrow.count = self.contacts.len();
+        self.counts.pairs = narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
         self.counts.points = points;
         self.counts.rows = if self.needs.friction { 2 * points } else { points };
+    }
+}
+
+impl Narrow {
+    /// Lists the candidates that are worth a look.
+    ///
+    /// Where most candidates do not touch, those whose centres are too far apart are left out
+    /// before their shapes are read; where most do, the lists of the last step still hold.
+    fn list_jobs(&mut self, contacts: usize) {
+        let cull = 4 * contacts < 3 * self.candidates.len();
+        if self.jobs_are_current && !cull {
+            return;
+        }
+        self.jobs_are_current = !cull;
+        for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
+            jobs.clear();
+            for &name in names {
+                let candidate = &mut self.candidates[name as usize];
+                if cull {
+                    let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
+                    let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
+                    if d[0] * d[0] + d[1] * d[1] > candidate.reach_squared {
+                        self.is_changed |= candidate.contact != NO_CONTACT;
+                        candidate.contact = NO_CONTACT;
+                        continue;
+                    }
+                }
+                jobs.push(name, candidate.bodies, candidate.shapes, candidate.contact);
+            }
+        }
+    }
+
+    /// Contacts in the order of their candidates: old ones that go on, and fresh ones.
+    fn sort_contacts(&mut self, contacts: &mut Vec<Contact>) {
+        std::mem::swap(contacts, &mut self.last_contacts);
+        contacts.clear();
+        for candidate in &mut self.candidates {
+            if candidate.contact == NO_CONTACT {
+                continue;
+            }
+            let from = if candidate.contact & FRESH == 0 { &self.last_contacts } else { &self.fresh };
+            let contact = from[(candidate.contact & !FRESH) as usize];
+            candidate.contact = contacts.len() as u32;
+            contacts.push(contact);
+        }
+        self.jobs_are_current = false;
     }
 }

@@ -19,7 +19,14 @@ const OPPOSITES: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinem
 
 impl World {
     /// Gives every contact its lane: by colours, or one after the other.
+    ///
+    /// The lanes of the last step hold while the set of contacts does.
     pub(super) fn assign_lanes(&mut self, needs: &Needs) {
+        let choice = Some((self.settings.width, self.settings.order, *needs));
+        if !self.narrow.is_changed && self.lanes_are_for == choice {
+            return;
+        }
+        (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
         let contacts = &self.contacts;
         let inert = self.bodies.len() as u32;
         let bodies = |contact: u32| {

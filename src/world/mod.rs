@@ -11,11 +11,15 @@ use crate::constraints::motion::{self, MotionInput};
 use crate::constraints::observe::ObservedRule;
 use crate::constraints::{Needs, StepInput, Workspace};
 use crate::contacts::Contact;
+use crate::lanes::LaneWidth;
+use crate::narrowphase::batch::{self, Kind};
 use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
 use crate::shapes::{Shape, combine};
+use collide::Narrow;
 use glam::Vec2;
 use lanes::Group;
 
+mod candidates;
 mod collide;
 mod counts;
 mod lanes;
@@ -25,11 +29,15 @@ mod settings;
 pub use counts::{Divergence, StepCounts};
 pub use settings::{Order, Settings};
 
-/// What a shape's surface is like.
+/// What is known of a shape for its contacts.
 #[derive(Clone, Copy, Debug)]
 struct Surface {
     friction: f32,
     restitution: f32,
+    /// Farthest point from the body's centre of mass (m).
+    reach: f32,
+    /// Kernel of pairs of such shapes.
+    kind: Kind,
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
@@ -56,11 +64,11 @@ pub struct World {
     proxies: Vec<Proxy>,
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
-    /// Candidates in pair order: a contact without its manifold.
-    candidates: Vec<Contact>,
-    last_contacts: Vec<Contact>,
+    narrow: Narrow,
     /// Contacts by what stands opposite: dynamic, kinematic, static.
     groups: [Group; 3],
+    /// What the present lanes were assigned for.
+    lanes_are_for: Option<(LaneWidth, Order, Needs)>,
     work: Workspace,
 }
 
@@ -82,9 +90,9 @@ impl World {
             proxies: Vec::new(),
             pairs: Vec::new(),
             pairs_are_stale: true,
-            candidates: Vec::new(),
-            last_contacts: Vec::new(),
+            narrow: Narrow::default(),
             groups: Default::default(),
+            lanes_are_for: None,
             work: Workspace::default(),
         }
     }
@@ -101,10 +109,18 @@ impl World {
         for part in &body.shapes {
             let shape = part.shape.translated(-center);
             let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
+            let mut reach = 0.0_f32;
+            shape.for_each_vertex(|v| reach = reach.max(v.length()));
+            let (kind, row) = batch::classify(&shape);
+            self.narrow.shapes.push(row);
             self.shapes.push(shape);
             self.shape_body.push(index as u32);
-            self.surfaces
-                .push(Surface { friction: part.friction as f32, restitution: part.restitution as f32 });
+            self.surfaces.push(Surface {
+                friction: part.friction as f32,
+                restitution: part.restitution as f32,
+                reach: reach + shape.radius(),
+                kind,
+            });
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }

@@ -2,7 +2,6 @@
 
 use super::World;
 use crate::bodies::BodyKind;
-use crate::contacts::Contact;
 use crate::params::{AABB_MARGIN, SPECULATIVE_DISTANCE};
 
 impl World {
@@ -24,20 +23,6 @@ impl World {
         }
         self.pairs_are_stale = false;
         self.broadphase.pairs(&self.proxies, &mut self.pairs);
-        self.candidates.clear();
-        for &[i, j] in &self.pairs {
-            let dynamic = |shape: u32| self.proxies[shape as usize].dynamic;
-            let (a, b) = if dynamic(j) { (i, j) } else { (j, i) };
-            let (surface_a, surface_b) = (self.surfaces[a as usize], self.surfaces[b as usize]);
-            self.candidates.push(Contact {
-                shape_a: a,
-                shape_b: b,
-                body_a: self.shape_body[a as usize],
-                body_b: self.shape_body[b as usize],
-                friction: (surface_a.friction * surface_b.friction).sqrt(),
-                restitution: surface_a.restitution.max(surface_b.restitution),
-                ..Contact::default()
-            });
-        }
+        self.update_candidates();
     }
 }

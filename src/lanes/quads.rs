@@ -1,0 +1,372 @@
+//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere.
+//!
+//! A record is `STRIDE` quads; quad `OFFSET` of `W` records is loaded and transposed in
+//! registers. The transposes stay inside 128-bit lanes: 128-bit lane `q` of vector `k` is loaded
+//! from record `4q + k`, so that one 4 × 4 transpose of each 128-bit lane (8 shuffles for any
+//! width) puts component `c` of records `0..W`, in order, into vector `c`.
+
+use bytemuck::{Pod, Zeroable};
+use wide::{f32x4, f32x8, f32x16};
+
+/// Four floats, aligned to be one load.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Quad(pub [f32; 4]);
+
+/// Quad `OFFSET` of record `index[lane]`.
+///
+/// # Safety
+/// `lane < index.len()` and `index[lane] * STRIDE + OFFSET < quads.len()`.
+#[inline(always)]
+unsafe fn at<const STRIDE: usize, const OFFSET: usize>(
+    quads: &[Quad],
+    index: &[u32],
+    lane: usize,
+) -> *const f32 {
+    debug_assert!(lane < index.len() && index[lane] as usize * STRIDE + OFFSET < quads.len());
+    // SAFETY: both bounds are the caller's promise.
+    unsafe { quads.as_ptr().add(*index.get_unchecked(lane) as usize * STRIDE + OFFSET).cast() }
+}
+
+/// As [`at`], to write.
+///
+/// # Safety
+/// `lane < index.len()` and `index[lane] * STRIDE + OFFSET < quads.len()`.
+#[inline(always)]
+unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(
+    quads: &mut [Quad],
+    index: &[u32],
+    lane: usize,
+) -> *mut f32 {
+    debug_assert!(lane < index.len() && index[lane] as usize * STRIDE + OFFSET < quads.len());
+    // SAFETY: both bounds are the caller's promise.
+    unsafe { quads.as_mut_ptr().add(*index.get_unchecked(lane) as usize * STRIDE + OFFSET).cast() }
+}
+
+/// # Safety
+/// `index` holds at least 1 entry, whose quad exists.
+#[inline(always)]
+pub unsafe fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [f32; 4] {
+    // SAFETY: the caller keeps `index` in bounds; a quad is four floats.
+    unsafe { *at::<S, O>(quads, index, 0).cast::<[f32; 4]>() }
+}
+
+/// # Safety
+/// `index` holds at least 1 entry, whose quad exists.
+#[inline(always)]
+pub unsafe fn scatter_1<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [f32; 4]) {
+    // SAFETY: the caller keeps `index` in bounds; a quad is four floats.
+    unsafe { *at_mut::<S, O>(quads, index, 0).cast::<[f32; 4]>() = v }
+}
+
+/// # Safety
+/// `index` holds at least 1 entry, whose quads exist.
+#[inline(always)]
+pub unsafe fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
+    quads: &mut [Quad],
+    index: &[u32],
+    v: [f32; 4],
+) {
+    // SAFETY: the caller keeps `index` in bounds; the second half of a quad is two floats.
+    unsafe {
+        *at_mut::<S, O>(quads, index, 0).add(2).cast::<[f32; 2]>() = [v[0], v[1]];
+        *at_mut::<S, P>(quads, index, 0).add(2).cast::<[f32; 2]>() = [v[2], v[3]];
+    }
+}
+
+/// # Safety
+/// `index` holds at least 4 entries, whose quads exist.
+#[inline(always)]
+pub unsafe fn gather_4<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [f32x4; 4] {
+    // SAFETY: the caller keeps `index` in bounds; quads are aligned as `f32x4` is.
+    f32x4::transpose(unsafe {
+        [
+            *at::<S, O>(quads, index, 0).cast::<f32x4>(),
+            *at::<S, O>(quads, index, 1).cast::<f32x4>(),
+            *at::<S, O>(quads, index, 2).cast::<f32x4>(),
+            *at::<S, O>(quads, index, 3).cast::<f32x4>(),
+        ]
+    })
+}
+
+/// # Safety
+/// `index` holds at least 4 entries, whose quads exist.
+#[inline(always)]
+pub unsafe fn scatter_4<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [f32x4; 4]) {
+    for (lane, quad) in f32x4::transpose(v).into_iter().enumerate() {
+        // SAFETY: the caller keeps `index` in bounds; quads are aligned as `f32x4` is.
+        unsafe { *at_mut::<S, O>(quads, index, lane).cast::<f32x4>() = quad }
+    }
+}
+
+/// # Safety
+/// `index` holds at least 4 entries, whose quads exist.
+#[inline(always)]
+pub unsafe fn scatter_halves_4<const S: usize, const O: usize, const P: usize>(
+    quads: &mut [Quad],
+    index: &[u32],
+    v: [f32x4; 4],
+) {
+    for (lane, quad) in f32x4::transpose(v).into_iter().enumerate() {
+        // SAFETY: the caller keeps lane `lane` of `index` in bounds.
+        unsafe { scatter_halves_1::<S, O, P>(quads, &index[lane..], quad.to_array()) }
+    }
+}
+
+#[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
+pub use avx::{gather_8, scatter_8, scatter_halves_8};
+#[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
+pub use avx512::{gather_16, scatter_16, scatter_halves_16};
+#[cfg(not(all(target_arch = "x86_64", target_feature = "avx")))]
+pub use halves::{gather_8, scatter_8, scatter_halves_8};
+#[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
+pub use halves::{gather_16, scatter_16, scatter_halves_16};
+
+/// The module of one register width. `$lanes` 128-bit lanes a register.
+macro_rules! registers {
+    ($module:ident, $register:ident, $float:ident, $class:ident, $lanes:literal, $unpacklo:ident, $unpackhi:ident,
+     $shuffle:ident, $gather:ident, $scatter:ident, $halves:ident, |$quads:ident| $join:expr, |$row:ident| $split:expr) => {
+        mod $module {
+            use super::*;
+            use std::arch::x86_64::*;
+
+            /// Transposes the 4 × 4 block in each 128-bit lane.
+            #[inline(always)]
+            fn transpose(r: [$register; 4]) -> [$register; 4] {
+                // SAFETY: the instructions are target features of this build.
+                unsafe {
+                    let ab_lo = $unpacklo(r[0], r[1]);
+                    let cd_lo = $unpacklo(r[2], r[3]);
+                    let ab_hi = $unpackhi(r[0], r[1]);
+                    let cd_hi = $unpackhi(r[2], r[3]);
+                    [
+                        $shuffle::<0b01_00_01_00>(ab_lo, cd_lo),
+                        $shuffle::<0b11_10_11_10>(ab_lo, cd_lo),
+                        $shuffle::<0b01_00_01_00>(ab_hi, cd_hi),
+                        $shuffle::<0b11_10_11_10>(ab_hi, cd_hi),
+                    ]
+                }
+            }
+
+            /// Quads of records `k`, `4 + k`, …, one per 128-bit lane.
+            ///
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quad exists.
+            #[inline(always)]
+            unsafe fn load<const S: usize, const O: usize>(quads: &[Quad], index: &[u32], k: usize) -> $register {
+                // SAFETY: SSE is a target feature of this build.
+                let mut $quads = [unsafe { _mm_setzero_ps() }; $lanes];
+                for (q, quad) in $quads.iter_mut().enumerate() {
+                    // SAFETY: the caller keeps `index` in bounds; quads are aligned.
+                    *quad = unsafe { _mm_load_ps(at::<S, O>(quads, index, 4 * q + k)) };
+                }
+                // SAFETY: the instructions are target features of this build.
+                unsafe { $join }
+            }
+
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quad exists.
+            #[inline(always)]
+            pub unsafe fn $gather<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [$float; 4] {
+                // SAFETY: the caller keeps `index` in bounds. Calls written out, because a
+                // closure under `map` is not always inlined.
+                let t = transpose(unsafe {
+                    [
+                        load::<S, O>(quads, index, 0),
+                        load::<S, O>(quads, index, 1),
+                        load::<S, O>(quads, index, 2),
+                        load::<S, O>(quads, index, 3),
+                    ]
+                });
+                [from(t[0]), from(t[1]), from(t[2]), from(t[3])]
+            }
+
+            /// The quads of records `k`, `4 + k`, … for k in 0..4.
+            #[inline(always)]
+            fn rows(v: [$float; 4]) -> [[__m128; $lanes]; 4] {
+                let t = transpose([into(v[0]), into(v[1]), into(v[2]), into(v[3])]);
+                let row = |$row: $register| {
+                    let $row = barrier($row);
+                    // SAFETY: the instructions are target features of this build.
+                    unsafe { $split }
+                };
+                [row(t[0]), row(t[1]), row(t[2]), row(t[3])]
+            }
+
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quad exists.
+            #[inline(always)]
+            pub unsafe fn $scatter<const S: usize, const O: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [$float; 4],
+            ) {
+                for (k, row) in rows(v).into_iter().enumerate() {
+                    for (q, quad) in row.into_iter().enumerate() {
+                        // SAFETY: the caller keeps `index` in bounds; quads are aligned.
+                        unsafe { _mm_store_ps(at_mut::<S, O>(quads, index, 4 * q + k), quad) }
+                    }
+                }
+            }
+
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quads exist.
+            #[inline(always)]
+            pub unsafe fn $halves<const S: usize, const O: usize, const P: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [$float; 4],
+            ) {
+                for (k, row) in rows(v).into_iter().enumerate() {
+                    for (q, quad) in row.into_iter().enumerate() {
+                        // SAFETY: the caller keeps `index` in bounds; the second half of a
+                        // quad is the two floats that each instruction stores.
+                        unsafe {
+                            let quad = _mm_castps_pd(quad);
+                            _mm_storel_pd(at_mut::<S, O>(quads, index, 4 * q + k).add(2).cast(), quad);
+                            _mm_storeh_pd(at_mut::<S, P>(quads, index, 4 * q + k).add(2).cast(), quad);
+                        }
+                    }
+                }
+            }
+
+            /// Keeps a transposed register whole: without it the optimiser splits the
+            /// transpose into 128-bit shuffles, one set per extracted lane.
+            #[inline(always)]
+            fn barrier(mut v: $register) -> $register {
+                // SAFETY: an empty instruction that claims to read and write one register.
+                unsafe {
+                    std::arch::asm!("/* {0} */", inout($class) v, options(pure, nomem, nostack, preserves_flags))
+                };
+                v
+            }
+
+            #[inline(always)]
+            fn from(v: $register) -> $float {
+                // SAFETY: both are the same number of plain floats.
+                unsafe { std::mem::transmute(v) }
+            }
+
+            #[inline(always)]
+            fn into(v: $float) -> $register {
+                // SAFETY: both are the same number of plain floats.
+                unsafe { std::mem::transmute(v) }
+            }
+        }
+    };
+}
+
+#[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
+registers!(
+    avx,
+    __m256,
+    f32x8,
+    ymm_reg,
+    2,
+    _mm256_unpacklo_ps,
+    _mm256_unpackhi_ps,
+    _mm256_shuffle_ps,
+    gather_8,
+    scatter_8,
+    scatter_halves_8,
+    |quads| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(quads[0]), quads[1]),
+    |row| [_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row)]
+);
+
+#[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
+registers!(
+    avx512,
+    __m512,
+    f32x16,
+    zmm_reg,
+    4,
+    _mm512_unpacklo_ps,
+    _mm512_unpackhi_ps,
+    _mm512_shuffle_ps,
+    gather_16,
+    scatter_16,
+    scatter_halves_16,
+    |quads| {
+        let v = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(quads[0]), quads[1]);
+        _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(v, quads[2]), quads[3])
+    },
+    |row| [
+        _mm512_castps512_ps128(row),
+        _mm512_extractf32x4_ps::<1>(row),
+        _mm512_extractf32x4_ps::<2>(row),
+        _mm512_extractf32x4_ps::<3>(row),
+    ]
+);
+
+/// Widths without instructions of their own: two of half the width, joined.
+#[allow(dead_code)]
+mod halves {
+    use super::*;
+
+    macro_rules! halves {
+        ($whole:ident, $half:ident, $gather:ident, $scatter:ident, $halves:ident, $gather_half:ident, $scatter_half:ident,
+         $halves_half:ident, $lanes:literal) => {
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quad exists.
+            #[inline(always)]
+            pub unsafe fn $gather<const S: usize, const O: usize>(
+                quads: &[Quad],
+                index: &[u32],
+            ) -> [$whole; 4] {
+                // SAFETY: the caller keeps the indices in bounds.
+                let (a, b) = unsafe {
+                    (
+                        super::$gather_half::<S, O>(quads, index),
+                        super::$gather_half::<S, O>(quads, &index[$lanes..]),
+                    )
+                };
+                std::array::from_fn(|c| bytemuck::cast([a[c], b[c]]))
+            }
+
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quad exists.
+            #[inline(always)]
+            pub unsafe fn $scatter<const S: usize, const O: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [$whole; 4],
+            ) {
+                let v: [[$half; 2]; 4] = bytemuck::cast(v);
+                // SAFETY: the caller keeps the indices in bounds.
+                unsafe {
+                    super::$scatter_half::<S, O>(quads, index, v.map(|v| v[0]));
+                    super::$scatter_half::<S, O>(quads, &index[$lanes..], v.map(|v| v[1]));
+                }
+            }
+
+            /// # Safety
+            /// `index` holds an entry for every lane, whose quads exist.
+            #[inline(always)]
+            pub unsafe fn $halves<const S: usize, const O: usize, const P: usize>(
+                quads: &mut [Quad],
+                index: &[u32],
+                v: [$whole; 4],
+            ) {
+                let v: [[$half; 2]; 4] = bytemuck::cast(v);
+                // SAFETY: the caller keeps the indices in bounds.
+                unsafe {
+                    super::$halves_half::<S, O, P>(quads, index, v.map(|v| v[0]));
+                    super::$halves_half::<S, O, P>(quads, &index[$lanes..], v.map(|v| v[1]));
+                }
+            }
+        };
+    }
+
+    halves!(f32x8, f32x4, gather_8, scatter_8, scatter_halves_8, gather_4, scatter_4, scatter_halves_4, 4);
+    halves!(
+        f32x16,
+        f32x8,
+        gather_16,
+        scatter_16,
+        scatter_halves_16,
+        gather_8,
+        scatter_8,
+        scatter_halves_8,
+        8
+    );
+}

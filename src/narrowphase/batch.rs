@@ -1,0 +1,245 @@
+//! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
+
+use super::lanes::{Pair, PoseRow, ShapeRow, Touch};
+use super::{circles, rectangles};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{LaneWidth, Lanes, Quad};
+use crate::shapes::Shape;
+use wide::{f32x4, f32x8, f32x16};
+
+/// Which kernel a pair of shapes has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`rectangles`]
+    Rectangles,
+    /// [`circles`]
+    Circles,
+    /// None: [`super::collide`], one by one.
+    Other,
+}
+
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 3] = [Kind::Rectangles, Kind::Circles, Kind::Other];
+}
+
+/// The kind of pairs of two such shapes, and the shape's row.
+pub fn classify(shape: &Shape) -> (Kind, ShapeRow) {
+    if let Some(row) = ShapeRow::rectangle(shape) {
+        (Kind::Rectangles, row)
+    } else if let Some(row) = ShapeRow::circle(shape) {
+        (Kind::Circles, row)
+    } else {
+        (Kind::Other, ShapeRow::default())
+    }
+}
+
+/// Pairs of one kind, one entry each in every list.
+#[derive(Debug, Default)]
+pub struct Jobs {
+    /// What the caller calls the pair.
+    pub name: Vec<u32>,
+    /// Bodies of a and b.
+    pub bodies: [Vec<u32>; 2],
+    /// Shapes a and b.
+    pub shapes: [Vec<u32>; 2],
+    /// The contact that holds the manifold, or [`NO_CONTACT`].
+    pub contact: Vec<u32>,
+}
+
+/// A pair that has not touched so far.
+pub const NO_CONTACT: u32 = u32::MAX;
+
+impl Jobs {
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        for list in [name, a, b, c, d, contact] {
+            list.clear();
+        }
+    }
+
+    /// Adds a pair.
+    #[inline]
+    pub fn push(&mut self, name: u32, bodies: [u32; 2], shapes: [u32; 2], contact: u32) {
+        self.name.push(name);
+        self.contact.push(contact);
+        for side in 0..2 {
+            self.bodies[side].push(bodies[side]);
+            self.shapes[side].push(shapes[side]);
+        }
+    }
+}
+
+/// What the kernels read besides the jobs.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    /// Poses by body.
+    pub poses: &'a [PoseRow],
+    /// Shapes by number; those of another kind are not looked at.
+    pub shapes: &'a [ShapeRow],
+    /// Points farther apart are left out (m).
+    pub speculative: f32,
+}
+
+/// Collides every job and updates its contact: geometry anew, impulses kept where the feature
+/// stays the same. Returns the number of points.
+///
+/// A contact that has no point any more gets count 0, and `change(name, contact)` is called for
+/// it; a pair without a contact that touches is reported by the same call. Behind `contacts`
+/// stands room for one more batch, in which such manifolds are made.
+///
+/// # Panics
+/// If a job names a body, shape or contact that does not exist: the check on which the gathers
+/// and scatters below rest.
+pub fn update(
+    kind: Kind,
+    width: LaneWidth,
+    jobs: &Jobs,
+    input: Input,
+    contacts: &mut Vec<Contact>,
+    change: impl FnMut(u32, &Contact),
+) -> usize {
+    let count = jobs.name.len();
+    let below = |list: &[u32], limit: usize| {
+        assert!(list.len() == count && list.iter().all(|&i| (i as usize) < limit));
+    };
+    jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
+    jobs.shapes.iter().for_each(|list| below(list, input.shapes.len()));
+    assert!(jobs.contact.len() == count);
+    let made = contacts.len();
+    assert!(jobs.contact.iter().all(|&i| (i as usize) < made || i == NO_CONTACT));
+    contacts.resize(made + width.lanes(), Contact::default());
+    let run = match width {
+        LaneWidth::W1 => run::<f32>,
+        LaneWidth::W4 => run::<f32x4>,
+        LaneWidth::W8 => run::<f32x8>,
+        LaneWidth::W16 => run::<f32x16>,
+    };
+    let points = run(kind, jobs, input, contacts, made, change);
+    contacts.truncate(made);
+    points
+}
+
+fn run<L: Lanes>(
+    kind: Kind,
+    jobs: &Jobs,
+    input: Input,
+    contacts: &mut [Contact],
+    made: usize,
+    change: impl FnMut(u32, &Contact),
+) -> usize {
+    match kind {
+        Kind::Rectangles => run_kernel(rectangles::collide::<L>, jobs, input, contacts, made, change),
+        Kind::Circles => run_kernel(circles::collide::<L>, jobs, input, contacts, made, change),
+        Kind::Other => unreachable!("a kind without a kernel"),
+    }
+}
+
+/// `contacts[made..]` is the room for a batch of new manifolds.
+#[inline(always)]
+fn run_kernel<L: Lanes>(
+    kernel: impl Fn(&Pair<L>, f32) -> Touch<L>,
+    jobs: &Jobs,
+    input: Input,
+    contacts: &mut [Contact],
+    made: usize,
+    mut change: impl FnMut(u32, &Contact),
+) -> usize {
+    let mut points = 0;
+    let count = jobs.name.len();
+    for first in (0..count).step_by(L::WIDTH) {
+        // The last batch is filled up with its first pair, whose result goes to the spare room.
+        let mut padded = [[0; 16]; 5];
+        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1], &jobs.contact];
+        let filled = (count - first).min(L::WIDTH);
+        let [body_a, body_b, shape_a, shape_b, _] = lists.map(|list| &list[first..]);
+        let ends = [body_a, body_b, shape_a, shape_b];
+        let [body_a, body_b, shape_a, shape_b] = if filled == L::WIDTH {
+            ends
+        } else {
+            for (padded, list) in padded.iter_mut().zip(ends) {
+                padded.fill(list[0]);
+                padded[..filled].copy_from_slice(list);
+            }
+            [&padded[0][..], &padded[1][..], &padded[2][..], &padded[3][..]]
+        };
+        let known = &jobs.contact[first..first + filled];
+        let mut target = [0; 16];
+        for (lane, target) in target.iter_mut().enumerate().take(L::WIDTH) {
+            let spare = (made + lane) as u32;
+            *target = match known.get(lane) {
+                Some(&contact) if contact != NO_CONTACT => contact,
+                _ => {
+                    contacts[made + lane].manifold.count = 0;
+                    spare
+                }
+            };
+        }
+        // SAFETY: `update` checked all indices; padding repeats one of them.
+        let pair =
+            unsafe { Pair::<L>::gather(input.poses, input.shapes, [body_a, body_b], [shape_a, shape_b]) };
+        let touch = kernel(&pair, input.speculative);
+        // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
+        // no two lanes have the same.
+        unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };
+        for lane in 0..filled {
+            let contact = &contacts[target[lane] as usize];
+            points += contact.manifold.count as usize;
+            if (contact.manifold.count > 0) != (known[lane] != NO_CONTACT) {
+                change(jobs.name[first + lane], contact);
+            }
+        }
+    }
+    points
+}
+
+/// Writes manifolds into contacts; a point keeps the impulses of the old one of its name.
+///
+/// Integers are moved and compared as the bits of floats: equal bits of numbers below 2²³ are
+/// equal (tiny) floats. The name of an old point that is not in use is NaN, which equals nothing.
+///
+/// # Safety
+/// `target` holds at least `L::WIDTH` entries, all different, each a contact of which `contacts`
+/// has all quads.
+#[inline(always)]
+unsafe fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: &[u32]) {
+    use quad::*;
+    // SAFETY: the caller's promise.
+    let (header, old) = unsafe {
+        (
+            L::gather_quads::<STRIDE, HEADER>(contacts, target),
+            [
+                L::gather_quads::<STRIDE, STATE_0>(contacts, target),
+                L::gather_quads::<STRIDE, STATE_1>(contacts, target),
+            ],
+        )
+    };
+    let (zero, nothing) = (L::zero(), L::splat(f32::NAN));
+    let count = touch.count.integer_bits();
+    let two = L::splat(2.0).integer_bits();
+    let old_name =
+        [header[2].select_equal(zero, nothing, old[0][1]), header[2].select_equal(two, old[1][1], nothing)];
+    let state = |p: usize| {
+        let name = touch.feature[p].integer_bits();
+        let used = touch.count - L::splat(p as f32);
+        let keep = |k: usize| {
+            let matched =
+                name.select_equal(old_name[0], old[0][k], name.select_equal(old_name[1], old[1][k], zero));
+            used.select_positive(matched, zero)
+        };
+        [touch.separation[p], name, keep(2), keep(3)]
+    };
+    let anchors =
+        |p: usize| [touch.anchor_a[p][0], touch.anchor_a[p][1], touch.anchor_b[p][0], touch.anchor_b[p][1]];
+    let header = [touch.normal[0], touch.normal[1], count, header[3]];
+    let (state_0, state_1) = (state(0), state(1));
+    // SAFETY: the caller's promise.
+    unsafe {
+        L::scatter_quads::<STRIDE, ANCHORS_0>(contacts, target, anchors(0));
+        L::scatter_quads::<STRIDE, STATE_0>(contacts, target, state_0);
+        L::scatter_quads::<STRIDE, ANCHORS_1>(contacts, target, anchors(1));
+        L::scatter_quads::<STRIDE, STATE_1>(contacts, target, state_1);
+        L::scatter_quads::<STRIDE, HEADER>(contacts, target, header);
+    }
+}
