@@ -3,16 +3,15 @@
 use super::batches::{Batches, PADDING, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::sweep::over_segments;
-use crate::contacts::Contact;
-use crate::lanes::{BodyRow, Lanes};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{BodyRow, Lanes, Quad};
 
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;
 
-/// Fills the records of a segment.
+/// Fills the records of a segment, in lanes throughout: contacts are gathered by quads.
 ///
-/// Lane by lane the geometry is copied and the arms r × n and r × t = −(r·n) are formed;
-/// then, in lanes, the effective masses 1/k with
+/// The arms are r × n and r × t = −(r·n); the effective masses 1/k with
 /// k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)², u = n and t.
 ///
 /// Lanes without a contact, and points that a contact does not have, get effective mass
@@ -24,74 +23,88 @@ fn prepare_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
     segment: &Segment,
     contacts: &[Contact],
 ) {
+    use quad::*;
     let layout = const { Layout::of::<N, O>() };
     let stride = layout.stride;
+    let quads: &[Quad] = bytemuck::cast_slice(contacts);
     let slab: &mut [L] = bytemuck::cast_slice_mut(&mut batches.slab);
     let records = &mut slab[segment.first_vector..][..segment.batches * stride];
     for (batch, record) in records.chunks_exact_mut(stride).enumerate() {
         let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
-        for (lane, &contact) in batches.contact[lanes.clone()].iter().enumerate() {
-            let mut put = |quantity: usize, value: f32| floats[quantity * L::WIDTH + lane] = value;
-            if contact == PADDING {
-                (0..stride).for_each(|quantity| put(quantity, 0.0));
-                continue;
+        let mut index = &batches.contact[lanes.clone()];
+        // Only a segment's last batch has empty lanes. They read some contact and ignore it.
+        let (mut replaced, mut present) = ([0; 16], L::splat(1.0));
+        if index[L::WIDTH - 1] == PADDING {
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut present));
+            for (lane, &contact) in index.iter().enumerate() {
+                let padding = contact == PADDING;
+                replaced[lane] = if padding { index[0] } else { contact };
+                floats[lane] = if padding { 0.0 } else { 1.0 };
             }
-            let contact = &contacts[contact as usize];
-            let n = contact.manifold.normal;
-            put(0, n.x);
-            put(1, n.y);
-            if N::FRICTION {
-                put(layout.friction, contact.friction);
-            }
-            for p in 0..N::POINTS {
-                let point = &contact.manifold.points[p];
-                let active = (p as u32) < contact.manifold.count;
-                let active = if active { 1.0 } else { 0.0 };
-                if N::ROTATION {
-                    put(layout.at(p, layout.arm_b), active * point.anchor_b.perp_dot(n));
-                    put(layout.at(p, layout.arm_b) + 1, -active * point.anchor_b.dot(n));
-                    if O::HAS_ROW {
-                        put(layout.at(p, layout.arm_a), active * point.anchor_a.perp_dot(n));
-                        put(layout.at(p, layout.arm_a) + 1, -active * point.anchor_a.dot(n));
-                    }
-                }
-                put(layout.at(p, layout.separation), active * point.separation);
-                put(layout.at(p, layout.normal_mass), active);
-                put(layout.at(p, layout.normal_impulse), active * point.normal_impulse);
-                if N::FRICTION {
-                    put(layout.at(p, layout.tangent_impulse), active * point.tangent_impulse);
-                }
-            }
+            index = &replaced;
         }
-
-        // SAFETY: `Problem::new` checked every row index against the rows.
-        let b = unsafe { L::gather(rows, &batches.row_b[lanes.clone()]) };
-        let a = if O::MOVES {
-            // SAFETY: as above.
-            unsafe { L::gather(rows, &batches.row_a[lanes]) }
-        } else {
-            [L::zero(); 8]
+        // SAFETY: `Problem::new` checked every row and contact index.
+        let ([nx, ny, count, friction], a, b) = unsafe {
+            (
+                L::gather_quads::<STRIDE, HEADER>(quads, index),
+                if O::MOVES { L::gather(rows, &batches.row_a[lanes.clone()]) } else { [L::zero(); 8] },
+                L::gather(rows, &batches.row_b[lanes]),
+            )
         };
+        let filled = |value: L| present.select_positive(value, L::zero());
+        (record[0], record[1]) = (filled(nx), filled(ny));
+        if N::FRICTION {
+            record[layout.friction] = filled(friction);
+        }
+        let two = L::splat(2.0).integer_bits();
         for p in 0..N::POINTS {
+            // SAFETY: as above.
+            let ([ax, ay, bx, by], [separation, _, normal, tangent]) = unsafe {
+                if p == 0 {
+                    (
+                        L::gather_quads::<STRIDE, ANCHORS_0>(quads, index),
+                        L::gather_quads::<STRIDE, STATE_0>(quads, index),
+                    )
+                } else {
+                    (
+                        L::gather_quads::<STRIDE, ANCHORS_1>(quads, index),
+                        L::gather_quads::<STRIDE, STATE_1>(quads, index),
+                    )
+                }
+            };
+            // Counts are integers, compared as the bits of floats.
+            let active = if p == 0 {
+                count.select_equal(L::zero(), L::zero(), present)
+            } else {
+                count.select_equal(two, present, L::zero())
+            };
+            let only = |value: L| active.select_positive(value, L::zero());
+            let arms = |x: L, y: L| [only(x.mul_add(ny, -(y * nx))), only(-(x.mul_add(nx, y * ny)))];
+            let (arms_a, arms_b) = (arms(ax, ay), arms(bx, by));
             let k = |axis: usize| {
                 let mut k = a[INV_MASS] + b[INV_MASS];
                 if N::ROTATION {
-                    let arm_b = record[layout.at(p, layout.arm_b) + axis];
-                    k = (b[INV_INERTIA] * arm_b).mul_add(arm_b, k);
+                    k = (b[INV_INERTIA] * arms_b[axis]).mul_add(arms_b[axis], k);
                     if O::MOVES {
-                        let arm_a = record[layout.at(p, layout.arm_a) + axis];
-                        k = (a[INV_INERTIA] * arm_a).mul_add(arm_a, k);
+                        k = (a[INV_INERTIA] * arms_a[axis]).mul_add(arms_a[axis], k);
                     }
                 }
                 k
             };
-            let active = record[layout.at(p, layout.normal_mass)];
-            let mass = |k: L| active.select_positive(L::splat(1.0) / k, L::zero());
-            let (normal, tangent) = (mass(k(0)), mass(k(1)));
-            record[layout.at(p, layout.normal_mass)] = normal;
+            if N::ROTATION {
+                let at = layout.at(p, layout.arm_b);
+                [record[at], record[at + 1]] = arms_b;
+                if O::HAS_ROW {
+                    let at = layout.at(p, layout.arm_a);
+                    [record[at], record[at + 1]] = arms_a;
+                }
+            }
+            record[layout.at(p, layout.separation)] = only(separation);
+            record[layout.at(p, layout.normal_mass)] = only(L::splat(1.0) / k(0));
+            record[layout.at(p, layout.normal_impulse)] = only(normal);
             if N::FRICTION {
-                record[layout.at(p, layout.tangent_mass)] = tangent;
+                record[layout.at(p, layout.tangent_mass)] = only(L::splat(1.0) / k(1));
+                record[layout.at(p, layout.tangent_impulse)] = only(tangent);
             }
         }
     }
@@ -101,4 +114,53 @@ fn prepare_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
 #[inline(never)]
 pub fn prepare<L: Lanes, N: KernelNeeds>(rows: &mut [BodyRow], batches: &mut Batches, contacts: &[Contact]) {
     over_segments!(prepare_segment, L, N; rows, batches, contacts);
+}
+
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes.
+#[inline(always)]
+fn store_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
+    _rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    contacts: &mut [Contact],
+) {
+    use quad::*;
+    let layout = const { Layout::of::<N, O>() };
+    let stride = layout.stride;
+    let slab: &[L] = bytemuck::cast_slice(&batches.slab);
+    let records = &slab[segment.first_vector..][..segment.batches * stride];
+    for (batch, record) in records.chunks_exact(stride).enumerate() {
+        let index = &batches.contact[segment.first_lane + batch * L::WIDTH..][..L::WIDTH];
+        let impulses = |p: usize| {
+            let tangent = if N::FRICTION { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
+            [record[layout.at(p, layout.normal_impulse)], tangent]
+        };
+        let ([n0, t0], [n1, t1]) = (impulses(0), if N::POINTS == 2 { impulses(1) } else { [L::zero(); 2] });
+        if index[L::WIDTH - 1] != PADDING {
+            // SAFETY: `Problem::new` checked every contact index.
+            unsafe {
+                let quads = bytemuck::cast_slice_mut(contacts);
+                L::scatter_halves::<STRIDE, STATE_0, STATE_1>(quads, index, [n0, t0, n1, t1]);
+            }
+            continue;
+        }
+        let floats = [n0, t0, n1, t1];
+        let floats: &[f32] = bytemuck::cast_slice(&floats);
+        for (lane, &contact) in index.iter().enumerate().take_while(|&(_, &contact)| contact != PADDING) {
+            let at = |k: usize| floats[k * L::WIDTH + lane];
+            let [first, second] = &mut contacts[contact as usize].manifold.points;
+            (first.normal_impulse, first.tangent_impulse) = (at(0), at(1));
+            (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
+        }
+    }
+}
+
+/// Writes the accumulated impulses of all segments back to their contacts.
+#[inline(never)]
+pub fn store<L: Lanes, N: KernelNeeds>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    contacts: &mut [Contact],
+) {
+    over_segments!(store_segment, L, N; rows, batches, contacts);
 }

@@ -1,6 +1,6 @@
 //! The velocity problem of one step, as solvers see it: passes over bodies and constraints.
 
-use super::batches::Batches;
+use super::batches::{Batches, PADDING};
 use super::motion::Motion;
 use super::needs::{KernelNeeds, Needs};
 use super::observe::ObservedRule;
@@ -81,7 +81,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
     /// Prepares the constraints of a step.
     ///
     /// # Panics
-    /// If a batch names a row that does not exist: the one check on which all gathers
+    /// If a batch names a row or a contact that does not exist: the one check on which all gathers
     /// and scatters of the step rest.
     pub fn new(
         work: &'a mut Workspace,
@@ -92,7 +92,10 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         for (batches, width) in [(&work.lanes, L::WIDTH), (&work.serial, 1)] {
             let rows = work.rows.len() as u32;
             assert!(batches.width == width || batches.segments.is_empty());
-            assert!(batches.row_a.iter().chain(&batches.row_b).all(|&row| row < rows));
+            let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
+            assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
+            let made = contacts.len();
+            assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
         }
         let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = work;
         prepare::prepare::<L, N>(rows, lanes, contacts);
@@ -239,18 +242,8 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             restitution::forget::<L, N>(rows, lanes, lane_bounces);
             restitution::forget::<f32, N>(rows, serial, serial_bounces);
         }
-        for batches in [lanes, serial] {
-            let width = batches.width;
-            batches.for_each_lane(&self.needs, |contact, layout, record, lane| {
-                let points = &mut self.contacts[contact as usize].manifold.points;
-                for (p, point) in points.iter_mut().enumerate().take(layout.points) {
-                    point.normal_impulse = record[layout.at(p, layout.normal_impulse) * width + lane];
-                    if layout.has_friction {
-                        point.tangent_impulse = record[layout.at(p, layout.tangent_impulse) * width + lane];
-                    }
-                }
-            });
-        }
+        prepare::store::<L, N>(rows, lanes, self.contacts);
+        prepare::store::<f32, N>(rows, serial, self.contacts);
         self.clock.lap(Phase::Store);
         self.effort
     }
