@@ -18,6 +18,7 @@ use crate::shapes::{Shape, combine};
 use collide::Narrow;
 use glam::Vec2;
 use lanes::Group;
+use traits::Traits;
 
 mod candidates;
 mod collide;
@@ -25,6 +26,7 @@ mod counts;
 mod lanes;
 mod pairs;
 mod settings;
+mod traits;
 
 pub use counts::{Divergence, StepCounts};
 pub use settings::{Order, Settings};
@@ -58,6 +60,7 @@ pub struct World {
     pub counts: StepCounts,
     /// Steps taken.
     pub step_index: u64,
+    traits: Traits,
     needs: Needs,
     surfaces: Vec<Surface>,
     broadphase: BroadPhase,
@@ -85,6 +88,7 @@ impl World {
             timings: Timings::default(),
             counts: StepCounts::default(),
             step_index: 0,
+            traits: Traits::default(),
             needs: Needs::NONE,
             surfaces: Vec::new(),
             proxies: Vec::new(),
@@ -124,7 +128,8 @@ impl World {
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }
-        self.needs = self.find_needs();
+        self.traits.add(body, self.bodies.round[index]);
+        self.needs = self.traits.needs();
         self.pairs_are_stale = true;
         index
     }
@@ -132,32 +137,6 @@ impl World {
     /// What the scene needs of its constraints.
     pub fn needs(&self) -> Needs {
         self.needs
-    }
-
-    fn find_needs(&self) -> Needs {
-        let bodies = &self.bodies;
-        let count = bodies.len();
-        let mut rubs = vec![false; count];
-        let mut has_corner = vec![false; count];
-        for (i, shape) in self.shapes.iter().enumerate() {
-            let body = self.shape_body[i] as usize;
-            rubs[body] |= self.surfaces[i].friction > 0.0;
-            has_corner[body] |= !matches!(shape, Shape::Circle { .. });
-        }
-        // A pair has the property if both bodies have it and one of them is dynamic.
-        let pair_of = |has: &[bool]| {
-            has.iter().filter(|&&h| h).count() >= 2 && (0..count).any(|i| has[i] && bodies.is_dynamic(i))
-        };
-        let friction = pair_of(&rubs);
-        let spins = (0..count).any(|i| bodies.angular_velocity[i] != 0.0 || bodies.torque[i] != 0.0);
-        let discs = (0..count).all(|i| !bodies.is_dynamic(i) || bodies.round[i]);
-        Needs {
-            rotation: friction || spins || !discs,
-            friction,
-            restitution: self.surfaces.iter().any(|s| s.restitution > 0.0),
-            two_points: pair_of(&has_corner),
-            damping: (0..count).any(|i| bodies.linear_damping[i] > 0.0 || bodies.angular_damping[i] > 0.0),
-        }
     }
 
     /// Advances by `settings.dt`.
