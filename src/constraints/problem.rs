@@ -75,6 +75,8 @@ pub struct StepInput {
     pub contact_hertz: f32,
     /// Sum impulses into [`Contact::step_impulse`].
     pub record_impulses: bool,
+    /// Points of all contacts, to count rows by.
+    pub points: usize,
 }
 
 impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
@@ -106,7 +108,6 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts, kicks, h);
         }
         clock.lap(Phase::Prepare);
-        let contacts_points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         Problem {
             work,
             contacts,
@@ -116,7 +117,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             h: input.h,
             contact_hertz: input.contact_hertz,
             record_impulses: input.record_impulses,
-            points: contacts_points,
+            points: input.points,
             effort: Effort::default(),
             kernel: PhantomData,
         }

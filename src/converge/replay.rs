@@ -125,7 +125,8 @@ impl<'a> Replay<'a> {
         let width = if sequence == Sequence::Colored { width } else { LaneWidth::W1 };
         let budget =
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
-        let input = StepInput { needs, budget, h, contact_hertz, record_impulses: false };
+        let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
+        let input = StepInput { needs, budget, h, contact_hertz, record_impulses: false, points };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],

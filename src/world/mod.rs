@@ -203,6 +203,7 @@ impl World {
             h: s.h(),
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
+            points: self.counts.points,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
