@@ -38,7 +38,7 @@ pub struct Manifold {
 /// The narrow phase writes the first five in lanes and preparation reads them in lanes, so their
 /// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(16))]
+#[repr(C, align(64))]
 pub struct Contact {
     /// Geometry at the start of the step; impulses of its last substep.
     pub manifold: Manifold,

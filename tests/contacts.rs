@@ -46,8 +46,13 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
 }
 
 /// Scenes in which contacts begin, end and slide, of every kind of pair.
-const SCENES: &[(&str, u32)] =
-    &[("crowded_plate", 60), ("circle_pile:60", 120), ("card_house", 60), ("friction_ramp", 90), ("arch", 30)];
+const SCENES: &[(&str, u32)] = &[
+    ("crowded_plate", 60),
+    ("circle_pile:60", 120),
+    ("card_house", 60),
+    ("friction_ramp", 90),
+    ("arch", 30),
+];
 
 #[test]
 fn kept_contacts_are_those_of_a_fresh_look() {

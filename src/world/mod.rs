@@ -220,15 +220,21 @@ impl World {
 
     /// Reports the first body that is out of all bounds.
     fn check(&self) -> Result<(), Divergence> {
-        for i in 0..self.bodies.len() {
-            let speed = self.bodies.velocity(i).length();
-            let spin = self.bodies.angular_velocity[i].abs();
-            let position = self.bodies.position_x[i] + self.bodies.position_y[i];
-            if !(speed <= DIVERGED_SPEED && spin <= DIVERGED_SPEED && position.is_finite()) {
-                return Err(Divergence { step: self.step_index, body: i, speed: speed.max(spin) });
-            }
+        let b = &self.bodies;
+        let bad = |i: usize| {
+            let square = b.velocity_x[i] * b.velocity_x[i] + b.velocity_y[i] * b.velocity_y[i];
+            let position = b.position_x[i] + b.position_y[i];
+            // Written so that NaN is bad, and without a branch so that it is done in lanes.
+            !((square <= DIVERGED_SPEED * DIVERGED_SPEED)
+                & (b.angular_velocity[i].abs() <= DIVERGED_SPEED)
+                & (position.abs() < f32::INFINITY))
+        };
+        if !(0..b.len()).fold(false, |any, i| any | bad(i)) {
+            return Ok(());
         }
-        Ok(())
+        let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
+        let speed = b.velocity(body).length().max(b.angular_velocity[body].abs());
+        Err(Divergence { step: self.step_index, body, speed })
     }
 
     /// Hash (FNV-1a) of every bit of the body state.

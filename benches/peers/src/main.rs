@@ -80,6 +80,7 @@ fn run(args: &Args) -> Result<(), String> {
     let path = args.out.join("peers.csv");
     let failed = |e: csv::Error| format!("{}: {e}", path.display());
     let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
+    let mut summary = vec![table::SUMMARY.to_string()];
     for (name, steps, stands) in scenes {
         let steps = args.steps.unwrap_or(if args.quick { QUICK_STEPS } else { steps });
         let outcomes = race::race(name, steps, args.repeats, stands, &contenders)?;
@@ -91,11 +92,12 @@ fn run(args: &Args) -> Result<(), String> {
         for line in table::equal_errors(&outcomes, stands) {
             println!("  {line}");
         }
+        summary.push(table::summary_line(name, &outcomes));
         for outcome in &outcomes {
             csv.serialize(table::Row::new(name, outcome)).map_err(failed)?;
         }
         csv.flush().map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    println!("\n{}", path.display());
+    println!("\n{}\n\n{}", summary.join("\n"), path.display());
     Ok(())
 }

@@ -110,6 +110,43 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     lines
 }
 
+/// One scene in the summary of all, in Markdown: defaults (n = 4) of all three engines, ours at
+/// its widest; ratios to our step of the same round, with their quartiles; errors of the last second.
+pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
+    let of = |family: &str| {
+        outcomes.iter().find(|o| {
+            let c = &o.contender;
+            o.contender.name().starts_with(family) && c.substeps == 4 && c.hertz == 30.0 && c.recycling
+        })
+    };
+    let engines = ["simpulse", "Box2D", "rapier"].map(of);
+    let [ours, box2d, rapier] = engines;
+    let cell = |o: Option<&Outcome>, of: fn(&Outcome) -> String| o.map_or(NONE.into(), of);
+    let errors = |of: fn(&crate::check::Errors) -> f64| {
+        let one = |o: Option<&Outcome>| {
+            let errors = o.filter(|o| o.failed.is_none()).and_then(|o| o.errors.as_ref());
+            errors.map_or("fails".into(), |e| significant(1e3 * of(e)))
+        };
+        engines.map(one).join(" / ")
+    };
+    let cells = [
+        scene.to_string(),
+        cell(ours, |o| o.step.map_or(NONE.into(), |q| significant(q.median))),
+        cell(box2d, |o| factor(&o.ratio)),
+        cell(box2d, |o| factor(&o.stages_ratio)),
+        cell(rapier, |o| factor(&o.ratio)),
+        errors(|e| e.penetration_mean),
+        errors(|e| e.penetration_max),
+        errors(|e| e.rms_velocity),
+    ];
+    format!("| {} |", cells.join(" | "))
+}
+
+/// Head of the summary.
+pub const SUMMARY: &str = "\
+| scene | simpulse ms | Box2D × | its stages × | rapier × | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r |
+|---|---|---|---|---|---|---|---|";
+
 /// A row of `peers.csv`.
 #[derive(Serialize)]
 pub struct Row {
