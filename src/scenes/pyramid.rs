@@ -12,25 +12,26 @@ pub(super) const LARGE: Entry =
     Entry::new("large_pyramid", "a pyramid of 5050 boxes", |_| scene("large_pyramid", 100).steps(500))
         .known(|scene, _| rests_on_ground(scene));
 
-pub(super) const MANY: Entry = Entry::new("many_pyramids", "400 pyramids of 55 boxes on 20 floors", |_| {
-    const FLOORS: u32 = 20;
-    const BASE: u32 = 10;
-    // A pyramid and a metre of air, in both directions.
-    const SPACING: f64 = BASE as f64 + 1.0;
-    let half_width = 0.5 * SPACING * f64::from(FLOORS);
-    let height = |floor: u32| SPACING * f64::from(floor);
-    let mut bodies: Vec<SceneBody> = (0..FLOORS)
-        .map(|floor| SceneBody::fixed([0.0, height(floor)], SceneShape::line(half_width)))
-        .collect();
-    for floor in 0..FLOORS {
-        for column in 0..FLOORS {
-            let left = -half_width + SPACING * f64::from(column) + 0.5;
-            bodies.extend(boxes(BASE, [left, height(floor)]));
+pub(super) const MANY: Entry =
+    Entry::new("many_pyramids", "floors with pyramids of 55 boxes, as many as there are floors", |floors| {
+        const BASE: u32 = 10;
+        // A pyramid and a metre of air, in both directions.
+        const SPACING: f64 = BASE as f64 + 1.0;
+        let half_width = 0.5 * SPACING * f64::from(floors);
+        let height = |floor: u32| SPACING * f64::from(floor);
+        let mut bodies: Vec<SceneBody> = (0..floors)
+            .map(|floor| SceneBody::fixed([0.0, height(floor)], SceneShape::line(half_width)))
+            .collect();
+        for floor in 0..floors {
+            for column in 0..floors {
+                let left = -half_width + SPACING * f64::from(column) + 0.5;
+                bodies.extend(boxes(BASE, [left, height(floor)]));
+            }
         }
-    }
-    Scene::new("many_pyramids", bodies).steps(200)
-})
-.known(|scene, _| rests_on_ground(scene));
+        Scene::new("many_pyramids", bodies).steps(200)
+    })
+    .sized(20, 1, 100, "floors")
+    .known(|scene, _| rests_on_ground(scene));
 
 fn scene(name: &str, base: u32) -> Scene {
     let corner = [-0.5 * f64::from(base), 0.0];

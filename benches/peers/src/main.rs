@@ -29,6 +29,8 @@ use std::path::PathBuf;
 const SCENES: &[(&str, u32, bool)] = &[
     ("large_pyramid", 500, true),
     ("many_pyramids", 200, true),
+    // 150 000 manifolds: no cache holds them.
+    ("many_pyramids:32", 120, true),
     ("circle_pile:2000", 500, false),
     ("tumbler", 750, false),
     ("washer", 500, false),
