@@ -1,10 +1,10 @@
 //! `simpulse capture`: freezes the contact problem of one step.
 
-use super::scene;
 use crate::capture::capture;
 use crate::error::Error;
 use crate::params::Budget;
 use crate::solvers::{self, DEFAULT};
+use crate::study::open_scene;
 use crate::truth::frozen::Frozen;
 use crate::truth::reference::reference;
 use crate::world::{Settings, World};
@@ -96,7 +96,7 @@ const PATIENCE: usize = 300;
 /// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
 /// the step, a step without contacts.
 pub fn freeze(name: &str, step: u64, run: &RunArgs) -> Result<(Frozen, Option<String>), Error> {
-    let mut world = scene(name)?.build(run.settings()?)?;
+    let mut world = open_scene(name, None, None, None)?.scene.build(run.settings()?)?;
     advance(&mut world, step)?;
     let problem = capture(&mut world, format!("{name}, step {step}"));
     if problem.contacts.is_empty() {

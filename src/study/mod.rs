@@ -126,15 +126,16 @@ impl StudyPlan {
     }
 }
 
-/// A scene of the catalogue or of a file (a name that ends in `.json`), for so many steps
-/// of length `dt` (s) if these are given; what is known about it is for that run.
+/// A scene of the catalogue or of a file (a name with a separator, or that ends in `.json`), for
+/// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
 pub fn open_scene(
     name: &str,
     seed: Option<u64>,
     steps: Option<u32>,
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
-    let mut loaded = if name.ends_with(".json") {
+    let is_path = name.ends_with(".json") || name.contains(['/', '\\']);
+    let mut loaded = if is_path {
         Loaded { scene: Scene::from_file(name)?, truth: None }
     } else {
         match seed {
