@@ -1,10 +1,11 @@
 //! Constraints: contacts as lane batches, and the row arithmetic that solvers share.
 //!
 //! Reading order: [`needs`] (what is compiled in, where a record keeps what),
-//! [`batches`] (which contact stands in which lane), [`sweep`] (the kernel),
+//! [`batches`] and [`assign`] (which contact stands in which lane), [`sweep`] (the kernel),
 //! [`prepare`], [`restitution`], [`motion`], and [`problem`], which is all that a
 //! solver sees.
 
+pub mod assign;
 pub mod batches;
 pub mod motion;
 pub mod needs;

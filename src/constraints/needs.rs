@@ -101,6 +101,11 @@ pub enum OppositeKind {
     Static,
 }
 
+impl OppositeKind {
+    /// Every kind.
+    pub const ALL: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];
+}
+
 /// Where each quantity of a constraint record stands, in lane vectors.
 ///
 /// A record is what one batch of `W` contacts keeps: `stride` vectors of `W` floats,

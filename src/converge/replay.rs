@@ -7,9 +7,9 @@
 
 use super::setup;
 use crate::clock::Clock;
-use crate::coloring::{Coloring, EXEMPT};
+use crate::constraints::assign::{Assignment, Sides};
 use crate::constraints::motion::{Integrator, MotionInput, RotationUpdate};
-use crate::constraints::{Batches, Layout, OppositeKind, StepInput, Workspace};
+use crate::constraints::{OppositeKind, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::error::Error;
 use crate::lanes::{BodyRow, LaneWidth};
@@ -200,7 +200,7 @@ impl<'a> Replay<'a> {
         };
         let row = |(i, c): (usize, &ProblemContact)| {
             let contact = &self.scratch[self.places[i].0];
-            let stiff = self.opposite(contact) != OppositeKind::Dynamic;
+            let stiff = opposite(self.problem, contact) != OppositeKind::Dynamic;
             match rule.law(stiff, moved(c) as f32, 1.0 / diagonal[i][0]) {
                 Some(law) => OwnRow { bias: law.bias, compliance: law.compliance },
                 None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
@@ -210,51 +210,28 @@ impl<'a> Replay<'a> {
         Some(OwnLaw { rows, friction: rule.friction })
     }
 
-    fn opposite(&self, contact: &Contact) -> OppositeKind {
-        match self.problem.bodies.get(contact.body_a as usize) {
-            None => OppositeKind::Static,
-            Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
-            Some(_) => OppositeKind::Dynamic,
+    /// Gives every contact its lane, as a world's step does.
+    fn assign_lanes(&mut self, sequence: Sequence) {
+        let problem = self.problem;
+        let sides =
+            Sides { bodies: problem.bodies.len(), opposite: |contact: &Contact| opposite(problem, contact) };
+        let (work, needs, contacts) = (&mut self.work, &self.input.needs, &self.contacts);
+        let mut assignment = Assignment::default();
+        if sequence == Sequence::Colored {
+            assignment.colored(work, self.width, needs, contacts, &sides);
+        } else {
+            let order = sequence.order(contacts.len()).into_iter();
+            assignment.serial(work, needs, contacts, order, &sides);
         }
     }
+}
 
-    /// Gives every contact its lane, by the rules of a world's step.
-    fn assign_lanes(&mut self, sequence: Sequence) {
-        let inert = self.problem.bodies.len() as u32;
-        let (mut lanes, mut serial) = (Batches::default(), Batches::default());
-        lanes.clear(self.width.lanes());
-        serial.clear(1);
-        let bodies = |i: u32| [self.contacts[i as usize].body_a, self.contacts[i as usize].body_b];
-        let kind = |i: u32| self.opposite(&self.contacts[i as usize]);
-        let layout = |kind| Layout::for_needs(&self.input.needs, kind);
-        let order = sequence.order(self.contacts.len());
-        if sequence == Sequence::Colored {
-            for opposite in [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static] {
-                let group: Vec<u32> = order.iter().copied().filter(|&i| kind(i) == opposite).collect();
-                let edge = |&i: &u32| {
-                    let [a, b] = bodies(i);
-                    [if opposite == OppositeKind::Dynamic { a } else { EXEMPT }, b]
-                };
-                let edges: Vec<[u32; 2]> = group.iter().map(edge).collect();
-                let mut coloring = Coloring::new();
-                coloring.assign(&edges, inert as usize);
-                let contact = |&edge: &u32| group[edge as usize];
-                for color in 0..coloring.colors() {
-                    let edges = coloring.color(color).iter().map(contact);
-                    lanes.push_segment(opposite, &layout(opposite), edges, inert, bodies);
-                }
-                let rest = coloring.overflow().iter().map(contact);
-                serial.push_segment(opposite, &layout(opposite), rest, inert, bodies);
-            }
-        } else {
-            for run in order.chunk_by(|&i, &j| kind(i) == kind(j)) {
-                let opposite = kind(run[0]);
-                serial.push_segment(opposite, &layout(opposite), run.iter().copied(), inert, bodies);
-            }
-        }
-        lanes.reserve_slab();
-        serial.reserve_slab();
-        (self.work.lanes, self.work.serial) = (lanes, serial);
+/// What stands opposite the dynamic body of a contact.
+fn opposite(problem: &ContactProblem, contact: &Contact) -> OppositeKind {
+    match problem.bodies.get(contact.body_a as usize) {
+        None => OppositeKind::Static,
+        Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
+        Some(_) => OppositeKind::Dynamic,
     }
 }
 

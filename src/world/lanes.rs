@@ -2,93 +2,37 @@
 
 use super::{Order, World};
 use crate::bodies::BodyKind;
-use crate::coloring::{Coloring, EXEMPT};
+use crate::constraints::assign::Sides;
 use crate::constraints::restitution::Bounces;
-use crate::constraints::{Layout, Needs, OppositeKind, Workspace};
+use crate::constraints::{Needs, OppositeKind};
 use crate::contacts::Contact;
 
-/// Contacts against one kind of body, and their colours.
-#[derive(Default)]
-pub(super) struct Group {
-    contacts: Vec<u32>,
-    edges: Vec<[u32; 2]>,
-    coloring: Coloring,
-}
-
-const OPPOSITES: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];
-
 impl World {
-    /// Gives every contact its lane: by colours, or one after the other.
-    ///
-    /// The lanes of the last step hold while the set of contacts does.
+    /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
     pub(super) fn assign_lanes(&mut self, needs: &Needs) {
         let choice = Some((self.settings.width, self.settings.order, *needs));
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
-        let contacts = &self.contacts;
-        let inert = self.bodies.len() as u32;
-        let bodies = |contact: u32| {
-            let contact = &contacts[contact as usize];
-            [contact.body_a, contact.body_b]
+        let kinds = &self.bodies.kind;
+        let opposite = |contact: &Contact| match kinds[contact.body_a as usize] {
+            BodyKind::Dynamic => OppositeKind::Dynamic,
+            BodyKind::Kinematic => OppositeKind::Kinematic,
+            BodyKind::Static => OppositeKind::Static,
         };
-        let opposite = |contact: &Contact| match self.bodies.kind[contact.body_a as usize] {
-            BodyKind::Dynamic => 0,
-            BodyKind::Kinematic => 1,
-            BodyKind::Static => 2,
-        };
-        let Workspace { lanes, serial, .. } = &mut self.work;
-        lanes.clear(self.settings.width.lanes());
-        serial.clear(1);
-        let (mut colors, mut overflow) = (0, 0);
+        let sides = Sides { bodies: kinds.len(), opposite };
+        let (work, contacts) = (&mut self.work, &self.contacts);
         match self.settings.order {
             Order::Natural => {
-                let order = &mut self.groups[0].contacts;
-                order.clear();
-                order.extend(0..contacts.len() as u32);
-                let kind_of = |i: u32| opposite(&contacts[i as usize]);
-                for run in order.chunk_by(|&i, &j| kind_of(i) == kind_of(j)) {
-                    let kind = OPPOSITES[kind_of(run[0])];
-                    let layout = Layout::for_needs(needs, kind);
-                    serial.push_segment(kind, &layout, run.iter().copied(), inert, bodies);
-                }
+                self.assignment.serial(work, needs, contacts, 0..contacts.len() as u32, &sides);
             }
-            Order::Colored => {
-                for group in &mut self.groups {
-                    group.contacts.clear();
-                    group.edges.clear();
-                }
-                for (i, contact) in contacts.iter().enumerate() {
-                    let kind = opposite(contact);
-                    let group = &mut self.groups[kind];
-                    group.contacts.push(i as u32);
-                    group.edges.push([if kind == 0 { contact.body_a } else { EXEMPT }, contact.body_b]);
-                }
-                for (group, kind) in self.groups.iter_mut().zip(OPPOSITES) {
-                    let layout = Layout::for_needs(needs, kind);
-                    let Group { contacts, edges, coloring } = group;
-                    coloring.assign(edges, self.bodies.kind.len());
-                    let contact = |&edge: &u32| contacts[edge as usize];
-                    for color in 0..coloring.colors() {
-                        let edges = coloring.color(color).iter();
-                        lanes.push_segment(kind, &layout, edges.map(contact), inert, bodies);
-                    }
-                    colors += coloring.colors();
-                    let rest = coloring.overflow();
-                    serial.push_segment(kind, &layout, rest.iter().map(contact), inert, bodies);
-                    overflow += rest.len();
-                }
-            }
+            Order::Colored => self.assignment.colored(work, self.settings.width, needs, contacts, &sides),
         }
-        for batches in [lanes, serial] {
-            batches.reserve_slab();
-        }
-        let w = &self.work;
-        self.counts.colors = colors;
-        self.counts.overflow = overflow;
-        self.counts.lane_slots = w.lanes.contact.len() + w.serial.contact.len();
-        self.counts.constraint_bytes = w.lanes.bytes() + w.serial.bytes();
+        self.counts.colors = self.assignment.colors;
+        self.counts.overflow = self.assignment.overflow;
+        self.counts.lane_slots = work.lanes.contact.len() + work.serial.contact.len();
+        self.counts.constraint_bytes = work.lanes.bytes() + work.serial.bytes();
         if needs.restitution {
             let points = if needs.two_points { 2 } else { 1 };
             self.counts.constraint_bytes += Bounces::bytes(self.counts.lane_slots, points);

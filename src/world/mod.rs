@@ -7,6 +7,7 @@
 use crate::bodies::{Bodies, BodyDef, BodyKind};
 use crate::broadphase::{BroadPhase, Proxy};
 use crate::clock::{Clock, Phase, Timings};
+use crate::constraints::assign::Assignment;
 use crate::constraints::motion::{self, MotionInput};
 use crate::constraints::observe::ObservedRule;
 use crate::constraints::{Needs, StepInput, Workspace};
@@ -17,7 +18,6 @@ use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
 use crate::shapes::{Shape, combine};
 use collide::Narrow;
 use glam::Vec2;
-use lanes::Group;
 use traits::Traits;
 
 mod candidates;
@@ -68,8 +68,7 @@ pub struct World {
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
     narrow: Narrow,
-    /// Contacts by what stands opposite: dynamic, kinematic, static.
-    groups: [Group; 3],
+    assignment: Assignment,
     /// What the present lanes were assigned for.
     lanes_are_for: Option<(LaneWidth, Order, Needs)>,
     work: Workspace,
@@ -95,7 +94,7 @@ impl World {
             pairs: Vec::new(),
             pairs_are_stale: true,
             narrow: Narrow::default(),
-            groups: Default::default(),
+            assignment: Assignment::default(),
             lanes_are_for: None,
             work: Workspace::default(),
         }

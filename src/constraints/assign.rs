@@ -1,0 +1,110 @@
+//! Which contact goes to which lane: by colours, or one after the other.
+
+use super::{Layout, Needs, OppositeKind, Workspace};
+use crate::coloring::{Coloring, EXEMPT};
+use crate::contacts::Contact;
+use crate::lanes::LaneWidth;
+
+/// Contacts against one kind of body, and their colours.
+#[derive(Debug, Default)]
+struct Group {
+    contacts: Vec<u32>,
+    edges: Vec<[u32; 2]>,
+    coloring: Coloring,
+}
+
+/// Gives contacts their lanes; keeps its memory from call to call.
+#[derive(Debug, Default)]
+pub struct Assignment {
+    /// By [`OppositeKind`].
+    groups: [Group; 3],
+    /// Colours in use.
+    pub colors: usize,
+    /// Contacts that got no colour and are solved one by one.
+    pub overflow: usize,
+}
+
+/// What lanes are assigned for.
+pub struct Sides<F> {
+    /// Number of bodies; the row of this number is the inert one.
+    pub bodies: usize,
+    /// What stands opposite the dynamic body of a contact.
+    pub opposite: F,
+}
+
+impl Assignment {
+    /// Lanes of `width` colour by colour; what gets no colour goes one after the other.
+    pub fn colored(
+        &mut self,
+        work: &mut Workspace,
+        width: LaneWidth,
+        needs: &Needs,
+        contacts: &[Contact],
+        sides: &Sides<impl Fn(&Contact) -> OppositeKind>,
+    ) {
+        let Workspace { lanes, serial, .. } = work;
+        lanes.clear(width.lanes());
+        serial.clear(1);
+        (self.colors, self.overflow) = (0, 0);
+        for group in &mut self.groups {
+            group.contacts.clear();
+            group.edges.clear();
+        }
+        for (i, contact) in contacts.iter().enumerate() {
+            let kind = (sides.opposite)(contact);
+            let group = &mut self.groups[kind as usize];
+            group.contacts.push(i as u32);
+            let a = if kind == OppositeKind::Dynamic { contact.body_a } else { EXEMPT };
+            group.edges.push([a, contact.body_b]);
+        }
+        let inert = sides.bodies as u32;
+        for (Group { contacts: list, edges, coloring }, kind) in self.groups.iter_mut().zip(OppositeKind::ALL)
+        {
+            let layout = Layout::for_needs(needs, kind);
+            coloring.assign(edges, sides.bodies);
+            let contact = |&edge: &u32| list[edge as usize];
+            for color in 0..coloring.colors() {
+                let edges = coloring.color(color).iter().map(contact);
+                lanes.push_segment(kind, &layout, edges, inert, rows_of(contacts));
+            }
+            let rest = coloring.overflow().iter().map(contact);
+            self.overflow += rest.len();
+            serial.push_segment(kind, &layout, rest, inert, rows_of(contacts));
+            self.colors += coloring.colors();
+        }
+        lanes.reserve_slab();
+        serial.reserve_slab();
+    }
+
+    /// One after the other, in `order`.
+    pub fn serial(
+        &mut self,
+        work: &mut Workspace,
+        needs: &Needs,
+        contacts: &[Contact],
+        order: impl Iterator<Item = u32>,
+        sides: &Sides<impl Fn(&Contact) -> OppositeKind>,
+    ) {
+        let Workspace { lanes, serial, .. } = work;
+        lanes.clear(1);
+        serial.clear(1);
+        (self.colors, self.overflow) = (0, 0);
+        let list = &mut self.groups[0].contacts;
+        list.clear();
+        list.extend(order);
+        let kind_of = |&i: &u32| (sides.opposite)(&contacts[i as usize]);
+        for run in list.chunk_by(|i, j| kind_of(i) == kind_of(j)) {
+            let kind = kind_of(&run[0]);
+            let layout = Layout::for_needs(needs, kind);
+            serial.push_segment(kind, &layout, run.iter().copied(), sides.bodies as u32, rows_of(contacts));
+        }
+        serial.reserve_slab();
+    }
+}
+
+fn rows_of(contacts: &[Contact]) -> impl Fn(u32) -> [u32; 2] {
+    |contact| {
+        let contact = &contacts[contact as usize];
+        [contact.body_a, contact.body_b]
+    }
+}
