@@ -55,9 +55,13 @@ pub struct Contact {
 impl Contact {
     /// The shape pair as a sortable number, the lower shape index first.
     pub fn key(&self) -> u64 {
-        let (low, high) = (self.shape_a.min(self.shape_b), self.shape_a.max(self.shape_b));
-        (low as u64) << 32 | high as u64
+        pair_key(self.shape_a, self.shape_b)
     }
+}
+
+/// A shape pair as a sortable number, the lower shape index first.
+pub fn pair_key(a: u32, b: u32) -> u64 {
+    (a.min(b) as u64) << 32 | a.max(b) as u64
 }
 
 impl Manifold {

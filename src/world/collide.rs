@@ -1,7 +1,7 @@
 //! From candidate pairs to contacts that remember their impulses.
 
 use super::World;
-use crate::contacts::Contact;
+use crate::contacts::{Contact, pair_key};
 use crate::narrowphase::collide;
 use crate::params::SPECULATIVE_DISTANCE;
 
@@ -24,12 +24,22 @@ impl World {
                 continue;
             }
             points += manifold.count as usize;
-            let key = candidate.key();
+            let key = pair_key(candidate.shape_a, candidate.shape_b);
             while last.next_if(|old| old.key() < key).is_some() {}
             if let Some(old) = last.next_if(|old| old.key() == key) {
                 manifold.take_impulses(&old.manifold);
             }
-            self.contacts.push(Contact { manifold, ..*candidate });
+            let (surface_a, surface_b) = (self.surfaces[a], self.surfaces[b]);
+            self.contacts.push(Contact {
+                shape_a: candidate.shape_a,
+                shape_b: candidate.shape_b,
+                body_a: candidate.body_a,
+                body_b: candidate.body_b,
+                friction: (surface_a.friction * surface_b.friction).sqrt(),
+                restitution: surface_a.restitution.max(surface_b.restitution),
+                manifold,
+                step_impulse: Default::default(),
+            });
         }
         self.counts.pairs = self.candidates.len();
         self.counts.contacts = self.contacts.len();

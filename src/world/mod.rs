@@ -5,16 +5,17 @@
 //! ```
 
 use crate::bodies::{Bodies, BodyDef, BodyKind};
-use crate::broadphase::{BroadPhase, Proxy};
+use crate::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::motion::{self, MotionInput};
 use crate::constraints::observe::ObservedRule;
 use crate::constraints::{Needs, StepInput, Workspace};
 use crate::contacts::Contact;
-use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
+use crate::params::DIVERGED_SPEED;
 use crate::shapes::{Shape, combine};
 use glam::Vec2;
 use lanes::Group;
+use pairs::Candidate;
 
 mod collide;
 mod counts;
@@ -54,10 +55,11 @@ pub struct World {
     surfaces: Vec<Surface>,
     broadphase: BroadPhase,
     proxies: Vec<Proxy>,
+    fat_boxes: FatBoxes,
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
-    /// Candidates in pair order: a contact without its manifold.
-    candidates: Vec<Contact>,
+    /// Candidates in pair order.
+    candidates: Vec<Candidate>,
     last_contacts: Vec<Contact>,
     /// Contacts by what stands opposite: dynamic, kinematic, static.
     groups: [Group; 3],
@@ -80,6 +82,7 @@ impl World {
             needs: Needs::NONE,
             surfaces: Vec::new(),
             proxies: Vec::new(),
+            fat_boxes: FatBoxes::default(),
             pairs: Vec::new(),
             pairs_are_stale: true,
             candidates: Vec::new(),
@@ -100,7 +103,8 @@ impl World {
         });
         for part in &body.shapes {
             let shape = part.shape.translated(-center);
-            let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
+            // Fat boxes are made at the first step.
+            let aabb = shape.aabb(&self.bodies.pose(index));
             self.shapes.push(shape);
             self.shape_body.push(index as u32);
             self.surfaces
@@ -108,6 +112,7 @@ impl World {
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }
+        self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
         self.needs = self.find_needs();
         self.pairs_are_stale = true;
         index

@@ -1,43 +1,36 @@
 //! Bounds and candidate pairs.
 
 use super::World;
-use crate::bodies::BodyKind;
-use crate::contacts::Contact;
-use crate::params::{AABB_MARGIN, SPECULATIVE_DISTANCE};
+
+/// Two shapes that may touch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// The static or kinematic one if there is one, else the lower index.
+    pub shape_a: u32,
+    /// Of a dynamic body.
+    pub shape_b: u32,
+    pub body_a: u32,
+    pub body_b: u32,
+}
 
 impl World {
-    /// Grows the bounds of shapes that left theirs; if any did, finds the pairs anew.
+    /// Renews the bounds of shapes that left theirs; if any did, brings the pairs up to date.
     pub(super) fn update_pairs(&mut self) {
-        for (i, shape) in self.shapes.iter().enumerate() {
-            let body = self.shape_body[i] as usize;
-            if self.bodies.kind[body] == BodyKind::Static {
-                continue;
-            }
-            let aabb = shape.aabb(&self.bodies.pose(body)).grown(SPECULATIVE_DISTANCE);
-            if !self.proxies[i].aabb.contains(&aabb) {
-                self.proxies[i].aabb = aabb.grown(AABB_MARGIN);
-                self.pairs_are_stale = true;
-            }
-        }
-        if !self.pairs_are_stale {
+        let World { bodies, shapes, proxies, pairs, .. } = self;
+        let moved = self.fat_boxes.update(bodies, shapes, self.settings.dt, proxies);
+        if self.pairs_are_stale {
+            self.broadphase.pairs(proxies, pairs);
+        } else if !moved.is_empty() {
+            self.broadphase.update(proxies, moved, pairs);
+        } else {
             return;
         }
         self.pairs_are_stale = false;
-        self.broadphase.pairs(&self.proxies, &mut self.pairs);
         self.candidates.clear();
-        for &[i, j] in &self.pairs {
-            let dynamic = |shape: u32| self.proxies[shape as usize].dynamic;
-            let (a, b) = if dynamic(j) { (i, j) } else { (j, i) };
-            let (surface_a, surface_b) = (self.surfaces[a as usize], self.surfaces[b as usize]);
-            self.candidates.push(Contact {
-                shape_a: a,
-                shape_b: b,
-                body_a: self.shape_body[a as usize],
-                body_b: self.shape_body[b as usize],
-                friction: (surface_a.friction * surface_b.friction).sqrt(),
-                restitution: surface_a.restitution.max(surface_b.restitution),
-                ..Contact::default()
-            });
-        }
+        self.candidates.extend(pairs.iter().map(|&[i, j]| {
+            let (a, b) = if proxies[j as usize].dynamic { (i, j) } else { (j, i) };
+            let body = |shape: u32| self.shape_body[shape as usize];
+            Candidate { shape_a: a, shape_b: b, body_a: body(a), body_b: body(b) }
+        }));
     }
 }
