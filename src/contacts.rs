@@ -57,9 +57,11 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
+    /// One more than the colour it was last solved in, or 0.
+    pub color: u32,
     /// Fills the last quad.
     #[doc(hidden)]
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -81,9 +83,13 @@ pub mod quad {
 impl Contact {
     /// The shape pair as a sortable number, the lower shape index first.
     pub fn key(&self) -> u64 {
-        let (low, high) = (self.shape_a.min(self.shape_b), self.shape_a.max(self.shape_b));
-        (low as u64) << 32 | high as u64
+        pair_key(self.shape_a, self.shape_b)
     }
+}
+
+/// A shape pair as a sortable number, the lower shape index first.
+pub fn pair_key(a: u32, b: u32) -> u64 {
+    (a.min(b) as u64) << 32 | a.max(b) as u64
 }
 
 impl Manifold {

@@ -97,6 +97,81 @@ proptest! {
     }
 }
 
+/// Whether no body has a colour twice, every colour below the last is in use, and the lists agree.
+fn is_proper(coloring: &Coloring, edges: &[[u32; 2]]) -> bool {
+    let starts = coloring.starts();
+    let proper = (0..coloring.colors()).all(|color| {
+        let mut ends: Vec<u32> = coloring
+            .color(color)
+            .iter()
+            .flat_map(|&e| edges[e as usize])
+            .filter(|&b| b < BODIES as u32)
+            .collect();
+        let count = ends.len();
+        ends.sort();
+        ends.dedup();
+        let named = coloring.color(color).iter().all(|&e| coloring.color_of()[e as usize] as usize == color);
+        starts[color] < starts[color + 1] && ends.len() == count && named
+    });
+    let mut order = coloring.order().to_vec();
+    order.sort();
+    proper && order == (0..edges.len() as u32).collect::<Vec<_>>()
+}
+
+proptest! {
+    /// Any list of kept colours, even one that is no colouring, gives a proper one; colours of
+    /// a proper one stay, but for the sixteenth of the edges that is coloured anew.
+    #[test]
+    fn recoloring(edges in graph(), kept in proptest::collection::vec(any::<u8>(), 0..100)) {
+        let mut coloring = Coloring::new();
+        coloring.recolor(&edges, &kept, BODIES);
+        prop_assert!(is_proper(&coloring, &edges));
+        coloring.assign(&edges, BODIES);
+        let fresh = coloring.clone();
+        coloring.recolor(&edges, fresh.color_of(), BODIES);
+        prop_assert_eq!(coloring.color_of(), fresh.color_of());
+        prop_assert_eq!(coloring.order(), fresh.order());
+    }
+
+    /// Churn: edges come and go for a long time.
+    #[test]
+    fn colors_do_not_drift(seed in any::<u32>()) {
+        let mut state = seed | 1;
+        let mut random = move |n: u32| {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state % n
+        };
+        let (mut coloring, mut fresh) = (Coloring::new(), Coloring::new());
+        let mut edges: Vec<([u32; 2], u8)> = Vec::new();
+        let (mut sum, mut fresh_sum) = (0, 0);
+        for step in 0..2000 {
+            // Crowded and sparse times take turns.
+            let size = if step / 100 % 2 == 0 { 120 } else { 30 };
+            for _ in 0..8 {
+                let (a, b) = (random(BODIES as u32), random(BODIES as u32));
+                if edges.len() < size && a != b {
+                    edges.push(([a, b], OVERFLOW));
+                } else if !edges.is_empty() {
+                    edges.remove(random(edges.len() as u32) as usize);
+                }
+            }
+            let (ends, kept): (Vec<_>, Vec<_>) = edges.iter().copied().unzip();
+            coloring.recolor(&ends, &kept, BODIES);
+            prop_assert!(is_proper(&coloring, &ends));
+            let most = degrees(&ends).into_iter().max().unwrap_or(0);
+            prop_assert!(coloring.colors() <= (2 * most).saturating_sub(1).max(1));
+            edges.iter_mut().zip(coloring.color_of()).for_each(|(edge, &color)| edge.1 = color);
+            fresh.assign(&ends, BODIES);
+            sum += coloring.colors();
+            fresh_sum += fresh.colors();
+        }
+        // Measured: 1.09 to 1.13 times as many as first fit anew.
+        prop_assert!(sum * 4 <= fresh_sum * 5, "{} against {}", sum, fresh_sum);
+    }
+}
+
 #[test]
 fn no_edges() {
     let mut coloring = Coloring::new();

@@ -8,10 +8,12 @@
 //! in the tree. So the tree is ahead while less than one in 25 does.
 
 mod all_pairs;
+mod bounds;
 mod hash_grid;
 mod tree;
 
 pub use all_pairs::all_pairs;
+pub use bounds::FatBoxes;
 pub use hash_grid::HashGrid;
 pub use tree::Tree;
 
@@ -100,6 +102,16 @@ impl BroadPhase {
             BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
             BroadPhase::Tree(tree) => tree.pairs(proxies, out),
             BroadPhase::AllPairs => all_pairs(proxies, out),
+        }
+    }
+
+    /// Brings `pairs` up to date: it holds what the last call gave, and since then only the
+    /// proxies in `moved`, ascending, have changed in any way. The result is that of
+    /// [`BroadPhase::pairs`].
+    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
+        match self {
+            BroadPhase::Tree(tree) => tree.update(proxies, moved, pairs),
+            _ => self.pairs(proxies, pairs),
         }
     }
 }

@@ -1,91 +1,109 @@
-//! A dynamic tree of boxes with a list of pairs that outlives the step.
+//! A packed tree of boxes, sixteen children to a node, kept from step to step.
 //!
-//! **Idea.** The tree holds each proxy in a box somewhat larger than its own,
-//! and nothing is done for it until it leaves that box. The list holds all
-//! pairs of large boxes that overlap: it changes only where a proxy left its
-//! box, and those pairs whose own bounds overlap are read off it.
+//! **Tree.** The leaves hold the proxies in the order of a space-filling curve, sixteen each; a
+//! node holds the bounds of sixteen neighbours of the level below. There are no links: the
+//! children of node k are the nodes 16k to 16k + 15 of the next level. A query tests all children
+//! of a node at once, in lanes.
 //!
-//! **Cost of a tree.** A query enters a node about as often as the node's
-//! perimeter is long, so a tree is judged by the sum of its inner perimeters
-//! (surface area heuristic). A new leaf L with sibling S costs the perimeter of
-//! their parent and what L adds to each ancestor A of S:
+//! **Motion.** A proxy keeps its place in the order when it moves, and the bounds above it follow
+//! (refit). Bodies that move together stay neighbours, so the order lasts for many steps. It is
+//! made anew when the perimeters of the leaves, which say how many a query enters, have grown by
+//! [`WORN`].
 //!
-//! ```text
-//! cost(S) = P(S ∪ L) + Σ_A [P(A ∪ L) − P(A)]                           (1)
-//! ```
+//! **Curve.** Hilbert's, through the centres, in a square of 2^[`BITS`] cells. Proxies far larger
+//! than most would stretch the leaf that they share with small ones, so they come first, together.
 //!
-//! Below S the sum has one term more and the first one is at least P(L), which
-//! bounds every descendant of S from below and prunes the search for the best.
-//! On the way back to the root, rotations swap a node with a child of its
-//! sibling where that shortens a perimeter.
+//! **Pairs.** Where few proxies moved, their pairs leave the list and are searched for; where
+//! many did, all are. In that case proxies are taken by their index and only partners of higher
+//! index are kept: every pair is met twice, but the list is made in order, and sorting it was
+//! dearer than the second look.
 //!
-//! **Source:** Catto 2019 (`catto2019`). **Departures:** the search goes depth
-//! first, cheaper child first, instead of through a priority queue; the margin
-//! is a fraction of the proxy instead of a length, so that no unit of length
-//! is built in.
+//! **Source:** leaves packed along Hilbert's curve, Kamel and Faloutsos 1993 (`kamel1993`); wide
+//! nodes tested in lanes, Wald, Benthin and Boulos 2008 (`wald2008`); refit and rebuild when the
+//! tree is worn, Lauterbach et al. 2006 (`lauterbach2006`).
 
-use super::{Proxy, overlap};
-use crate::shapes::Aabb;
-use glam::Vec2;
+use super::Proxy;
+use crate::lanes::Block;
+use wide::{f32x16, u32x16};
 
-/// Margin on each side, as a fraction of the mean of width and height: 10 cm
-/// on a crate of a metre. Larger: fewer proxies leave their boxes, but the list
-/// holds more pairs that are not.
-const MARGIN: f32 = 0.1;
+/// Children of a node.
+const FAN: usize = 16;
 
-/// No node.
-const NONE: u32 = u32::MAX;
+/// Bits of a coordinate on the curve.
+const BITS: u32 = 10;
 
+/// The order is made anew when the leaves' perimeters have grown by this factor.
+const WORN: f32 = 1.15;
+
+/// Lists are merged if no more than one proxy in this many moved.
+const FEW: usize = 16;
+
+/// Sixteen boxes; lanes without one hold NaN, which meets nothing.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    aabb: Aabb,
-    /// Next free node while the node is free.
-    parent: u32,
-    /// `[NONE, proxy]` in a leaf.
-    children: [u32; 2],
+    /// min x, min y, max x, max y.
+    sides: [Block; 4],
 }
 
 impl Node {
-    fn is_leaf(&self) -> bool {
-        self.children[0] == NONE
+    const EMPTY: Node = Node { sides: [Block([f32::NAN; FAN]); 4] };
+
+    /// Sets a lane; a box with a NaN is none.
+    #[inline]
+    fn set(&mut self, lane: usize, sides: [f32; 4]) {
+        let sides = if sides.iter().any(|side| side.is_nan()) { [f32::NAN; 4] } else { sides };
+        for (side, value) in self.sides.iter_mut().zip(sides) {
+            side.0[lane] = value;
+        }
+    }
+
+    /// The lanes whose boxes share a point with the query's.
+    #[inline]
+    fn hits(&self, query: &[f32x16; 4]) -> u32 {
+        let [min_x, min_y, max_x, max_y] = self.sides.map(|side| f32x16::new(side.0));
+        let x = min_x.simd_le(query[2]) & query[0].simd_le(max_x);
+        let y = min_y.simd_le(query[3]) & query[1].simd_le(max_y);
+        (x & y).to_bitmask() & 0xFFFF
+    }
+
+    /// Bounds of all lanes; the minimum of a number and a NaN is the number.
+    #[inline]
+    fn bounds(&self) -> [f32; 4] {
+        let fold = |side: &Block, pick: fn(f32, f32) -> f32| {
+            let mut v = side.0;
+            for half in [8, 4, 2, 1] {
+                for i in 0..half {
+                    v[i] = pick(v[i], v[i + half]);
+                }
+            }
+            v[0]
+        };
+        let [a, b, c, d] = &self.sides;
+        [fold(a, f32::min), fold(b, f32::min), fold(c, f32::max), fold(d, f32::max)]
     }
 }
 
 /// Finds candidate pairs; remembers the last call.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Tree {
-    nodes: Vec<Node>,
-    root: u32,
-    free: u32,
-    /// Each proxy as it was put into the tree, with its large box, `[proxies]`.
-    stored: Vec<Proxy>,
-    /// Its leaf, `[proxies]`.
-    leaves: Vec<u32>,
-    /// Whether it left its box in this call, `[proxies]`.
+    /// Leaves first, root last.
+    levels: Vec<Vec<Node>>,
+    /// Proxy in each place of the leaves, `[FAN · leaves]`.
+    order: Vec<u32>,
+    /// Place of each proxy, `[proxies]`.
+    place: Vec<u32>,
+    /// Perimeters of the leaves when the order was made (m).
+    cost_of_order: f32,
+    /// Position on the curve and proxy, to be sorted.
+    keys: Vec<[u32; 2]>,
+    sorted: Vec<[u32; 2]>,
+    /// Whether a proxy moved in this call, `[proxies]`.
     moved: Vec<bool>,
-    /// Pairs of large boxes, ascending.
-    pairs: Vec<[u32; 2]>,
-    /// Those found in this call.
+    /// Pairs found in this call, where few proxies moved.
     fresh: Vec<[u32; 2]>,
     merged: Vec<[u32; 2]>,
-    stack: Vec<(u32, f32)>,
-}
-
-impl Default for Tree {
-    fn default() -> Self {
-        Tree {
-            nodes: Vec::new(),
-            root: NONE,
-            free: NONE,
-            stored: Vec::new(),
-            leaves: Vec::new(),
-            moved: Vec::new(),
-            pairs: Vec::new(),
-            fresh: Vec::new(),
-            merged: Vec::new(),
-            stack: Vec::new(),
-        }
-    }
+    /// Level and node.
+    stack: Vec<[u32; 2]>,
 }
 
 impl Tree {
@@ -96,285 +114,300 @@ impl Tree {
 
     /// See [`super::BroadPhase::pairs`].
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
-        if self.update(proxies) {
-            self.renew_pairs();
+        if self.place.len() != proxies.len() {
+            self.make_order(proxies);
+        } else {
+            self.fill(proxies);
+            self.renew_order(proxies);
         }
-        out.clear();
-        let touching = |&&[i, j]: &&[u32; 2]| proxies[i as usize].may_touch(&proxies[j as usize]);
-        out.extend(self.pairs.iter().filter(touching));
+        self.find_all(proxies, out);
     }
 
-    /// Brings the leaves up to date; whether the list of pairs has to follow.
-    fn update(&mut self, proxies: &[Proxy]) -> bool {
-        let removed = self.stored.len() > proxies.len();
-        while self.stored.len() > proxies.len() {
-            self.stored.pop();
-            if let Some(leaf) = self.leaves.pop() {
-                self.detach(leaf);
-                self.release(leaf);
+    /// See [`super::BroadPhase::update`].
+    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
+        if self.place.len() != proxies.len() || moved.len() * FEW > proxies.len() {
+            self.pairs(proxies, pairs);
+            return;
+        }
+        for &i in moved {
+            let place = self.place[i as usize] as usize;
+            self.levels[0][place / FAN].set(place % FAN, sides(&proxies[i as usize]));
+        }
+        for &i in moved {
+            let leaf = self.place[i as usize] as usize / FAN;
+            if self.levels.len() > 1 {
+                let bounds = self.levels[0][leaf].bounds();
+                self.levels[1][leaf / FAN].set(leaf % FAN, bounds);
             }
         }
+        self.refit(2);
+        self.renew_order(proxies);
+        self.find_moved(proxies, moved, pairs);
+    }
+
+    /// Sorts the proxies along the curve and builds the levels.
+    fn make_order(&mut self, proxies: &[Proxy]) {
+        self.keys.clear();
+        let exponent = |p: &Proxy| {
+            let extent = (p.aabb.max - p.aabb.min).abs().max_element();
+            extent.to_bits() >> 23
+        };
+        let sum: u64 = proxies.iter().map(|p| u64::from(exponent(p))).sum();
+        // Four times the mean, or more.
+        let large = (sum / proxies.len().max(1) as u64) as u32 + 2;
+        let center = |p: &Proxy| 0.5 * p.aabb.min + 0.5 * p.aabb.max;
+        let (mut low, mut high) = (glam::Vec2::INFINITY, glam::Vec2::NEG_INFINITY);
+        for proxy in proxies.iter().filter(|p| exponent(p) <= large) {
+            let center = center(proxy);
+            if center.is_finite() {
+                (low, high) = (low.min(center), high.max(center));
+            }
+        }
+        let cells = ((1 << BITS) - 1) as f32;
+        let scale = cells / (high - low).max_element();
+        for (i, proxy) in proxies.iter().enumerate() {
+            // What is no number becomes 0.
+            let cell = (center(proxy) - low) * scale;
+            let along = hilbert(cell.x.min(cells) as u32, cell.y.min(cells) as u32);
+            let key = if exponent(proxy) > large { 0 } else { 1 + along };
+            self.keys.push([key, i as u32]);
+        }
+        // A key has one bit more than the curve.
+        for shift in [0, BITS + 1] {
+            sort_digit(&self.keys, &mut self.sorted, shift);
+            std::mem::swap(&mut self.keys, &mut self.sorted);
+        }
+
+        let leaves = proxies.len().div_ceil(FAN);
+        self.order.clear();
+        self.order.extend(self.keys.iter().map(|key| key[1]));
+        self.order.resize(leaves * FAN, 0);
+        self.place.clear();
+        self.place.resize(proxies.len(), 0);
+        for (place, key) in self.keys.iter().enumerate() {
+            self.place[key[1] as usize] = place as u32;
+        }
+        let mut count = leaves.max(1);
+        for level in 0.. {
+            if self.levels.len() == level {
+                self.levels.push(Vec::new());
+            }
+            self.levels[level].clear();
+            self.levels[level].resize(count, Node::EMPTY);
+            if count == 1 {
+                self.levels.truncate(level + 1);
+                break;
+            }
+            count = count.div_ceil(FAN);
+        }
+        self.fill(proxies);
+        self.cost_of_order = self.cost();
+    }
+
+    /// Makes the order anew if it is worn.
+    fn renew_order(&mut self, proxies: &[Proxy]) {
+        if self.cost() > WORN * self.cost_of_order {
+            self.make_order(proxies);
+        }
+    }
+
+    /// Perimeters of the leaves, halved.
+    fn cost(&self) -> f32 {
+        let Some(parents) = self.levels.get(1) else { return 0.0 };
+        let mut cost = f32x16::ZERO;
+        for node in parents {
+            let [min_x, min_y, max_x, max_y] = node.sides.map(|side| f32x16::new(side.0));
+            // Of a NaN and zero, zero is taken.
+            cost += ((max_x - min_x) + (max_y - min_y)).fast_max(f32x16::ZERO);
+        }
+        cost.reduce_add()
+    }
+
+    /// Sets all boxes.
+    fn fill(&mut self, proxies: &[Proxy]) {
+        for (node, order) in self.levels[0].iter_mut().zip(self.order.chunks(FAN)) {
+            for (lane, &i) in order.iter().enumerate() {
+                node.set(lane, sides(&proxies[i as usize]));
+            }
+        }
+        // Places past the last proxy are empty.
+        if let Some(node) = self.levels[0].last_mut() {
+            let used = self.place.len() - (self.place.len().div_ceil(FAN).max(1) - 1) * FAN;
+            for lane in used..FAN {
+                node.set(lane, [f32::NAN; 4]);
+            }
+        }
+        self.refit(1);
+    }
+
+    /// Sets the boxes of the levels from `first` on.
+    fn refit(&mut self, first: usize) {
+        for level in first..self.levels.len() {
+            let (below, above) = self.levels.split_at_mut(level);
+            for (i, node) in below[level - 1].iter().enumerate() {
+                above[0][i / FAN].set(i % FAN, node.bounds());
+            }
+        }
+    }
+
+    /// All pairs, in order.
+    fn find_all(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
+        out.clear();
+        let mut stack = std::mem::take(&mut self.stack);
+        for (i, proxy) in proxies.iter().enumerate() {
+            let start = out.len();
+            let own = u32x16::splat(i as u32);
+            self.query(proxy, &mut stack, |places, hits| {
+                let mut higher = hits & u32x16::new(*places).simd_gt(own).to_bitmask();
+                while higher != 0 {
+                    let j = places[higher.trailing_zeros() as usize];
+                    higher &= higher - 1;
+                    if proxy.may_touch(&proxies[j as usize]) {
+                        out.push([i as u32, j]);
+                    }
+                }
+            });
+            sort_partners(&mut out[start..]);
+        }
+        self.stack = stack;
+    }
+
+    /// Drops the pairs of proxies that moved, and merges in those that they have now.
+    fn find_moved(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
         self.moved.clear();
         self.moved.resize(proxies.len(), false);
-        let mut any_moved = false;
-        for (i, proxy) in proxies.iter().enumerate() {
-            match self.stored.get(i) {
-                Some(stored) if covers(stored, proxy) => continue,
-                Some(_) => self.detach(self.leaves[i]),
-                None => {
-                    let leaf = self.allocate([NONE, i as u32]);
-                    self.leaves.push(leaf);
-                    self.stored.push(*proxy);
+        moved.iter().for_each(|&i| self.moved[i as usize] = true);
+        let (mut fresh, mut stack) = (std::mem::take(&mut self.fresh), std::mem::take(&mut self.stack));
+        fresh.clear();
+        for &i in moved {
+            let proxy = &proxies[i as usize];
+            self.query(proxy, &mut stack, |places, mut hits| {
+                while hits != 0 {
+                    let j = places[hits.trailing_zeros() as usize];
+                    hits &= hits - 1;
+                    // If both moved, the lower one reports the pair.
+                    if (!self.moved[j as usize] || i < j) && proxy.may_touch(&proxies[j as usize]) {
+                        fresh.push([i.min(j), i.max(j)]);
+                    }
                 }
-            }
-            let large = Proxy { aabb: enlarged(&proxy.aabb), ..*proxy };
-            self.stored[i] = large;
-            self.nodes[self.leaves[i] as usize].aabb = large.aabb;
-            self.attach(self.leaves[i]);
-            self.moved[i] = true;
-            any_moved = true;
+            });
         }
-        removed || any_moved
-    }
-
-    /// Drops the pairs of proxies that moved or are gone, and merges in those
-    /// that the moved ones have now.
-    fn renew_pairs(&mut self) {
-        let (moved, stored) = (&self.moved, &self.stored);
-        // A pair's second index is the larger, so it tells whether both exist.
-        self.pairs.retain(|&[i, j]| (j as usize) < moved.len() && !moved[i as usize] && !moved[j as usize]);
-        self.fresh.clear();
-        for i in (0..stored.len()).filter(|&i| moved[i]) {
-            self.stack.clear();
-            self.stack.push((self.root, 0.0));
-            while let Some((node, _)) = self.stack.pop() {
-                let node = &self.nodes[node as usize];
-                if !overlap(&node.aabb, &stored[i].aabb) {
-                    continue;
-                }
-                let [a, b] = node.children;
-                if !node.is_leaf() {
-                    self.stack.extend([(a, 0.0), (b, 0.0)]);
-                    continue;
-                }
-                // If both moved, the lower one reports the pair.
-                let j = b as usize;
-                if (!moved[j] || i < j) && stored[i].may_touch(&stored[j]) {
-                    self.fresh.push([i.min(j) as u32, i.max(j) as u32]);
-                }
-            }
-        }
-        self.fresh.sort_unstable();
-
+        fresh.sort_unstable();
         self.merged.clear();
-        let mut kept = self.pairs.iter().copied().peekable();
-        for &pair in &self.fresh {
+        let stays = |pair: &&[u32; 2]| !pair.iter().any(|&i| self.moved[i as usize]);
+        let mut kept = pairs.iter().filter(stays).copied().peekable();
+        for &pair in &fresh {
             while let Some(earlier) = kept.next_if(|kept| *kept < pair) {
                 self.merged.push(earlier);
             }
             self.merged.push(pair);
         }
         self.merged.extend(kept);
-        std::mem::swap(&mut self.pairs, &mut self.merged);
+        std::mem::swap(pairs, &mut self.merged);
+        (self.fresh, self.stack) = (fresh, stack);
     }
 
-    /// Hangs a leaf, whose box is set, beside its best sibling.
-    fn attach(&mut self, leaf: u32) {
-        if self.root == NONE {
-            self.root = leaf;
-            self.nodes[leaf as usize].parent = NONE;
-            return;
-        }
-        let aabb = self.nodes[leaf as usize].aabb;
-        let sibling = self.best_sibling(&aabb);
-        let above = self.nodes[sibling as usize].parent;
-        let parent = self.allocate([sibling, leaf]);
-        self.nodes[parent as usize].parent = above;
-        self.nodes[sibling as usize].parent = parent;
-        self.nodes[leaf as usize].parent = parent;
-        self.replace_child(above, sibling, parent);
-        self.refit(parent);
-    }
-
-    /// The node with the least cost (1) as a sibling of a leaf with bounds `aabb`.
-    fn best_sibling(&mut self, aabb: &Aabb) -> u32 {
-        let own = perimeter(aabb);
-        let mut best = self.root;
-        let mut best_cost = perimeter(&union(&self.nodes[self.root as usize].aabb, aabb));
-        self.stack.clear();
-        self.stack.push((self.root, 0.0));
-        // `inherited` is the sum in (1).
-        while let Some((index, inherited)) = self.stack.pop() {
-            let node = &self.nodes[index as usize];
-            let joint = perimeter(&union(&node.aabb, aabb));
-            if inherited + joint < best_cost {
-                best_cost = inherited + joint;
-                best = index;
-            }
-            let inherited = inherited + joint - perimeter(&node.aabb);
-            if node.is_leaf() || inherited + own >= best_cost {
-                continue;
-            }
-            let [a, b] = node.children;
-            let growth = |child: u32| {
-                let child = &self.nodes[child as usize].aabb;
-                perimeter(&union(child, aabb)) - perimeter(child)
-            };
-            // The one that grows less is pushed last and searched first.
-            let [later, first] = if growth(a) < growth(b) { [b, a] } else { [a, b] };
-            self.stack.extend([(later, inherited), (first, inherited)]);
-        }
-        best
-    }
-
-    /// Takes a leaf out of the tree and releases its parent; the leaf stays allocated.
-    fn detach(&mut self, leaf: u32) {
-        let parent = self.nodes[leaf as usize].parent;
-        if parent == NONE {
-            self.root = NONE;
-            return;
-        }
-        let Node { parent: above, children: [a, b], .. } = self.nodes[parent as usize];
-        let sibling = if a == leaf { b } else { a };
-        self.nodes[sibling as usize].parent = above;
-        self.replace_child(above, parent, sibling);
-        self.release(parent);
-        self.refit(above);
-    }
-
-    /// Fits the boxes from `index` up to the root, rotating on the way.
-    fn refit(&mut self, mut index: u32) {
-        while index != NONE {
-            self.rotate(index);
-            let Node { parent, children: [a, b], .. } = self.nodes[index as usize];
-            self.nodes[index as usize].aabb =
-                union(&self.nodes[a as usize].aabb, &self.nodes[b as usize].aabb);
-            index = parent;
-        }
-    }
-
-    /// Swaps a child of `top` with a child of its other child, if one of the
-    /// four swaps shortens the perimeter of that other child: below `top` are
-    /// the same leaves before and after, so no other box changes.
-    fn rotate(&mut self, top: u32) {
-        let [b, c] = self.nodes[top as usize].children;
-        let mut best = None;
-        let mut best_gain = 0.0;
-        for (down, other) in [(b, c), (c, b)] {
-            let node = self.nodes[other as usize];
-            if node.is_leaf() {
-                continue;
-            }
-            let [f, g] = node.children;
-            for (up, stays) in [(f, g), (g, f)] {
-                let box_after = union(&self.nodes[down as usize].aabb, &self.nodes[stays as usize].aabb);
-                let gain = perimeter(&node.aabb) - perimeter(&box_after);
-                if gain > best_gain {
-                    best_gain = gain;
-                    best = Some((down, other, up, box_after));
+    /// Calls `visit` with the sixteen proxies of every leaf that is hit, and which of them are.
+    #[inline]
+    fn query(&self, proxy: &Proxy, stack: &mut Vec<[u32; 2]>, mut visit: impl FnMut(&[u32; FAN], u32)) {
+        let query = sides(proxy).map(f32x16::splat);
+        stack.clear();
+        stack.push([self.levels.len() as u32 - 1, 0]);
+        while let Some([level, node]) = stack.pop() {
+            let mut hits = self.levels[level as usize][node as usize].hits(&query);
+            if level > 0 {
+                while hits != 0 {
+                    stack.push([level - 1, node * FAN as u32 + hits.trailing_zeros()]);
+                    hits &= hits - 1;
                 }
+            } else if let Some(places) = self.order[node as usize * FAN..].first_chunk() {
+                visit(places, hits);
             }
         }
-        if let Some((down, other, up, box_after)) = best {
-            self.replace_child(top, down, up);
-            self.replace_child(other, up, down);
-            self.nodes[up as usize].parent = top;
-            self.nodes[down as usize].parent = other;
-            self.nodes[other as usize].aabb = box_after;
+    }
+}
+
+/// min x, min y, max x, max y.
+#[inline]
+fn sides(proxy: &Proxy) -> [f32; 4] {
+    let (min, max) = (proxy.aabb.min, proxy.aabb.max);
+    [min.x, min.y, max.x, max.y]
+}
+
+/// Sorts the partners of one proxy, few as a rule.
+fn sort_partners(pairs: &mut [[u32; 2]]) {
+    if pairs.len() > 32 {
+        pairs.sort_unstable_by_key(|pair| pair[1]);
+        return;
+    }
+    for i in 1..pairs.len() {
+        let pair = pairs[i];
+        let mut hole = i;
+        while hole > 0 && pairs[hole - 1][1] > pair[1] {
+            pairs[hole] = pairs[hole - 1];
+            hole -= 1;
+        }
+        pairs[hole] = pair;
+    }
+}
+
+/// Distance along Hilbert's curve of a cell of the square of 2^[`BITS`] cells.
+///
+/// From the largest quadrants to the smallest: the curve passes the quadrants (0,0), (0,1),
+/// (1,1), (1,0), mirrored in the first and the last so that it joins its neighbours.
+fn hilbert(mut x: u32, mut y: u32) -> u32 {
+    let mut along = 0;
+    for bit in (0..BITS).rev() {
+        let (right, top) = (x >> bit & 1, y >> bit & 1);
+        along = along << 2 | (3 * right ^ top);
+        if top == 0 {
+            if right == 1 {
+                (x, y) = (!x, !y);
+            }
+            (x, y) = (y, x);
         }
     }
-
-    /// Puts `new` where `old` hangs below `parent`, or at the root if that is [`NONE`].
-    fn replace_child(&mut self, parent: u32, old: u32, new: u32) {
-        if parent == NONE {
-            self.root = new;
-            return;
-        }
-        let children = &mut self.nodes[parent as usize].children;
-        children[usize::from(children[0] != old)] = new;
-    }
-
-    /// A node from the free list or a new one; its box and parent are to be set.
-    fn allocate(&mut self, children: [u32; 2]) -> u32 {
-        if self.free == NONE {
-            let zero = Aabb { min: Vec2::ZERO, max: Vec2::ZERO };
-            self.nodes.push(Node { aabb: zero, parent: NONE, children });
-            return self.nodes.len() as u32 - 1;
-        }
-        let index = self.free;
-        self.free = self.nodes[index as usize].parent;
-        self.nodes[index as usize].children = children;
-        index
-    }
-
-    fn release(&mut self, index: u32) {
-        self.nodes[index as usize].parent = self.free;
-        self.free = index;
-    }
+    along
 }
 
-/// Whether the stored proxy still stands for `proxy`: bounds within the large box, all else equal.
-fn covers(stored: &Proxy, proxy: &Proxy) -> bool {
-    let (large, own) = (&stored.aabb, &proxy.aabb);
-    large.min.cmple(own.min).all()
-        && own.max.cmple(large.max).all()
-        && (stored.body, stored.group, stored.dynamic) == (proxy.body, proxy.group, proxy.dynamic)
-}
-
-/// The large box: grown on each side, or left as it is if the extent is no number.
-fn enlarged(aabb: &Aabb) -> Aabb {
-    let extent = aabb.max - aabb.min;
-    let margin = MARGIN * 0.5 * (extent.x + extent.y);
-    let margin = if margin.is_finite() { margin } else { 0.0 };
-    Aabb { min: aabb.min - margin, max: aabb.max + margin }
-}
-
-/// Bounds of both; `f32::min`, unlike glam's, lets no NaN of one hide the other.
-fn union(a: &Aabb, b: &Aabb) -> Aabb {
-    Aabb {
-        min: Vec2::new(a.min.x.min(b.min.x), a.min.y.min(b.min.y)),
-        max: Vec2::new(a.max.x.max(b.max.x), a.max.y.max(b.max.y)),
+/// Stable counting sort by [`BITS`] + 1 bits of the first number from bit `shift` on.
+fn sort_digit(from: &[[u32; 2]], to: &mut Vec<[u32; 2]>, shift: u32) {
+    let digit = |pair: &[u32; 2]| (pair[0] >> shift) as usize & ((2 << BITS) - 1);
+    let mut next = [0u32; (2 << BITS) + 1];
+    for pair in from {
+        next[digit(pair) + 1] += 1;
     }
-}
-
-/// Half the perimeter: comparisons need no more.
-fn perimeter(aabb: &Aabb) -> f32 {
-    let extent = aabb.max - aabb.min;
-    extent.x + extent.y
+    for i in 1..next.len() {
+        next[i] += next[i - 1];
+    }
+    to.clear();
+    to.resize(from.len(), [0; 2]);
+    for pair in from {
+        let next = &mut next[digit(pair)];
+        to[*next as usize] = *pair;
+        *next += 1;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shapes::Aabb;
+    use glam::Vec2;
 
-    /// Walks the tree: links, boxes, every leaf once, every other node free.
-    fn validate(tree: &Tree) -> f32 {
-        let mut cost = 0.0;
-        let mut seen = vec![false; tree.nodes.len()];
-        let mut stack = vec![(tree.root, NONE)];
-        while let Some((index, parent)) = stack.pop().filter(|top| top.0 != NONE) {
-            let node = &tree.nodes[index as usize];
-            assert!(!std::mem::replace(&mut seen[index as usize], true), "node {index} twice");
-            assert_eq!(node.parent, parent, "parent of {index}");
-            if node.is_leaf() {
-                let proxy = node.children[1] as usize;
-                assert_eq!((tree.leaves[proxy], tree.stored[proxy].aabb), (index, node.aabb));
-            } else {
-                let [a, b] = node.children.map(|c| tree.nodes[c as usize].aabb);
-                assert_eq!(node.aabb, union(&a, &b), "box of {index}");
-                cost += perimeter(&node.aabb);
-                stack.extend(node.children.map(|child| (child, index)));
+    /// Neighbours on the curve are neighbours in the square, and every cell is passed once.
+    #[test]
+    fn the_curve_is_hilberts() {
+        let side = 1u32 << BITS;
+        let mut cells = vec![[0, 0]; (side * side) as usize];
+        for x in 0..side {
+            for y in 0..side {
+                cells[hilbert(x, y) as usize] = [x, y];
             }
         }
-        let used = seen.iter().filter(|&&s| s).count();
-        assert_eq!(used, (2 * tree.leaves.len()).saturating_sub(1));
-        let mut free = tree.free;
-        while free != NONE {
-            assert!(!std::mem::replace(&mut seen[free as usize], true), "free node {free} in use");
-            free = tree.nodes[free as usize].parent;
+        for step in cells.windows(2) {
+            assert_eq!(step[0][0].abs_diff(step[1][0]) + step[0][1].abs_diff(step[1][1]), 1, "{step:?}");
         }
-        assert!(seen.iter().all(|&s| s), "a node is lost");
-        cost
     }
 
     /// A lattice of boxes that shears, frame by frame, and shrinks and grows in number.
@@ -392,59 +425,45 @@ mod tests {
         (0..count).map(proxy).collect()
     }
 
+    /// Every node has the bounds of its children, every proxy its place.
+    fn validate(tree: &Tree, proxies: &[Proxy]) {
+        for (i, proxy) in proxies.iter().enumerate() {
+            let place = tree.place[i] as usize;
+            assert_eq!(tree.order[place] as usize, i);
+            assert_eq!(tree.levels[0][place / FAN].sides.map(|s| s.0[place % FAN]), sides(proxy));
+        }
+        for level in tree.levels.windows(2) {
+            assert_eq!(level[1].len(), level[0].len().div_ceil(FAN));
+            for (i, node) in level[0].iter().enumerate() {
+                let numbers = |sides: [f32; 4]| sides.map(|side| (!side.is_nan()).then_some(side));
+                assert_eq!(numbers(level[1][i / FAN].sides.map(|s| s.0[i % FAN])), numbers(node.bounds()));
+            }
+        }
+        assert_eq!(tree.levels.last().map(Vec::len), Some(1));
+    }
+
     #[test]
     fn stays_a_tree_through_motion_and_removal() {
         let mut tree = Tree::new();
         let mut out = Vec::new();
         for (frame, count) in [(0, 400), (1, 400), (2, 90), (3, 1), (4, 0), (5, 2), (6, 400), (7, 399)] {
-            tree.pairs(&scene(frame, count), &mut out);
-            validate(&tree);
-            assert!(tree.nodes.len() < 2 * 400, "the free list is not used");
+            let proxies = scene(frame, count);
+            tree.pairs(&proxies, &mut out);
+            validate(&tree, &proxies);
         }
     }
 
     #[test]
-    fn rest_changes_nothing() {
+    fn a_worn_order_is_made_anew() {
         let mut tree = Tree::new();
         let mut out = Vec::new();
-        let mut proxies = scene(0, 400);
-        tree.pairs(&proxies, &mut out);
-        let within = MARGIN * 1.6 * 0.9;
-        for proxy in &mut proxies {
-            proxy.aabb.min += within;
-            proxy.aabb.max += within;
-        }
-        assert!(!tree.update(&proxies), "within the margin");
-        proxies[7].aabb.max += within;
-        assert!(tree.update(&proxies), "past it");
-        assert_eq!(tree.moved.iter().filter(|&&moved| moved).count(), 1);
-    }
-
-    /// Cost of the tree that halves the boxes by their centres, along the
-    /// longer side of the bounds, until one is left.
-    fn halved(boxes: &mut [Aabb]) -> f32 {
-        if boxes.len() < 2 {
-            return 0.0;
-        }
-        let bounds = boxes.iter().copied().reduce(|a, b| union(&a, &b)).unwrap();
-        let extent = bounds.max - bounds.min;
-        let key = |b: &Aabb| if extent.x > extent.y { b.min.x + b.max.x } else { b.min.y + b.max.y };
-        boxes.sort_by(|a, b| key(a).total_cmp(&key(b)));
-        let (low, high) = boxes.split_at_mut(boxes.len() / 2);
-        perimeter(&bounds) + halved(low) + halved(high)
-    }
-
-    /// 20 % is the most that a tree kept through motion is claimed to lose
-    /// against one built anew (`catto2019`).
-    #[test]
-    fn motion_keeps_the_cost() {
-        let mut tree = Tree::new();
-        let mut out = Vec::new();
-        for frame in 0..60 {
-            tree.pairs(&scene(frame, 400), &mut out);
-            let rebuilt = halved(&mut tree.stored.iter().map(|p| p.aabb).collect::<Vec<_>>());
-            let cost = validate(&tree);
-            assert!(cost <= 1.2 * rebuilt, "frame {frame}: {cost} against {rebuilt}");
+        for frame in 0..200 {
+            let proxies = scene(frame, 400);
+            tree.pairs(&proxies, &mut out);
+            let cost = tree.cost();
+            let mut anew = Tree::new();
+            anew.pairs(&proxies, &mut out);
+            assert!(cost <= 1.3 * anew.cost(), "frame {frame}: {cost} against {}", anew.cost());
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Which contact goes to which lane: by colours, or one after the other.
 
 use super::{Layout, Needs, OppositeKind, Workspace};
-use crate::coloring::{Coloring, EXEMPT};
+use crate::coloring::{Coloring, EXEMPT, OVERFLOW};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 
@@ -10,6 +10,8 @@ use crate::lanes::LaneWidth;
 struct Group {
     contacts: Vec<u32>,
     edges: Vec<[u32; 2]>,
+    /// Colours of the last step.
+    kept: Vec<u8>,
     coloring: Coloring,
 }
 
@@ -34,12 +36,14 @@ pub struct Sides<F> {
 
 impl Assignment {
     /// Lanes of `width` colour by colour; what gets no colour goes one after the other.
+    ///
+    /// A contact keeps the colour that it has, if it can; all colours are noted in the contacts.
     pub fn colored(
         &mut self,
         work: &mut Workspace,
         width: LaneWidth,
         needs: &Needs,
-        contacts: &[Contact],
+        contacts: &mut [Contact],
         sides: &Sides<impl Fn(&Contact) -> OppositeKind>,
     ) {
         let Workspace { lanes, serial, .. } = work;
@@ -49,6 +53,7 @@ impl Assignment {
         for group in &mut self.groups {
             group.contacts.clear();
             group.edges.clear();
+            group.kept.clear();
         }
         for (i, contact) in contacts.iter().enumerate() {
             let kind = (sides.opposite)(contact);
@@ -56,12 +61,17 @@ impl Assignment {
             group.contacts.push(i as u32);
             let a = if kind == OppositeKind::Dynamic { contact.body_a } else { EXEMPT };
             group.edges.push([a, contact.body_b]);
+            group.kept.push(if contact.color == 0 { OVERFLOW } else { (contact.color - 1) as u8 });
         }
         let inert = sides.bodies as u32;
-        for (Group { contacts: list, edges, coloring }, kind) in self.groups.iter_mut().zip(OppositeKind::ALL)
+        for (Group { contacts: list, edges, kept, coloring }, kind) in
+            self.groups.iter_mut().zip(OppositeKind::ALL)
         {
             let layout = Layout::for_needs(needs, kind);
-            coloring.assign(edges, sides.bodies);
+            coloring.recolor(edges, kept, sides.bodies);
+            for (&contact, &color) in list.iter().zip(coloring.color_of()) {
+                contacts[contact as usize].color = if color == OVERFLOW { 0 } else { u32::from(color) + 1 };
+            }
             let contact = |&edge: &u32| list[edge as usize];
             for color in 0..coloring.colors() {
                 let edges = coloring.color(color).iter().map(contact);

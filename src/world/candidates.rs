@@ -1,7 +1,7 @@
 //! Pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
-use crate::contacts::Contact;
+use crate::contacts::{Contact, pair_key};
 use crate::narrowphase::batch::{Kind, NO_CONTACT};
 use crate::params::SPECULATIVE_DISTANCE;
 
@@ -26,11 +26,6 @@ pub(super) struct Candidate {
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;
 
 impl Candidate {
-    /// The shape pair as a sortable number, the lower shape index first.
-    fn key(&self) -> u64 {
-        key(self.shapes)
-    }
-
     /// A contact of this pair without a manifold.
     pub fn without_manifold(&self) -> Contact {
         Contact {
@@ -45,10 +40,6 @@ impl Candidate {
     }
 }
 
-fn key([i, j]: [u32; 2]) -> u64 {
-    (i.min(j) as u64) << 32 | i.max(j) as u64
-}
-
 impl World {
     /// Candidates from `self.pairs`; those that were there before keep their contact.
     ///
@@ -61,9 +52,9 @@ impl World {
         let mut last = narrow.last_candidates.iter().peekable();
         let mut kept = 0;
         for &[i, j] in &self.pairs {
-            let key = key([i, j]);
-            while last.next_if(|old| old.key() < key).is_some() {}
-            let candidate = match last.next_if(|old| old.key() == key) {
+            let key = pair_key(i, j);
+            while last.next_if(|old| pair_key(old.shapes[0], old.shapes[1]) < key).is_some() {}
+            let candidate = match last.next_if(|old| pair_key(old.shapes[0], old.shapes[1]) == key) {
                 Some(old) => *old,
                 None => {
                     let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };

@@ -5,7 +5,7 @@
 //! ```
 
 use crate::bodies::{Bodies, BodyDef, BodyKind};
-use crate::broadphase::{BroadPhase, Proxy};
+use crate::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::assign::Assignment;
 use crate::constraints::motion::{self, MotionInput};
@@ -14,7 +14,7 @@ use crate::constraints::{Needs, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 use crate::narrowphase::batch::{self, Kind};
-use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
+use crate::params::DIVERGED_SPEED;
 use crate::shapes::{Shape, combine};
 use collide::Narrow;
 use glam::Vec2;
@@ -65,6 +65,7 @@ pub struct World {
     surfaces: Vec<Surface>,
     broadphase: BroadPhase,
     proxies: Vec<Proxy>,
+    fat_boxes: FatBoxes,
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
     narrow: Narrow,
@@ -91,6 +92,7 @@ impl World {
             needs: Needs::NONE,
             surfaces: Vec::new(),
             proxies: Vec::new(),
+            fat_boxes: FatBoxes::default(),
             pairs: Vec::new(),
             pairs_are_stale: true,
             narrow: Narrow::default(),
@@ -111,7 +113,8 @@ impl World {
         });
         for part in &body.shapes {
             let shape = part.shape.translated(-center);
-            let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
+            // Fat boxes are made at the first step.
+            let aabb = shape.aabb(&self.bodies.pose(index));
             let mut reach = 0.0_f32;
             shape.for_each_vertex(|v| reach = reach.max(v.length()));
             let (kind, row) = batch::classify(&shape);
@@ -127,6 +130,7 @@ impl World {
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }
+        self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
         self.traits.add(body, self.bodies.round[index]);
         self.needs = self.traits.needs();
         self.pairs_are_stale = true;

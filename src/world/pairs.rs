@@ -1,28 +1,20 @@
 //! Bounds and candidate pairs.
 
 use super::World;
-use crate::bodies::BodyKind;
-use crate::params::{AABB_MARGIN, SPECULATIVE_DISTANCE};
 
 impl World {
-    /// Grows the bounds of shapes that left theirs; if any did, finds the pairs anew.
+    /// Renews the bounds of shapes that left theirs; if any did, brings the pairs up to date.
     pub(super) fn update_pairs(&mut self) {
-        for (i, shape) in self.shapes.iter().enumerate() {
-            let body = self.shape_body[i] as usize;
-            if self.bodies.kind[body] == BodyKind::Static {
-                continue;
-            }
-            let aabb = shape.aabb(&self.bodies.pose(body)).grown(SPECULATIVE_DISTANCE);
-            if !self.proxies[i].aabb.contains(&aabb) {
-                self.proxies[i].aabb = aabb.grown(AABB_MARGIN);
-                self.pairs_are_stale = true;
-            }
-        }
-        if !self.pairs_are_stale {
+        let World { bodies, shapes, proxies, pairs, .. } = self;
+        let moved = self.fat_boxes.update(bodies, shapes, self.settings.dt, proxies);
+        if self.pairs_are_stale {
+            self.broadphase.pairs(proxies, pairs);
+        } else if !moved.is_empty() {
+            self.broadphase.update(proxies, moved, pairs);
+        } else {
             return;
         }
         self.pairs_are_stale = false;
-        self.broadphase.pairs(&self.proxies, &mut self.pairs);
         self.update_candidates();
     }
 }
