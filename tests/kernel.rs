@@ -79,10 +79,11 @@ fn batches(setup: &Setup, width: usize) -> Batches {
         assert!(coloring.overflow().is_empty());
         let layout = Layout::for_needs(&Needs::FULL, opposite);
         for color in 0..coloring.colors() {
-            let contacts = coloring.color(color).iter().map(|&edge| members[edge as usize]);
-            batches.push_segment(opposite, &layout, contacts, BODIES as u32, |i| {
-                [setup.contacts[i as usize].body_a, setup.contacts[i as usize].body_b]
+            let contacts = coloring.color(color).iter().map(|&edge| {
+                let contact = &setup.contacts[members[edge as usize] as usize];
+                (members[edge as usize], [contact.body_a, contact.body_b])
             });
+            batches.push_segment(opposite, &layout, contacts, BODIES as u32);
         }
     }
     batches.reserve_slab();

@@ -9,6 +9,9 @@ use crate::lanes::LaneWidth;
 #[derive(Debug, Default)]
 struct Group {
     contacts: Vec<u32>,
+    /// Rows of a and b.
+    rows: Vec<[u32; 2]>,
+    /// The same, with a exempt unless it is dynamic.
     edges: Vec<[u32; 2]>,
     /// Colours of the last step.
     kept: Vec<u8>,
@@ -52,6 +55,7 @@ impl Assignment {
         (self.colors, self.overflow) = (0, 0);
         for group in &mut self.groups {
             group.contacts.clear();
+            group.rows.clear();
             group.edges.clear();
             group.kept.clear();
         }
@@ -59,12 +63,13 @@ impl Assignment {
             let kind = (sides.opposite)(contact);
             let group = &mut self.groups[kind as usize];
             group.contacts.push(i as u32);
+            group.rows.push([contact.body_a, contact.body_b]);
             let a = if kind == OppositeKind::Dynamic { contact.body_a } else { EXEMPT };
             group.edges.push([a, contact.body_b]);
             group.kept.push(if contact.color == 0 { OVERFLOW } else { (contact.color - 1) as u8 });
         }
         let inert = sides.bodies as u32;
-        for (Group { contacts: list, edges, kept, coloring }, kind) in
+        for (Group { contacts: list, rows, edges, kept, coloring }, kind) in
             self.groups.iter_mut().zip(OppositeKind::ALL)
         {
             let layout = Layout::for_needs(needs, kind);
@@ -72,14 +77,14 @@ impl Assignment {
             for (&contact, &color) in list.iter().zip(coloring.color_of()) {
                 contacts[contact as usize].color = if color == OVERFLOW { 0 } else { u32::from(color) + 1 };
             }
-            let contact = |&edge: &u32| list[edge as usize];
+            let contact = |&edge: &u32| (list[edge as usize], rows[edge as usize]);
             for color in 0..coloring.colors() {
                 let edges = coloring.color(color).iter().map(contact);
-                lanes.push_segment(kind, &layout, edges, inert, rows_of(contacts));
+                lanes.push_segment(kind, &layout, edges, inert);
             }
             let rest = coloring.overflow().iter().map(contact);
             self.overflow += rest.len();
-            serial.push_segment(kind, &layout, rest, inert, rows_of(contacts));
+            serial.push_segment(kind, &layout, rest, inert);
             self.colors += coloring.colors();
         }
         lanes.reserve_slab();
@@ -106,15 +111,9 @@ impl Assignment {
         for run in list.chunk_by(|i, j| kind_of(i) == kind_of(j)) {
             let kind = kind_of(&run[0]);
             let layout = Layout::for_needs(needs, kind);
-            serial.push_segment(kind, &layout, run.iter().copied(), sides.bodies as u32, rows_of(contacts));
+            let contact = |&i: &u32| (i, [contacts[i as usize].body_a, contacts[i as usize].body_b]);
+            serial.push_segment(kind, &layout, run.iter().map(contact), sides.bodies as u32);
         }
         serial.reserve_slab();
-    }
-}
-
-fn rows_of(contacts: &[Contact]) -> impl Fn(u32) -> [u32; 2] {
-    |contact| {
-        let contact = &contacts[contact as usize];
-        [contact.body_a, contact.body_b]
     }
 }

@@ -51,15 +51,14 @@ impl Batches {
         self.vectors = 0;
     }
 
-    /// Appends one segment of `contacts`, padded to whole batches with lanes that point
-    /// at the `inert` row. `bodies(contact)` gives the rows of a and b.
+    /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
+    /// batches with lanes that point at the `inert` row.
     pub fn push_segment(
         &mut self,
         opposite: OppositeKind,
         layout: &Layout,
-        contacts: impl ExactSizeIterator<Item = u32>,
+        contacts: impl ExactSizeIterator<Item = (u32, [u32; 2])>,
         inert: u32,
-        bodies: impl Fn(u32) -> [u32; 2],
     ) {
         if contacts.len() == 0 {
             return;
@@ -67,8 +66,7 @@ impl Batches {
         let batches = contacts.len().div_ceil(self.width);
         let first_lane = self.contact.len();
         self.segments.push(Segment { opposite, first_lane, batches, first_vector: self.vectors });
-        for contact in contacts {
-            let [a, b] = bodies(contact);
+        for (contact, [a, b]) in contacts {
             self.contact.push(contact);
             self.row_a.push(a);
             self.row_b.push(b);
