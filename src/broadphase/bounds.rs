@@ -128,17 +128,17 @@ impl FatBoxes {
         let speed = bodies.velocity(body).length();
         let spin = bodies.angular_velocity[body].abs();
         let mut slack = f32::INFINITY;
-        for i in first..last {
+        for (i, proxy) in (first..last).zip(&mut proxies[first..last]) {
             let tight = self.outlines[i].bounds(&pose).grown(SPECULATIVE_DISTANCE);
-            if self.slack[body] < 0.0 || !proxies[i].aabb.contains(&tight) {
+            if self.slack[body] < 0.0 || !proxy.aabb.contains(&tight) {
                 let extent = tight.max - tight.min;
                 let margin = AABB_MARGIN.min(MARGIN_FRACTION * extent.max_element());
                 let path = (speed + spin * self.reach[body]) * dt;
                 let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
-                proxies[i].aabb = if lasts { tight.grown(margin) } else { tight };
+                proxy.aabb = if lasts { tight.grown(margin) } else { tight };
                 self.moved.push(i as u32);
             }
-            slack = slack.min(inset(&proxies[i].aabb, &tight));
+            slack = slack.min(inset(&proxy.aabb, &tight));
         }
         if bodies.kind[body] == BodyKind::Static {
             slack = f32::INFINITY;

@@ -406,7 +406,7 @@ fn hilbert(mut x: u32, mut y: u32) -> u32 {
     let mut along = 0;
     for bit in (0..BITS).rev() {
         let (right, top) = (x >> bit & 1, y >> bit & 1);
-        along = along << 2 | (3 * right ^ top);
+        along = along << 2 | ((3 * right) ^ top);
         if top == 0 {
             if right == 1 {
                 (x, y) = (!x, !y);
@@ -497,6 +497,27 @@ mod tests {
             let proxies = scene(frame, count);
             tree.pairs(&proxies, &mut out);
             validate(&tree, &proxies);
+        }
+    }
+
+    /// Four levels, and ever other proxies that move, from one to all that are worth merging.
+    #[test]
+    fn updates_equal_a_new_tree() {
+        let mut proxies = scene(0, 5000);
+        let (mut tree, mut pairs, mut expected) = (Tree::new(), Vec::new(), Vec::new());
+        tree.pairs(&proxies, &mut pairs);
+        for frame in 1..40 {
+            let moved: Vec<u32> = (0..5000).filter(|i| (i * 7919 + frame) % (5000 / frame) == 0).collect();
+            assert!(moved.len() * FEW <= proxies.len());
+            for &i in &moved {
+                let shift = Vec2::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0) * 0.3;
+                let Aabb { min, max } = &mut proxies[i as usize].aabb;
+                (*min, *max) = (*min + shift, *max + shift);
+            }
+            tree.update(&proxies, &moved, &mut pairs);
+            validate(&tree, &proxies);
+            Tree::new().pairs(&proxies, &mut expected);
+            assert_eq!(pairs, expected, "frame {frame}");
         }
     }
 
