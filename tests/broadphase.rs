@@ -1,9 +1,14 @@
 //! Every kind of broad phase gives the pairs of the definition.
 
+mod common;
+
 use glam::Vec2;
 use proptest::prelude::*;
-use simpulse::broadphase::{BroadPhase, BroadPhaseKind, HashGrid, Proxy, all_pairs};
-use simpulse::shapes::Aabb;
+use simpulse::bodies::{Bodies, BodyDef, BodyKind};
+use simpulse::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, HashGrid, Proxy, all_pairs};
+use simpulse::params::SPECULATIVE_DISTANCE;
+use simpulse::shapes::{Aabb, MassProperties, Shape};
+use simpulse::solvers::VARIANTS;
 
 fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
     let min = Vec2::from(min);
@@ -269,5 +274,131 @@ proptest! {
                 prop_assert_eq!(&out, &defined, "{:?}", kind);
             }
         }
+    }
+
+    /// The same told which proxies changed: from one alone up to more than are worth merging.
+    #[test]
+    fn updates(
+        mut proxies in scene(),
+        frames in proptest::collection::vec(
+            proptest::collection::vec((0usize..120, -1.0f32..1.0, -1.0f32..1.0, -4..2i32), 0..20), 0..20),
+        grown in proxy(Style::Even),
+    ) {
+        for kind in BroadPhaseKind::ALL {
+            let mut broad_phase = BroadPhase::new(kind);
+            let (mut pairs, mut defined) = (Vec::new(), Vec::new());
+            broad_phase.pairs(&proxies, &mut pairs);
+            for frame in &frames {
+                let mut moved = Vec::new();
+                for &(i, dx, dy, scale) in frame {
+                    if let Some(proxy) = proxies.get_mut(i) {
+                        let step = Vec2::new(dx, dy) * 10f32.powi(scale);
+                        proxy.aabb.min += step;
+                        proxy.aabb.max += step * if scale == 0 { f32::NAN } else { 1.0 };
+                        proxy.group ^= i32::from(scale == 1);
+                        moved.push(i as u32);
+                    }
+                }
+                moved.sort();
+                moved.dedup();
+                if moved.len() == 7 {
+                    moved.push(proxies.len() as u32);
+                    proxies.push(grown);
+                }
+                broad_phase.update(&proxies, &moved, &mut pairs);
+                all_pairs(&proxies, &mut defined);
+                prop_assert_eq!(&pairs, &defined, "{:?}", kind);
+            }
+        }
+    }
+
+    /// Fat boxes hold the grown bounds whatever bodies do, and change only where it is told.
+    #[test]
+    fn fat_boxes_keep_their_promise(
+        far in prop::sample::select(vec![0.0f32, 1e3, 1e6]),
+        moves in proptest::collection::vec(
+            (0usize..12, -1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0, -5..2i32), 1..200),
+    ) {
+        let mut bodies = Bodies::default();
+        let (mut shapes, mut shape_body) = (Vec::new(), Vec::new());
+        for i in 0..12 {
+            let kind = [BodyKind::Dynamic, BodyKind::Dynamic, BodyKind::Kinematic][i % 3];
+            bodies.push(&body_def(kind, [f64::from(far) + i as f64, 0.0]), &MassProperties::ZERO);
+            for shape in &assortment()[i % 4..=i % 4 + i % 2] {
+                shapes.push(*shape);
+                shape_body.push(i as u32);
+            }
+        }
+        let bounds = |bodies: &Bodies, i: usize| {
+            shapes[i].aabb(&bodies.pose(shape_body[i] as usize)).grown(SPECULATIVE_DISTANCE)
+        };
+        let mut proxies: Vec<Proxy> =
+            (0..shapes.len()).map(|i| boxed([0.0; 2], [0.0; 2], shape_body[i])).collect();
+        let mut fat_boxes = FatBoxes::default();
+        fat_boxes.add(&bodies, &shape_body, &shapes);
+        prop_assert_eq!(fat_boxes.update(&bodies, 0.01, &mut proxies).len(), shapes.len());
+        for frame in moves.chunks(4) {
+            for &(body, dx, dy, turn, scale) in frame {
+                let scale = 10f32.powi(scale);
+                bodies.advance(body, Vec2::new(dx, dy) * scale);
+                let angle = bodies.angle(body) + turn * scale;
+                (bodies.rotation_sin[body], bodies.rotation_cos[body]) = angle.sin_cos();
+                bodies.velocity_x[body] = 100.0 * dx * scale;
+            }
+            let before = proxies.clone();
+            let moved = fat_boxes.update(&bodies, 0.01, &mut proxies).to_vec();
+            prop_assert!(moved.is_sorted_by(|a, b| a < b));
+            for (i, proxy) in proxies.iter().enumerate() {
+                let tight = bounds(&bodies, i);
+                let fat = proxy.aabb.grown(rounding(&tight));
+                prop_assert!(fat.contains(&tight), "shape {}: {:?} in {:?}", i, tight, proxy.aabb);
+                prop_assert_eq!(moved.contains(&(i as u32)), *proxy != before[i], "shape {}", i);
+            }
+        }
+    }
+}
+
+/// What bounds may be off by: four units in the last place of the largest coordinate.
+fn rounding(aabb: &Aabb) -> f32 {
+    4.0 * f32::EPSILON * aabb.min.abs().max(aabb.max.abs()).max_element()
+}
+
+fn body_def(kind: BodyKind, position: [f64; 2]) -> BodyDef {
+    BodyDef {
+        kind,
+        position,
+        angle: 0.3,
+        velocity: [0.0; 2],
+        angular_velocity: 0.0,
+        gravity_scale: 1.0,
+        linear_damping: 0.0,
+        angular_damping: 0.0,
+        group: 0,
+        shapes: Vec::new(),
+    }
+}
+
+/// One of each shape, off centre.
+fn assortment() -> [Shape; 5] {
+    let (a, b) = (Vec2::new(-0.5, 0.2), Vec2::new(2.0, 0.3));
+    [
+        Shape::rectangle("", Vec2::new(0.5, 0.1), Vec2::new(0.2, 0.0), 0.4, 0.05).unwrap(),
+        Shape::circle("", Vec2::new(0.3, 0.1), 0.4).unwrap(),
+        Shape::capsule("", a, b, 0.2).unwrap(),
+        Shape::segment("", a, b).unwrap(),
+        Shape::rectangle("", Vec2::new(3.0, 2.0), Vec2::ZERO, 0.0, 0.0).unwrap(),
+    ]
+}
+
+/// A world goes the same way whatever finds its pairs.
+#[test]
+fn worlds_do_not_depend_on_the_kind() {
+    for name in ["pyramid:12", "circle_pile:120", "smash"] {
+        let scene = common::scene(name);
+        let hashes = BroadPhaseKind::ALL.map(|kind| {
+            let settings = simpulse::world::Settings { broadphase: kind, ..common::settings(&VARIANTS[2]) };
+            common::run(&scene, settings, if name == "smash" { 12 } else { 150 }).state_hash()
+        });
+        assert!(hashes.iter().all(|&hash| hash == hashes[0]), "{name}: {hashes:x?}");
     }
 }

@@ -29,13 +29,16 @@
 //! every neighbour that is near and does not touch. So it is a fraction of the shape and at most
 //! [`AABB_MARGIN`]; and nothing for a shape that would cross it within [`LASTS`] steps, which
 //! would be searched for all the same, and nothing for static bodies.
+//!
+//! **Source:** boxes with a margin, Catto 2019 (`catto2019`). **Departure:** the test of (1).
 
 use super::Proxy;
 use crate::bodies::{Bodies, BodyKind};
 use crate::lanes::LaneVec;
-use crate::params::{AABB_MARGIN, SPECULATIVE_DISTANCE};
-use crate::shapes::{Aabb, Shape};
-use wide::f32x16;
+use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
+use crate::shapes::{Aabb, Pose, Shape};
+use glam::Vec2;
+use wide::{f32x8, f32x16};
 
 /// Margin as a fraction of the larger side of a shape's bounds (1).
 const MARGIN_FRACTION: f32 = 0.1;
@@ -54,6 +57,8 @@ pub struct FatBoxes {
     reach: LaneVec,
     /// The least of the body's shapes (m), infinite for a static body.
     slack: LaneVec,
+    /// Each shape in lanes, `[shapes]`.
+    outlines: Vec<Outline>,
     /// First shape of each body; its shapes follow one another.
     first_shape: Vec<u32>,
     /// Bodies that fail the test.
@@ -68,7 +73,8 @@ impl FatBoxes {
         for body in self.first_shape.len()..bodies.len() {
             let first = shape_body.partition_point(|&b| (b as usize) < body);
             let own = shape_body[first..].iter().take_while(|&&b| b as usize == body).count();
-            let reach = shapes[first..first + own].iter().map(core_reach).fold(0.0, f32::max);
+            self.outlines.extend(shapes[first..first + own].iter().map(Outline::new));
+            let reach = self.outlines[first..].iter().map(Outline::reach).fold(0.0, f32::max);
             self.first_shape.push(first as u32);
             for column in [&mut self.x, &mut self.y, &mut self.cos, &mut self.sin] {
                 column.push(0.0);
@@ -82,11 +88,11 @@ impl FatBoxes {
     /// Renews the boxes of shapes that left theirs; returns those shapes, ascending.
     ///
     /// `dt` (s) is the step over which velocities are thought to last.
-    pub fn update(&mut self, bodies: &Bodies, shapes: &[Shape], dt: f32, proxies: &mut [Proxy]) -> &[u32] {
+    pub fn update(&mut self, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) -> &[u32] {
         self.moved.clear();
         self.find_failed(bodies);
         for i in 0..self.failed.len() {
-            self.look_at(self.failed[i] as usize, bodies, shapes, dt, proxies);
+            self.look_at(self.failed[i] as usize, bodies, dt, proxies);
         }
         &self.moved
     }
@@ -115,24 +121,24 @@ impl FatBoxes {
     }
 
     /// Renews the boxes of one body where needed, and makes its pose the reference.
-    fn look_at(&mut self, body: usize, bodies: &Bodies, shapes: &[Shape], dt: f32, proxies: &mut [Proxy]) {
+    fn look_at(&mut self, body: usize, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) {
         let pose = bodies.pose(body);
         let first = self.first_shape[body] as usize;
-        let last = self.first_shape.get(body + 1).map_or(shapes.len(), |&next| next as usize);
+        let last = self.first_shape.get(body + 1).map_or(self.outlines.len(), |&next| next as usize);
         let speed = bodies.velocity(body).length();
         let spin = bodies.angular_velocity[body].abs();
         let mut slack = f32::INFINITY;
-        for i in first..last {
-            let tight = shapes[i].aabb(&pose).grown(SPECULATIVE_DISTANCE);
-            if self.slack[body] < 0.0 || !proxies[i].aabb.contains(&tight) {
+        for (i, proxy) in (first..last).zip(&mut proxies[first..last]) {
+            let tight = self.outlines[i].bounds(&pose).grown(SPECULATIVE_DISTANCE);
+            if self.slack[body] < 0.0 || !proxy.aabb.contains(&tight) {
                 let extent = tight.max - tight.min;
                 let margin = AABB_MARGIN.min(MARGIN_FRACTION * extent.max_element());
                 let path = (speed + spin * self.reach[body]) * dt;
                 let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
-                proxies[i].aabb = if lasts { tight.grown(margin) } else { tight };
+                proxy.aabb = if lasts { tight.grown(margin) } else { tight };
                 self.moved.push(i as u32);
             }
-            slack = slack.min(inset(&proxies[i].aabb, &tight));
+            slack = slack.min(inset(&proxy.aabb, &tight));
         }
         if bodies.kind[body] == BodyKind::Static {
             slack = f32::INFINITY;
@@ -151,11 +157,49 @@ fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
     (low.min(high) * 0.999 - 16.0 * f32::EPSILON * largest).max(0.0)
 }
 
-/// r of (1): the largest distance of a core point from the centre of mass (m).
-fn core_reach(shape: &Shape) -> f32 {
-    match shape {
-        Shape::Circle { center, .. } => center.length(),
-        Shape::Capsule { a, b, .. } | Shape::Segment { a, b } => a.length().max(b.length()),
-        Shape::Polygon(polygon) => polygon.vertices().iter().map(|v| v.length()).fold(0.0, f32::max),
+/// The core points of a shape, some of them repeated, and its radius (m).
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    x: [f32; MAX_POLYGON_VERTICES],
+    y: [f32; MAX_POLYGON_VERTICES],
+    radius: f32,
+}
+
+impl Outline {
+    fn new(shape: &Shape) -> Self {
+        let ends = |a, b| std::array::from_fn(|i| if i % 2 == 0 { a } else { b });
+        let (core, radius) = match *shape {
+            Shape::Circle { center, radius } => ([center; MAX_POLYGON_VERTICES], radius),
+            Shape::Capsule { a, b, radius } => (ends(a, b), radius),
+            Shape::Segment { a, b } => (ends(a, b), 0.0),
+            Shape::Polygon(polygon) => (polygon.vertices, polygon.radius),
+        };
+        Outline { x: core.map(|c| c.x), y: core.map(|c| c.y), radius }
+    }
+
+    /// r of (1).
+    fn reach(&self) -> f32 {
+        self.x.iter().zip(&self.y).map(|(&x, &y)| Vec2::new(x, y).length()).fold(0.0, f32::max)
+    }
+
+    /// [`Shape::aabb`], by the same operations on all points at once.
+    #[inline]
+    fn bounds(&self, pose: &Pose) -> Aabb {
+        let (cos, sin) = (f32x8::splat(pose.rotation.x), f32x8::splat(pose.rotation.y));
+        let (x, y) = (f32x8::new(self.x), f32x8::new(self.y));
+        let (x, y) = ((cos * x - sin * y).to_array(), (sin * x + cos * y).to_array());
+        let fold = |mut v: [f32; MAX_POLYGON_VERTICES], pick: fn(f32, f32) -> f32| {
+            for half in [4, 2, 1] {
+                for i in 0..half {
+                    v[i] = pick(v[i], v[i + half]);
+                }
+            }
+            v[0]
+        };
+        let low = |a: f32, b: f32| if a < b { a } else { b };
+        let high = |a: f32, b: f32| if a > b { a } else { b };
+        let min = pose.position + Vec2::new(fold(x, low), fold(y, low));
+        let max = pose.position + Vec2::new(fold(x, high), fold(y, high));
+        Aabb { min, max }.grown(self.radius)
     }
 }

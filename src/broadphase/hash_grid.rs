@@ -29,6 +29,7 @@
 //! (`teschner2003`); a grid per size class, Mirtich 1996 (`mirtich1996`).
 
 use super::Proxy;
+use super::sort::PairSort;
 use glam::Vec2;
 use std::ops::Range;
 
@@ -65,8 +66,7 @@ pub struct HashGrid {
     entries: Vec<Entry>,
     /// Pairs as they are met; only a prefix is in use.
     found: Vec<[u32; 2]>,
-    /// First pair of each proxy in the sorted list, `[proxies + 2]`.
-    first: Vec<u32>,
+    sort: PairSort,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -153,7 +153,7 @@ impl HashGrid {
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
         self.fill(proxies);
         let found = self.search();
-        self.sort_pairs(proxies.len(), found, out);
+        self.sort.sort(proxies.len(), &self.found[..found], out);
     }
 
     /// Bytes of memory that depend on the proxies but not on the pairs; at
@@ -161,7 +161,8 @@ impl HashGrid {
     pub fn bytes(&self) -> usize {
         self.levels.capacity() * size_of::<Level>()
             + self.class.capacity() * size_of::<u16>()
-            + (self.bucket.capacity() + self.starts.capacity() + self.first.capacity()) * size_of::<u32>()
+            + (self.bucket.capacity() + self.starts.capacity()) * size_of::<u32>()
+            + self.sort.bytes()
             + self.entries.capacity() * size_of::<Entry>()
     }
 
@@ -265,35 +266,6 @@ impl HashGrid {
             }
         }
         search.len
-    }
-
-    /// Sorts the first `found` pairs into `out`: by counting for the lower
-    /// index, then each proxy's few partners among themselves.
-    fn sort_pairs(&mut self, proxies: usize, found: usize, out: &mut Vec<[u32; 2]>) {
-        let found = &self.found[..found];
-        self.first.clear();
-        self.first.resize(proxies + 2, 0);
-        for pair in found {
-            self.first[pair[0] as usize + 2] += 1;
-        }
-        let mut sum = 0;
-        for first in &mut self.first {
-            sum += *first;
-            *first = sum;
-        }
-        out.clear();
-        out.resize(found.len(), [0; 2]);
-        for &pair in found {
-            let next = &mut self.first[pair[0] as usize + 1];
-            out[*next as usize] = pair;
-            *next += 1;
-        }
-        for range in self.first[..=proxies].windows(2) {
-            let partners = &mut out[range[0] as usize..range[1] as usize];
-            if partners.len() > 1 {
-                partners.sort_unstable_by_key(|pair| pair[1]);
-            }
-        }
     }
 }
 

@@ -64,7 +64,7 @@ impl Settings {
             record_impulses: false,
             observe_rule: false,
             timed: false,
-            broadphase: BroadPhaseKind::HashGrid,
+            broadphase: BroadPhaseKind::default(),
             integrator: Integrator::default(),
             rotation: RotationUpdate::default(),
             extra_needs: Needs::NONE,

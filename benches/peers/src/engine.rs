@@ -125,7 +125,7 @@ impl Contender {
         match self.maker {
             Maker::Box2d => "Box2D x8".into(),
             Maker::Rapier => "rapier x8".into(),
-            Maker::Simpulse(width, BroadPhaseKind::Tree) => format!("simpulse x{} tree", width.lanes()),
+            Maker::Simpulse(width, BroadPhaseKind::HashGrid) => format!("simpulse x{} grid", width.lanes()),
             Maker::Simpulse(width, _) => format!("simpulse x{}", width.lanes()),
         }
     }
@@ -166,7 +166,7 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     let widths = if quick { &default[..] } else { &every[..3] };
     add(ours(LaneWidth::W8), widths);
     add(ours(LaneWidth::W4), widths);
-    add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::Tree), &default);
+    add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::HashGrid), &default);
     let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all
