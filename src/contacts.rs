@@ -57,11 +57,9 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// One more than the colour it was last solved in, or 0.
-    pub color: u32,
     /// Fills the last quad.
     #[doc(hidden)]
-    pub padding: [u32; 2],
+    pub padding: [u32; 3],
 }
 
 /// Quads of a [`Contact`], and which of them holds what.

@@ -1,7 +1,7 @@
 //! Which contact goes to which lane: by colours, or one after the other.
 
 use super::{Layout, Needs, OppositeKind, Workspace};
-use crate::coloring::{Coloring, EXEMPT, OVERFLOW};
+use crate::coloring::{Coloring, EXEMPT};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 
@@ -13,8 +13,6 @@ struct Group {
     rows: Vec<[u32; 2]>,
     /// The same, with a exempt unless it is dynamic.
     edges: Vec<[u32; 2]>,
-    /// Colours of the last step.
-    kept: Vec<u8>,
     coloring: Coloring,
 }
 
@@ -39,14 +37,12 @@ pub struct Sides<F> {
 
 impl Assignment {
     /// Lanes of `width` colour by colour; what gets no colour goes one after the other.
-    ///
-    /// A contact keeps the colour that it has, if it can; all colours are noted in the contacts.
     pub fn colored(
         &mut self,
         work: &mut Workspace,
         width: LaneWidth,
         needs: &Needs,
-        contacts: &mut [Contact],
+        contacts: &[Contact],
         sides: &Sides<impl Fn(&Contact) -> OppositeKind>,
     ) {
         let Workspace { lanes, serial, .. } = work;
@@ -57,7 +53,6 @@ impl Assignment {
             group.contacts.clear();
             group.rows.clear();
             group.edges.clear();
-            group.kept.clear();
         }
         for (i, contact) in contacts.iter().enumerate() {
             let kind = (sides.opposite)(contact);
@@ -66,17 +61,13 @@ impl Assignment {
             group.rows.push([contact.body_a, contact.body_b]);
             let a = if kind == OppositeKind::Dynamic { contact.body_a } else { EXEMPT };
             group.edges.push([a, contact.body_b]);
-            group.kept.push(if contact.color == 0 { OVERFLOW } else { (contact.color - 1) as u8 });
         }
         let inert = sides.bodies as u32;
-        for (Group { contacts: list, rows, edges, kept, coloring }, kind) in
+        for (Group { contacts: list, rows, edges, coloring }, kind) in
             self.groups.iter_mut().zip(OppositeKind::ALL)
         {
             let layout = Layout::for_needs(needs, kind);
-            coloring.recolor(edges, kept, sides.bodies);
-            for (&contact, &color) in list.iter().zip(coloring.color_of()) {
-                contacts[contact as usize].color = if color == OVERFLOW { 0 } else { u32::from(color) + 1 };
-            }
+            coloring.assign(edges, sides.bodies);
             let contact = |&edge: &u32| (list[edge as usize], rows[edge as usize]);
             for color in 0..coloring.colors() {
                 let edges = coloring.color(color).iter().map(contact);

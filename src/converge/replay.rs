@@ -215,7 +215,7 @@ impl<'a> Replay<'a> {
         let problem = self.problem;
         let sides =
             Sides { bodies: problem.bodies.len(), opposite: |contact: &Contact| opposite(problem, contact) };
-        let (work, needs, contacts) = (&mut self.work, &self.input.needs, &mut self.contacts);
+        let (work, needs, contacts) = (&mut self.work, &self.input.needs, &self.contacts);
         let mut assignment = Assignment::default();
         if sequence == Sequence::Colored {
             assignment.colored(work, self.width, needs, contacts, &sides);

@@ -22,7 +22,7 @@ impl World {
             BodyKind::Static => OppositeKind::Static,
         };
         let sides = Sides { bodies: kinds.len(), opposite };
-        let (work, contacts) = (&mut self.work, &mut self.contacts);
+        let (work, contacts) = (&mut self.work, &self.contacts);
         match self.settings.order {
             Order::Natural => {
                 self.assignment.serial(work, needs, contacts, 0..contacts.len() as u32, &sides);
