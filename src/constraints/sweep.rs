@@ -44,7 +44,7 @@
 
 use super::batches::{Batches, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes, prefetch};
 use crate::params::MAX_POSITION_CORRECTION;
 
 /// How a solver turns the state of a normal row into its new accumulated impulse.
@@ -338,10 +338,16 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelNeeds, O: Opposite>(
     let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
     let row_a = batches.row_a[lanes.clone()].chunks_exact(L::WIDTH);
     let row_b = batches.row_b[lanes].chunks_exact(L::WIDTH);
-    for ((record, row_a), row_b) in records.chunks_exact_mut(stride).zip(row_a).zip(row_b) {
+    let mut rest = records;
+    for (row_a, row_b) in row_a.zip(row_b) {
+        let (record, later) = rest.split_at_mut(stride);
+        prefetch(later, (AHEAD - 1) * stride..AHEAD * stride);
         visit(rows, record, row_a, row_b);
+        rest = later;
     }
 }
+
+const AHEAD: usize = 4;
 
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
 macro_rules! over_segments {
