@@ -15,9 +15,11 @@
 
 mod aligned;
 mod rows;
+mod store;
 
 pub use aligned::{Block, LaneVec};
 pub use rows::BodyRow;
+pub use store::{RowColumns, RowStore};
 
 use bytemuck::Pod;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -155,6 +157,18 @@ pub trait Lanes:
     /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
     unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]);
 
+    /// `values[index[lane]]` in every lane.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each less than `values.len()`.
+    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self;
+
+    /// `values[index[lane]] = v[lane]`, in lane order.
+    ///
+    /// # Safety
+    /// As [`Self::load_at`].
+    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self);
+
     /// Zero in every lane.
     #[inline(always)]
     fn zero() -> Self {
@@ -217,10 +231,22 @@ impl Lanes for f32 {
         // SAFETY: the caller keeps `index` in bounds.
         unsafe { rows::scatter_1::<1>(rows, index, delta) }
     }
+
+    #[inline(always)]
+    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::load_each(values, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::store_each(values, index, v) }
+    }
 }
 
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, $gather:path, $scatter:ident) => {
+    ($type:ty, $width:literal, $gather:path, $scatter:ident, $load:ident, $store:ident) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
@@ -276,14 +302,26 @@ macro_rules! wide_lanes {
                 // SAFETY: the caller keeps `index` in bounds.
                 unsafe { rows::$scatter::<1>(rows, index, delta) }
             }
+
+            #[inline(always)]
+            unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$load(values, index) }
+            }
+
+            #[inline(always)]
+            unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$store(values, index, v) }
+            }
         }
     };
 }
 
 use bytemuck::Zeroable;
-wide_lanes!(f32x4, 4, rows::gather_4, scatter_4);
-wide_lanes!(f32x8, 8, rows::gather_8, scatter_8);
-wide_lanes!(f32x16, 16, rows::gather_16, scatter_16);
+wide_lanes!(f32x4, 4, rows::gather_4, scatter_4, load_each, store_each);
+wide_lanes!(f32x8, 8, rows::gather_8, scatter_8, load_each, store_each);
+wide_lanes!(f32x16, 16, rows::gather_16, scatter_16, load_at_16, store_at_16);
 
 #[cfg(test)]
 mod tests {
@@ -374,6 +412,16 @@ mod tests {
             prop_assert_eq!(deltas[i].delta, rows[i].delta.map(|x| x + add));
             prop_assert_eq!(deltas[i].velocity, rows[i].velocity);
         }
+        let mut columns = RowColumns::from_rows(&rows);
+        // SAFETY: as above.
+        unsafe {
+            prop_assert_eq!(columns.gather::<L>(index).map(floats), v.map(floats));
+            columns.scatter_velocity(index, [plus(v[0]), plus(v[1]), plus(v[2]), v[3]]);
+        }
+        for (got, row) in velocities.iter_mut().zip(&rows) {
+            got.velocity[3] = row.velocity[3];
+        }
+        prop_assert_eq!(columns.to_rows(), velocities);
         Ok(())
     }
 
