@@ -262,8 +262,8 @@ fn an_eager_rule_cannot_move_padding() {
     struct Eager;
     impl NormalRule for Eager {
         const FRICTION: bool = false;
-        fn normal_impulse<L: Lanes>(&self, _: bool, _: L, _: L, mass: L, old: L) -> L {
-            mass.mul_add(L::splat(7.0), old)
+        fn line<L: Lanes>(&self, _: bool, _: L, mass: L, old: L) -> [L; 2] {
+            [mass.mul_add(L::splat(7.0), old), L::zero()]
         }
     }
     let body = BodyRow { velocity: [0.0, 0.0, 0.0, 1.0], delta: [0.0, 0.0, 0.0, 1.0] };

@@ -129,8 +129,8 @@ mod tests {
         struct Deaf;
         impl NormalRule for Deaf {
             const FRICTION: bool = false;
-            fn normal_impulse<L: Lanes>(&self, _: bool, _: L, _: L, _: L, old: L) -> L {
-                old
+            fn line<L: Lanes>(&self, _: bool, _: L, _: L, old: L) -> [L; 2] {
+                [old, L::zero()]
             }
         }
         assert_eq!(ObservedRule::of(Deaf, &[]).law(false, 0.0, 1.0), None);

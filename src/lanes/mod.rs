@@ -16,10 +16,12 @@
 mod aligned;
 mod quads;
 mod rows;
+mod store;
 
 pub use aligned::{Block, LaneVec};
 pub use quads::Quad;
 pub use rows::BodyRow;
+pub use store::{RowColumns, RowStore};
 
 use bytemuck::Pod;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -92,6 +94,23 @@ pub fn target_features() -> &'static str {
     } else {
         "scalar"
     }
+}
+
+/// Asks for the cache lines of `values[range]`; past the end, nothing is asked for. A hint: it
+/// changes no value, and on targets without such an instruction it does nothing.
+#[inline(always)]
+pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
+    #[cfg(target_arch = "x86_64")]
+    if range.end <= values.len() {
+        let bytes = range.len() * size_of::<T>();
+        for line in 0..bytes.div_ceil(64) {
+            let address = values.as_ptr().wrapping_add(range.start).cast::<i8>().wrapping_add(64 * line);
+            // SAFETY: a prefetch never faults.
+            unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(address) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, range);
 }
 
 /// `WIDTH` floats that are worked on together.
@@ -168,6 +187,18 @@ pub trait Lanes:
 
     /// The whole number n in [0, 2²³) that `self` holds, as the bits of the integer n.
     fn integer_bits(self) -> Self;
+
+    /// `values[index[lane]]` in every lane.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each less than `values.len()`.
+    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self;
+
+    /// `values[index[lane]] = v[lane]`, in lane order.
+    ///
+    /// # Safety
+    /// As [`Self::load_at`].
+    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self);
 
     /// Zero in every lane.
     #[inline(always)]
@@ -263,6 +294,18 @@ impl Lanes for f32 {
     fn integer_bits(self) -> Self {
         f32::from_bits((self + INTEGERS).to_bits() & MANTISSA)
     }
+
+    #[inline(always)]
+    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::load_each(values, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { rows::store_each(values, index, v) }
+    }
 }
 
 /// Floats from 2²³ on are the integers, and their last 23 bits count from there.
@@ -270,7 +313,7 @@ const INTEGERS: f32 = 8_388_608.0;
 const MANTISSA: u32 = 0x007F_FFFF;
 
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, $gather:path, $scatter:ident, $gather_quads:ident, $halves:ident) => {
+    ($type:ty, $width:literal, $gather:path, $scatter:ident, $gather_quads:ident, $halves:ident, $load:ident, $store:ident) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
@@ -365,14 +408,26 @@ macro_rules! wide_lanes {
             fn integer_bits(self) -> Self {
                 (self + <$type>::splat(INTEGERS)) & <$type>::splat(f32::from_bits(MANTISSA))
             }
+
+            #[inline(always)]
+            unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$load(values, index) }
+            }
+
+            #[inline(always)]
+            unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
+                // SAFETY: the caller keeps `index` in bounds.
+                unsafe { rows::$store(values, index, v) }
+            }
         }
     };
 }
 
 use bytemuck::Zeroable;
-wide_lanes!(f32x4, 4, rows::gather_4, scatter_4, gather_4, scatter_halves_4);
-wide_lanes!(f32x8, 8, rows::gather_8, scatter_8, gather_8, scatter_halves_8);
-wide_lanes!(f32x16, 16, rows::gather_16, scatter_16, gather_16, scatter_halves_16);
+wide_lanes!(f32x4, 4, rows::gather_4, scatter_4, gather_4, scatter_halves_4, load_each, store_each);
+wide_lanes!(f32x8, 8, rows::gather_8, scatter_8, gather_8, scatter_halves_8, load_each, store_each);
+wide_lanes!(f32x16, 16, rows::gather_16, scatter_16, gather_16, scatter_halves_16, load_at_16, store_at_16);
 
 #[cfg(test)]
 mod tests {
@@ -463,6 +518,16 @@ mod tests {
             prop_assert_eq!(deltas[i].delta, rows[i].delta.map(|x| x + add));
             prop_assert_eq!(deltas[i].velocity, rows[i].velocity);
         }
+        let mut columns = RowColumns::from_rows(&rows);
+        // SAFETY: as above.
+        unsafe {
+            prop_assert_eq!(columns.gather::<L>(index).map(floats), v.map(floats));
+            columns.scatter_velocity(index, [plus(v[0]), plus(v[1]), plus(v[2]), v[3]]);
+        }
+        for (got, row) in velocities.iter_mut().zip(&rows) {
+            got.velocity[3] = row.velocity[3];
+        }
+        prop_assert_eq!(columns.to_rows(), velocities);
         Ok(())
     }
 

@@ -1,7 +1,8 @@
 //! Gather and scatter of body rows: the only unsafe code of the crate.
 //!
 //! A row is 32 bytes, so a body is one aligned load. Rows are loaded whole and
-//! transposed in registers. The transposes stay inside 128-bit lanes: 128-bit
+//! transposed in registers. The transposes stay inside 128-bit lanes, except where whole rows
+//! are read (16 lanes): 128-bit
 //! lane `q` of vector `k` is loaded with half a row of body `4q + k`, so that one
 //! 4 × 4 transpose of each 128-bit lane (8 shuffles for any width) puts component
 //! `c` of bodies `0..W`, in order, into vector `c`.
@@ -91,10 +92,39 @@ pub unsafe fn scatter_4<const HALF: usize>(rows: &mut [BodyRow], index: &[u32], 
     }
 }
 
+/// `values[index[lane]]` in every lane, one after the other.
+///
+/// # Safety
+/// `index` holds at least as many entries as `V` floats, each less than `values.len()`.
+#[inline(always)]
+pub unsafe fn load_each<V: Pod>(values: &[f32], index: &[u32]) -> V {
+    let mut v = V::zeroed();
+    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut v));
+    for (lane, float) in floats.iter_mut().enumerate() {
+        // SAFETY: the caller keeps `index` in bounds.
+        *float = unsafe { *values.get_unchecked(*index.get_unchecked(lane) as usize) };
+    }
+    v
+}
+
+/// `values[index[lane]] = v[lane]`, in lane order.
+///
+/// # Safety
+/// `index` holds at least as many entries as `V` floats, each less than `values.len()`.
+#[inline(always)]
+pub unsafe fn store_each<V: Pod>(values: &mut [f32], index: &[u32], v: V) {
+    for (lane, float) in bytemuck::cast_slice::<V, f32>(&[v]).iter().enumerate() {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { *values.get_unchecked_mut(*index.get_unchecked(lane) as usize) = *float };
+    }
+}
+
+#[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
+pub use self::{load_each as load_at_16, store_each as store_at_16};
 #[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
 pub use avx::{gather_8, scatter_8};
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
-pub use avx512::{gather_16, scatter_16};
+pub use avx512::{gather_16, load_at_16, scatter_16, store_at_16};
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx")))]
 pub use halves::{gather_8, scatter_8};
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
@@ -225,45 +255,69 @@ mod avx512 {
         }
     }
 
-    /// Half rows of bodies `k`, `4 + k`, `8 + k` and `12 + k`, one per 128-bit lane.
+    /// Whole rows of bodies `i` and `i + 4`, one per 256-bit half.
+    ///
+    /// # Safety
+    /// `index` holds at least `i + 5` entries, each less than `rows.len()`.
+    #[inline(always)]
+    unsafe fn load(rows: &[BodyRow], index: &[u32], i: usize) -> __m512 {
+        // SAFETY: the caller keeps the indices in bounds; a row is eight floats, aligned to 32 bytes.
+        unsafe {
+            let low = _mm512_castps256_ps512(_mm256_load_ps(half::<0>(rows, index, i)));
+            _mm512_insertf32x8::<1>(low, _mm256_load_ps(half::<0>(rows, index, i + 4)))
+        }
+    }
+
+    /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles. By half rows, 32 loads,
+    /// 24 of them with an insert, and 16 shuffles, sweeps are 6 % slower. Masked broadcasts in
+    /// place of the inserts changed nothing.
     ///
     /// # Safety
     /// `index` holds at least 16 entries, each less than `rows.len()`.
     #[inline(always)]
-    unsafe fn load<const HALF: usize>(rows: &[BodyRow], index: &[u32], k: usize) -> __m512 {
-        // SAFETY: the caller keeps the 16 indices in bounds; half a row is four floats.
+    pub unsafe fn gather_16(rows: &[BodyRow], index: &[u32]) -> [f32x16; 8] {
+        // SAFETY: the caller keeps the 16 indices in bounds.
         unsafe {
-            let v = _mm512_castps128_ps512(_mm_load_ps(half::<HALF>(rows, index, k)));
-            let v = _mm512_insertf32x4::<1>(v, _mm_load_ps(half::<HALF>(rows, index, 4 + k)));
-            let v = _mm512_insertf32x4::<2>(v, _mm_load_ps(half::<HALF>(rows, index, 8 + k)));
-            _mm512_insertf32x4::<3>(v, _mm_load_ps(half::<HALF>(rows, index, 12 + k)))
+            // In 128-bit lanes: velocities of bodies 0..4, deltas of the same, then of 4..8.
+            let p = transpose([
+                load(rows, index, 0),
+                load(rows, index, 1),
+                load(rows, index, 2),
+                load(rows, index, 3),
+            ]);
+            // The same of bodies 8..16.
+            let q = transpose([
+                load(rows, index, 8),
+                load(rows, index, 9),
+                load(rows, index, 10),
+                load(rows, index, 11),
+            ]);
+            let velocity = |c: usize| from_m512(_mm512_shuffle_f32x4::<0b10_00_10_00>(p[c], q[c]));
+            let delta = |c: usize| from_m512(_mm512_shuffle_f32x4::<0b11_01_11_01>(p[c], q[c]));
+            [velocity(0), velocity(1), velocity(2), velocity(3), delta(0), delta(1), delta(2), delta(3)]
         }
     }
 
     /// # Safety
-    /// `index` holds at least 16 entries, each less than `rows.len()`.
+    /// `index` holds at least 16 entries, each less than `values.len()` and than 2³¹.
     #[inline(always)]
-    unsafe fn load_transposed<const HALF: usize>(rows: &[BodyRow], index: &[u32]) -> [f32x16; 4] {
-        // SAFETY: the caller keeps the indices in bounds. Calls written out, because a
-        // closure under `map` is not always inlined.
-        let t = transpose(unsafe {
-            [
-                load::<HALF>(rows, index, 0),
-                load::<HALF>(rows, index, 1),
-                load::<HALF>(rows, index, 2),
-                load::<HALF>(rows, index, 3),
-            ]
-        });
-        [from_m512(t[0]), from_m512(t[1]), from_m512(t[2]), from_m512(t[3])]
+    pub unsafe fn load_at_16(values: &[f32], index: &[u32]) -> f32x16 {
+        // SAFETY: the caller keeps the 16 indices in bounds; the load of indices is unaligned.
+        from_m512(unsafe {
+            let index = _mm512_loadu_si512(index.as_ptr().cast());
+            _mm512_i32gather_ps::<4>(index, values.as_ptr())
+        })
     }
 
     /// # Safety
-    /// `index` holds at least 16 entries, each less than `rows.len()`.
+    /// `index` holds at least 16 entries, each less than `values.len()` and than 2³¹.
     #[inline(always)]
-    pub unsafe fn gather_16(rows: &[BodyRow], index: &[u32]) -> [f32x16; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        let (l, h) = unsafe { (load_transposed::<0>(rows, index), load_transposed::<1>(rows, index)) };
-        [l[0], l[1], l[2], l[3], h[0], h[1], h[2], h[3]]
+    pub unsafe fn store_at_16(values: &mut [f32], index: &[u32], v: f32x16) {
+        // SAFETY: as above.
+        unsafe {
+            let index = _mm512_loadu_si512(index.as_ptr().cast());
+            _mm512_i32scatter_ps::<4>(values.as_mut_ptr(), index, into_m512(v));
+        }
     }
 
     /// # Safety

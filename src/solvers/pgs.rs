@@ -73,10 +73,10 @@ impl NormalRule for BaumgarteRule {
     const FRICTION: bool = true;
 
     #[inline(always)]
-    fn normal_impulse<L: Lanes>(&self, _stiff: bool, vn: L, separation: L, mass: L, old: L) -> L {
+    fn line<L: Lanes>(&self, _stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
         let gap = separation.max(L::zero()) * L::splat(self.inv_h);
         let overlap = (separation + L::splat(LINEAR_SLOP)).min(L::zero());
         let push = (overlap * L::splat(BAUMGARTE * self.inv_h)).max(L::splat(-MAX_PUSH_SPEED));
-        mass.neg_mul_add(vn + (gap + push), old).max(L::zero())
+        [mass.neg_mul_add(gap + push, old), mass]
     }
 }

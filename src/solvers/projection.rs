@@ -48,8 +48,7 @@ impl NormalRule for ProjectionRule {
     const FRICTION: bool = false;
 
     #[inline(always)]
-    fn normal_impulse<L: Lanes>(&self, _stiff: bool, vn: L, separation: L, mass: L, old: L) -> L {
-        let stopped = mass.neg_mul_add(vn, old).max(L::zero());
-        (L::splat(LINEAR_SLOP) - separation).select_positive(stopped, old)
+    fn line<L: Lanes>(&self, _stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        [old, (L::splat(LINEAR_SLOP) - separation).select_positive(mass, L::zero())]
     }
 }

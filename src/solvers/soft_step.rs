@@ -113,14 +113,14 @@ impl NormalRule for SoftRule {
     const FRICTION: bool = true;
 
     #[inline(always)]
-    fn normal_impulse<L: Lanes>(&self, stiff: bool, vn: L, separation: L, mass: L, old: L) -> L {
+    fn line<L: Lanes>(&self, stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
         let soft = if stiff { self.stiff } else { self.dynamic };
         let gap = separation * L::splat(self.inv_h);
         let push = (separation * L::splat(soft.mass_scale * soft.bias_rate)).max(L::splat(-MAX_PUSH_SPEED));
         let bias = separation.select_positive(gap, push);
         let scale = separation.select_positive(L::splat(1.0), L::splat(soft.mass_scale));
         let keep = separation.select_positive(L::splat(1.0), L::splat(1.0 - soft.impulse_scale));
-        mass.neg_mul_add(scale.mul_add(vn, bias), keep * old).max(L::zero())
+        [mass.neg_mul_add(bias, keep * old), mass * scale]
     }
 }
 
@@ -135,8 +135,8 @@ impl NormalRule for RigidRule {
     const FRICTION: bool = true;
 
     #[inline(always)]
-    fn normal_impulse<L: Lanes>(&self, _stiff: bool, vn: L, separation: L, mass: L, old: L) -> L {
+    fn line<L: Lanes>(&self, _stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
         let gap = separation.max(L::zero()) * L::splat(self.inv_h);
-        mass.neg_mul_add(vn + gap, old).max(L::zero())
+        [mass.neg_mul_add(gap, old), mass]
     }
 }

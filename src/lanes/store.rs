@@ -1,0 +1,78 @@
+//! Where sweeps keep the rows of bodies: packed, as solvers do, or in columns, to compare.
+
+use super::{BodyRow, LaneVec, Lanes};
+
+/// Rows of bodies that a sweep gathers from and scatters to.
+pub trait RowStore {
+    /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]` of the rows that `index` names.
+    ///
+    /// # Safety
+    /// `index` holds at least `WIDTH` entries, each of them a row of the store.
+    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8];
+
+    /// Writes back `[vx, vy, ω, m⁻¹]`, in lane order.
+    ///
+    /// # Safety
+    /// As [`Self::gather`].
+    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]);
+}
+
+impl RowStore for [BodyRow] {
+    #[inline(always)]
+    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { L::gather(self, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { L::scatter_velocity(self, index, velocity) }
+    }
+}
+
+/// A column per quantity of a row: the pure structure of arrays.
+///
+/// Solvers do not use it: a body is then eight cache lines instead of one, and eight gathers of
+/// one float a lane instead of one aligned load a body. It is here so that `benches/kernel.rs`
+/// can say what that costs.
+#[derive(Clone, Debug, Default)]
+pub struct RowColumns {
+    columns: [LaneVec; 8],
+}
+
+impl RowColumns {
+    /// The columns of `rows`.
+    pub fn from_rows(rows: &[BodyRow]) -> Self {
+        let mut columns: [LaneVec; 8] = Default::default();
+        for row in rows {
+            for (column, value) in columns.iter_mut().zip(row.velocity.iter().chain(&row.delta)) {
+                column.push(*value);
+            }
+        }
+        RowColumns { columns }
+    }
+
+    /// The same rows, packed.
+    pub fn to_rows(&self) -> Vec<BodyRow> {
+        let at = |i: usize, first: usize| std::array::from_fn(|k| self.columns[first + k][i]);
+        (0..self.columns[0].len()).map(|i| BodyRow { velocity: at(i, 0), delta: at(i, 4) }).collect()
+    }
+}
+
+impl RowStore for RowColumns {
+    #[inline(always)]
+    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
+        // SAFETY: the caller keeps `index` in bounds; all columns are equally long.
+        self.columns.each_ref().map(|column| unsafe { L::load_at(column, index) })
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
+        // The inverse mass does not change, and a column can be left alone where half a row cannot.
+        for (column, v) in self.columns.iter_mut().zip(velocity).take(3) {
+            // SAFETY: the caller keeps `index` in bounds; all columns are equally long.
+            unsafe { L::store_at(column, index, v) };
+        }
+    }
+}
