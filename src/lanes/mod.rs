@@ -122,6 +122,9 @@ pub trait Lanes:
     /// `self > 0 ? positive : otherwise`.
     fn select_positive(self, positive: Self, otherwise: Self) -> Self;
 
+    /// Whether any lane is above 0.
+    fn any_positive(self) -> bool;
+
     /// The rows of `WIDTH` bodies, transposed: `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`.
     ///
     /// # Safety
@@ -212,6 +215,11 @@ impl Lanes for f32 {
     #[inline(always)]
     fn select_positive(self, positive: Self, otherwise: Self) -> Self {
         if self > 0.0 { positive } else { otherwise }
+    }
+
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self > 0.0
     }
 
     #[inline(always)]
@@ -307,6 +315,11 @@ macro_rules! wide_lanes {
             #[inline(always)]
             fn select_positive(self, positive: Self, otherwise: Self) -> Self {
                 wide::Select::select(self.simd_gt(Self::zeroed()), positive, otherwise)
+            }
+
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self.simd_gt(Self::zeroed()).any()
             }
 
             #[inline(always)]

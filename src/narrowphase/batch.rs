@@ -1,11 +1,27 @@
 //! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
 
-use super::lanes::{Pair, PoseRow, ShapeRow, Touch};
+use super::hull::HullRow;
+use super::hull_circle::HullCircle;
+use super::hulls::Hulls;
+use super::lanes::{Pair, PoseRow, Poses, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
 use crate::lanes::{LaneWidth, Lanes, Quad};
 use crate::shapes::Shape;
 use wide::{f32x4, f32x8, f32x16};
+
+/// What kernels tell apart in a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// A polygon with four right angles.
+    Rectangle,
+    /// A circle.
+    Circle,
+    /// Any other polygon, or a capsule.
+    Hull,
+    /// A segment.
+    Segment,
+}
 
 /// Which kernel a pair of shapes has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,23 +30,46 @@ pub enum Kind {
     Rectangles,
     /// [`circles`]
     Circles,
-    /// None: [`super::collide`], one by one.
-    Other,
+    /// [`super::hulls`]
+    Hulls,
+    /// [`super::hull_circle`]
+    HullCircle,
+    /// The same with a and b exchanged.
+    CircleHull,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 3] = [Kind::Rectangles, Kind::Circles, Kind::Other];
+    pub const ALL: [Kind; 5] =
+        [Kind::Rectangles, Kind::Circles, Kind::Hulls, Kind::HullCircle, Kind::CircleHull];
+
+    /// The kernel of such a pair. Two segments have none, because they never touch.
+    pub fn of(a: Class, b: Class) -> Option<Self> {
+        match (a, b) {
+            (Class::Rectangle, Class::Rectangle) => Some(Kind::Rectangles),
+            (Class::Circle, Class::Circle) => Some(Kind::Circles),
+            (Class::Segment, Class::Segment) => None,
+            (_, Class::Circle) => Some(Kind::HullCircle),
+            (Class::Circle, _) => Some(Kind::CircleHull),
+            _ => Some(Kind::Hulls),
+        }
+    }
 }
 
-/// The kind of pairs of two such shapes, and the shape's row.
-pub fn classify(shape: &Shape) -> (Kind, ShapeRow) {
-    if let Some(row) = ShapeRow::rectangle(shape) {
-        (Kind::Rectangles, row)
-    } else if let Some(row) = ShapeRow::circle(shape) {
-        (Kind::Circles, row)
-    } else {
-        (Kind::Other, ShapeRow::default())
+/// Shapes as the kernels read them, by number.
+#[derive(Debug, Default)]
+pub struct Shapes {
+    rows: Vec<ShapeRow>,
+    hulls: Vec<HullRow>,
+}
+
+impl Shapes {
+    /// Adds a shape and tells its class.
+    pub fn push(&mut self, shape: &Shape) -> Class {
+        let (class, row) = ShapeRow::new(shape);
+        self.rows.push(row);
+        self.hulls.push(HullRow::new(shape));
+        class
     }
 }
 
@@ -76,8 +115,8 @@ impl Jobs {
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
-    /// Shapes by number; those of another kind are not looked at.
-    pub shapes: &'a [ShapeRow],
+    /// Shapes by number.
+    pub shapes: &'a Shapes,
     /// Points farther apart are left out (m).
     pub speculative: f32,
 }
@@ -105,7 +144,7 @@ pub fn update(
         assert!(list.len() == count && list.iter().all(|&i| (i as usize) < limit));
     };
     jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
-    jobs.shapes.iter().for_each(|list| below(list, input.shapes.len()));
+    jobs.shapes.iter().for_each(|list| below(list, input.shapes.rows.len()));
     assert!(jobs.contact.len() == count);
     let made = contacts.len();
     assert!(jobs.contact.iter().all(|&i| (i as usize) < made || i == NO_CONTACT));
@@ -129,32 +168,63 @@ fn run<L: Lanes>(
     made: usize,
     change: impl FnMut(u32, &Contact),
 ) -> usize {
+    let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
+    // SAFETY, of all closures: `update` checked all indices; there are as many rows as hulls, and
+    // padding repeats a pair.
     match kind {
-        Kind::Rectangles => run_kernel(rectangles::collide::<L>, jobs, input, contacts, made, change),
-        Kind::Circles => run_kernel(circles::collide::<L>, jobs, input, contacts, made, change),
-        Kind::Other => unreachable!("a kind without a kernel"),
+        Kind::Rectangles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            rectangles::collide(&Pair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Circles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            circles::collide(&Pair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Hulls => {
+            let mut pair = Hulls::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(&poses, hulls, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::HullCircle => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(hulls, rows, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::CircleHull => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, [a, b]| unsafe {
+                let poses = Poses::gather(poses, bodies).swapped();
+                pair.gather(hulls, rows, [b, a]);
+                pair.collide(&poses, speculative).swapped()
+            })
+        }
     }
 }
 
-/// `contacts[made..]` is the room for a batch of new manifolds.
+/// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
+/// given their bodies and shapes.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
-    kernel: impl Fn(&Pair<L>, f32) -> Touch<L>,
     jobs: &Jobs,
-    input: Input,
     contacts: &mut [Contact],
     made: usize,
     mut change: impl FnMut(u32, &Contact),
+    mut kernel: impl FnMut([&[u32]; 2], [&[u32]; 2]) -> Touch<L>,
 ) -> usize {
     let mut points = 0;
     let count = jobs.name.len();
     for first in (0..count).step_by(L::WIDTH) {
         // The last batch is filled up with its first pair, whose result goes to the spare room.
-        let mut padded = [[0; 16]; 5];
-        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1], &jobs.contact];
+        let mut padded = [[0; 16]; 4];
+        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1]];
         let filled = (count - first).min(L::WIDTH);
-        let [body_a, body_b, shape_a, shape_b, _] = lists.map(|list| &list[first..]);
-        let ends = [body_a, body_b, shape_a, shape_b];
+        let ends = lists.map(|list| &list[first..]);
         let [body_a, body_b, shape_a, shape_b] = if filled == L::WIDTH {
             ends
         } else {
@@ -176,10 +246,7 @@ fn run_kernel<L: Lanes>(
                 }
             };
         }
-        // SAFETY: `update` checked all indices; padding repeats one of them.
-        let pair =
-            unsafe { Pair::<L>::gather(input.poses, input.shapes, [body_a, body_b], [shape_a, shape_b]) };
-        let touch = kernel(&pair, input.speculative);
+        let touch = kernel([body_a, body_b], [shape_a, shape_b]);
         // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
         // no two lanes have the same.
         unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };

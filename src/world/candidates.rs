@@ -80,8 +80,8 @@ impl World {
                 }
             };
             kept += usize::from(candidate.contact != NO_CONTACT);
-            let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].kind);
-            let kind = if a == b { a } else { Kind::Other };
+            let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
+            let Some(kind) = Kind::of(a, b) else { continue };
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
         }

@@ -12,7 +12,7 @@ use crate::constraints::observe::ObservedRule;
 use crate::constraints::{Needs, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
-use crate::narrowphase::batch::{self, Kind};
+use crate::narrowphase::batch::Class;
 use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
 use crate::shapes::{Shape, combine};
 use collide::Narrow;
@@ -36,8 +36,8 @@ struct Surface {
     restitution: f32,
     /// Farthest point from the body's centre of mass (m).
     reach: f32,
-    /// Kernel of pairs of such shapes.
-    kind: Kind,
+    /// What the narrow phase knows it as.
+    class: Class,
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
@@ -111,15 +111,14 @@ impl World {
             let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
             let mut reach = 0.0_f32;
             shape.for_each_vertex(|v| reach = reach.max(v.length()));
-            let (kind, row) = batch::classify(&shape);
-            self.narrow.shapes.push(row);
+            let class = self.narrow.shapes.push(&shape);
             self.shapes.push(shape);
             self.shape_body.push(index as u32);
             self.surfaces.push(Surface {
                 friction: part.friction as f32,
                 restitution: part.restitution as f32,
                 reach: reach + shape.radius(),
-                kind,
+                class,
             });
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
