@@ -140,14 +140,16 @@ pub fn update(
     change: impl FnMut(u32, &Contact),
 ) -> usize {
     let count = jobs.name.len();
+    // The largest of each list is found in lanes, where a search for the first bad one would not be.
     let below = |list: &[u32], limit: usize| {
-        assert!(list.len() == count && list.iter().all(|&i| (i as usize) < limit));
+        let largest = list.iter().fold(0, |most, &i| i.max(most));
+        assert!(list.len() == count && (count == 0 || (largest as usize) < limit));
     };
     jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
     jobs.shapes.iter().for_each(|list| below(list, input.shapes.rows.len()));
-    assert!(jobs.contact.len() == count);
     let made = contacts.len();
-    assert!(jobs.contact.iter().all(|&i| (i as usize) < made || i == NO_CONTACT));
+    let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
+    assert!(jobs.contact.len() == count && beyond as usize <= made);
     contacts.resize(made + width.lanes(), Contact::default());
     let run = match width {
         LaneWidth::W1 => run::<f32>,
@@ -157,7 +159,7 @@ pub fn update(
     };
     let points = run(kind, jobs, input, contacts, made, change);
     contacts.truncate(made);
-    points
+    points as usize
 }
 
 fn run<L: Lanes>(
@@ -217,10 +219,11 @@ fn run_kernel<L: Lanes>(
     mut change: impl FnMut(u32, &Contact),
     mut kernel: impl FnMut([&[u32]; 2], [&[u32]; 2]) -> Touch<L>,
 ) -> usize {
-    let mut points = 0;
+    let mut points = 0_u32;
     let count = jobs.name.len();
     for first in (0..count).step_by(L::WIDTH) {
-        // The last batch is filled up with its first pair, whose result goes to the spare room.
+        // The last batch is filled up with its first pair, whose result goes to the spare room, as
+        // do those of pairs without a contact. No impulse is ever left there.
         let mut padded = [[0; 16]; 4];
         let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1]];
         let filled = (count - first).min(L::WIDTH);
@@ -234,31 +237,34 @@ fn run_kernel<L: Lanes>(
             }
             [&padded[0][..], &padded[1][..], &padded[2][..], &padded[3][..]]
         };
-        let known = &jobs.contact[first..first + filled];
+        let mut known = [NO_CONTACT; 16];
+        known[..filled].copy_from_slice(&jobs.contact[first..first + filled]);
         let mut target = [0; 16];
-        for (lane, target) in target.iter_mut().enumerate().take(L::WIDTH) {
-            let spare = (made + lane) as u32;
-            *target = match known.get(lane) {
-                Some(&contact) if contact != NO_CONTACT => contact,
-                _ => {
-                    contacts[made + lane].manifold.count = 0;
-                    spare
-                }
-            };
+        for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
+            *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
         let touch = kernel([body_a, body_b], [shape_a, shape_b]);
         // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
         // no two lanes have the same.
         unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };
+        // Counts in memory once more, so that a batch without changes is one comparison.
+        let mut count = [0.0_f32; 16];
+        count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);
+        let mut is_changed = false;
+        for (&count, &known) in count.iter().zip(&known) {
+            points += count as u32;
+            is_changed |= (count > 0.0) != (known != NO_CONTACT);
+        }
+        if !is_changed {
+            continue;
+        }
         for lane in 0..filled {
-            let contact = &contacts[target[lane] as usize];
-            points += contact.manifold.count as usize;
-            if (contact.manifold.count > 0) != (known[lane] != NO_CONTACT) {
-                change(jobs.name[first + lane], contact);
+            if (count[lane] > 0.0) != (known[lane] != NO_CONTACT) {
+                change(jobs.name[first + lane], &contacts[target[lane] as usize]);
             }
         }
     }
-    points
+    points as usize
 }
 
 /// Writes manifolds into contacts; a point keeps the impulses of the old one of its name.

@@ -89,11 +89,14 @@ impl<L: Lanes> Hull<L> {
         count: usize,
         place: impl Fn([L; 4]) -> [L; 4],
     ) {
-        // Quad 1 + slot of a row is quad 1 of the row that would begin `slot` quads further on.
         let quads: &[Quad] = bytemuck::cast_slice(rows);
+        let mut first = [0; 16];
+        for (first, &row) in first.iter_mut().zip(&index[..L::WIDTH]) {
+            *first = row * STRIDE as u32 + 1;
+        }
         for (slot, corner) in self.corners[..count].iter_mut().enumerate() {
             // SAFETY: the caller keeps the indices in bounds, and a row has more slots than `count`.
-            *corner = place(unsafe { L::gather_quads::<STRIDE, 1>(&quads[slot..], index) });
+            *corner = place(unsafe { L::gather_quads::<1, 0>(&quads[slot..], &first) });
         }
     }
 }
