@@ -8,6 +8,7 @@ use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
 use crate::lanes::{LaneWidth, Lanes, Quad};
 use crate::shapes::Shape;
+use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
 
 /// What kernels tell apart in a shape.
@@ -63,13 +64,26 @@ pub struct Shapes {
     hulls: Vec<HullRow>,
 }
 
+/// A shape's row is looked for among so many of the last ones.
+const RECENT: usize = 64;
+
 impl Shapes {
-    /// Adds a shape and tells its class.
-    pub fn push(&mut self, shape: &Shape) -> Class {
+    /// Adds a shape; returns its class and its number. Shapes that are alike to the bit share one, as
+    /// far as they come one soon after the other: most scenes then have few rows, which stay in the
+    /// cache, and many batches of a single one.
+    pub fn push(&mut self, shape: &Shape) -> (Class, u32) {
         let (class, row) = ShapeRow::new(shape);
-        self.rows.push(row);
-        self.hulls.push(HullRow::new(shape));
-        class
+        let hull = HullRow::new(shape);
+        let is_same = |&i: &usize| {
+            bytes_of(&self.rows[i]) == bytes_of(&row) && bytes_of(&self.hulls[i]) == bytes_of(&hull)
+        };
+        let count = self.rows.len();
+        let number = (count.saturating_sub(RECENT)..count).rev().find(is_same).unwrap_or_else(|| {
+            self.rows.push(row);
+            self.hulls.push(hull);
+            count
+        });
+        (class, number as u32)
     }
 }
 
@@ -80,7 +94,7 @@ pub struct Jobs {
     pub name: Vec<u32>,
     /// Bodies of a and b.
     pub bodies: [Vec<u32>; 2],
-    /// Shapes a and b.
+    /// Numbers of shapes a and b ([`Shapes::push`]).
     pub shapes: [Vec<u32>; 2],
     /// The contact that holds the manifold, or [`NO_CONTACT`].
     pub contact: Vec<u32>,
@@ -90,22 +104,31 @@ pub struct Jobs {
 pub const NO_CONTACT: u32 = u32::MAX;
 
 impl Jobs {
-    /// Forgets all pairs.
-    pub fn clear(&mut self) {
+    /// Lists those of `pairs` that `job` keeps, instead of what was listed. `job` returns whether it
+    /// does, and the pair's bodies, shapes and contact.
+    ///
+    /// Every pair is written, behind those kept before it: no branch waits for the decision.
+    #[inline(always)]
+    pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
         let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
-        for list in [name, a, b, c, d, contact] {
-            list.clear();
+        let mut lists = [name, a, b, c, d, contact];
+        let mut kept = 0;
+        {
+            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
+                list.resize(pairs.len(), 0);
+                &mut list[..pairs.len()]
+            });
+            for &pair in pairs {
+                let (keep, bodies, shapes, of_pair) = job(pair);
+                name[kept] = pair;
+                [a[kept], b[kept]] = bodies;
+                [c[kept], d[kept]] = shapes;
+                contact[kept] = of_pair;
+                kept += usize::from(keep);
+            }
         }
-    }
-
-    /// Adds a pair.
-    #[inline]
-    pub fn push(&mut self, name: u32, bodies: [u32; 2], shapes: [u32; 2], contact: u32) {
-        self.name.push(name);
-        self.contact.push(contact);
-        for side in 0..2 {
-            self.bodies[side].push(bodies[side]);
-            self.shapes[side].push(shapes[side]);
+        for list in lists {
+            list.truncate(kept);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Polygons, capsules and segments as the lane kernels read them.
 
+use super::lanes::only;
 use crate::lanes::{Lanes, Quad};
 use crate::params::MAX_POLYGON_VERTICES;
 use crate::shapes::Shape;
@@ -70,6 +71,10 @@ impl<L: Lanes> Hull<L> {
     /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
     pub unsafe fn gather_heads(&mut self, rows: &[HullRow], index: &[u32]) -> usize {
+        if let Some(row) = only(index, L::WIDTH) {
+            self.head = rows[row].head.map(L::splat);
+            return (rows[row].head[1] as usize + 1).min(MAX_POLYGON_VERTICES);
+        }
         // SAFETY: the caller keeps the indices in bounds.
         self.head = unsafe { L::gather_quads::<STRIDE, 0>(bytemuck::cast_slice(rows), index) };
         let last = bytemuck::cast_slice(std::slice::from_ref(&self.head[1]));
@@ -89,6 +94,12 @@ impl<L: Lanes> Hull<L> {
         count: usize,
         place: impl Fn([L; 4]) -> [L; 4],
     ) {
+        if let Some(row) = only(index, L::WIDTH) {
+            for (corner, from) in self.corners[..count].iter_mut().zip(&rows[row].corners) {
+                *corner = place(from.map(L::splat));
+            }
+            return;
+        }
         let quads: &[Quad] = bytemuck::cast_slice(rows);
         let mut first = [0; 16];
         for (first, &row) in first.iter_mut().zip(&index[..L::WIDTH]) {

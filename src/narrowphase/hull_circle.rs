@@ -7,7 +7,7 @@
 
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate};
-use crate::lanes::{Lanes, Quad};
+use crate::lanes::Lanes;
 
 /// Hulls as a, circles as b.
 pub struct HullCircle<L> {
@@ -31,12 +31,11 @@ impl<L: Lanes> HullCircle<L> {
     /// `b` less than `rows.len()`.
     #[inline(always)]
     pub unsafe fn gather(&mut self, hulls: &[HullRow], rows: &[ShapeRow], [a, b]: [&[u32]; 2]) {
-        let rows: &[Quad] = bytemuck::cast_slice(rows);
-        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
+        // SAFETY: the caller keeps the indices in bounds.
         unsafe {
             self.count = self.hull.gather_heads(hulls, a);
             self.hull.gather_corners(hulls, a, self.count, |corner| corner);
-            let (place, size) = (L::gather_quads::<2, 0>(rows, b), L::gather_quads::<2, 1>(rows, b));
+            let [place, size] = ShapeRow::gather::<L>(rows, b);
             self.circle = ([place[0], place[1]], size[2]);
         }
     }

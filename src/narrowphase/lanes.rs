@@ -76,6 +76,20 @@ impl ShapeRow {
     }
 }
 
+impl ShapeRow {
+    /// `place` and `size` of `L::WIDTH` rows.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather<L: Lanes>(rows: &[ShapeRow], index: &[u32]) -> [[L; 4]; 2] {
+        // Spreading a single row, as hulls do, was tried: 0 % on the washer's equal boxes.
+        let rows: &[Quad] = bytemuck::cast_slice(rows);
+        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
+        unsafe { [L::gather_quads::<2, 0>(rows, index), L::gather_quads::<2, 1>(rows, index)] }
+    }
+}
+
 /// The poses of two bodies, in lanes.
 #[derive(Clone, Copy)]
 pub struct Poses<L> {
@@ -137,15 +151,10 @@ impl<L: Lanes> Pair<L> {
     /// Both lists hold at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
     pub unsafe fn gather(poses: Poses<L>, rows: &[ShapeRow], [a, b]: [&[u32]; 2]) -> Self {
-        let rows: &[Quad] = bytemuck::cast_slice(rows);
-        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
-        unsafe {
-            Pair {
-                poses,
-                place: [L::gather_quads::<2, 0>(rows, a), L::gather_quads::<2, 0>(rows, b)],
-                size: [L::gather_quads::<2, 1>(rows, a), L::gather_quads::<2, 1>(rows, b)],
-            }
-        }
+        // SAFETY: the caller keeps the indices in bounds.
+        let ([place_a, size_a], [place_b, size_b]) =
+            unsafe { (ShapeRow::gather(rows, a), ShapeRow::gather(rows, b)) };
+        Pair { poses, place: [place_a, place_b], size: [size_a, size_b] }
     }
 }
 
@@ -223,4 +232,11 @@ pub fn perp<L: Lanes>(v: [L; 2]) -> [L; 2] {
 #[inline(always)]
 pub fn abs<L: Lanes>(x: L) -> L {
     x.max(-x)
+}
+
+/// The one number in the first `width` entries of `index`, if there is only one.
+#[inline(always)]
+pub fn only(index: &[u32], width: usize) -> Option<usize> {
+    let different = index[..width].iter().fold(0, |bits, &i| bits | (i ^ index[0]));
+    (different == 0).then_some(index[0] as usize)
 }

@@ -101,20 +101,17 @@ impl Narrow {
         }
         self.jobs_are_current = !cull;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
-            jobs.clear();
-            for &name in names {
+            jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];
-                if cull {
-                    let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
-                    let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                    if d[0] * d[0] + d[1] * d[1] > candidate.reach_squared {
-                        self.is_changed |= candidate.contact != NO_CONTACT;
-                        candidate.contact = NO_CONTACT;
-                        continue;
-                    }
+                let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
+                let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
+                let is_near = !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
+                if !is_near & (candidate.contact != NO_CONTACT) {
+                    self.is_changed = true;
+                    candidate.contact = NO_CONTACT;
                 }
-                jobs.push(name, candidate.bodies, candidate.shapes, candidate.contact);
-            }
+                (is_near, candidate.bodies, candidate.numbers, candidate.contact)
+            });
         }
     }
 

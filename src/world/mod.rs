@@ -38,6 +38,7 @@ struct Surface {
     reach: f32,
     /// What the narrow phase knows it as.
     class: Class,
+    number: u32,
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
@@ -111,7 +112,7 @@ impl World {
             let aabb = shape.aabb(&self.bodies.pose(index)).grown(SPECULATIVE_DISTANCE + AABB_MARGIN);
             let mut reach = 0.0_f32;
             shape.for_each_vertex(|v| reach = reach.max(v.length()));
-            let class = self.narrow.shapes.push(&shape);
+            let (class, number) = self.narrow.shapes.push(&shape);
             self.shapes.push(shape);
             self.shape_body.push(index as u32);
             self.surfaces.push(Surface {
@@ -119,6 +120,7 @@ impl World {
                 restitution: part.restitution as f32,
                 reach: reach + shape.radius(),
                 class,
+                number,
             });
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
