@@ -18,7 +18,7 @@ mod quads;
 mod rows;
 
 pub use aligned::{Block, LaneVec};
-pub use quads::Quad;
+pub use quads::{Quad, prefetch};
 pub use rows::BodyRow;
 
 use bytemuck::Pod;

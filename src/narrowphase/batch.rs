@@ -6,7 +6,7 @@ use super::hulls::Hulls;
 use super::lanes::{Pair, PoseRow, Poses, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{LaneWidth, Lanes, Quad};
+use crate::lanes::{LaneWidth, Lanes, Quad, prefetch};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
@@ -182,7 +182,7 @@ pub fn update(
     };
     let points = run(kind, jobs, input, contacts, made, change);
     contacts.truncate(made);
-    points as usize
+    points
 }
 
 fn run<L: Lanes>(
@@ -266,6 +266,10 @@ fn run_kernel<L: Lanes>(
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
+        // Contacts lie farther away than poses and shapes: those of the next batch are asked for now.
+        let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
+        let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
+        prefetch::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
         let touch = kernel([body_a, body_b], [shape_a, shape_b]);
         // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
         // no two lanes have the same.

@@ -1,9 +1,11 @@
 //! Contact geometry: two shapes at two poses in, one [`Manifold`] out.
 //!
 //! Every shape is a convex core grown by a radius, so a signed distance is that
-//! of the cores less both radii. Two circles need one square root; a circle
-//! against anything needs the closest point of a core; all other pairs are two
-//! hulls (polygon, capsule, segment) under the separating axis test.
+//! of the cores less both radii. Two circles ([`circles`]) need one square root; a
+//! circle against anything ([`hull_circle`]) needs the closest point of a core; all
+//! other pairs are two hulls (polygon, capsule, segment) under the separating axis
+//! test ([`hulls`]), which for two [`rectangles`] has a closed form. Each kernel is
+//! written in lanes; [`batch`] runs it over the pairs of a step.
 //!
 //! Only the difference of the positions enters, so a scene loses nothing far
 //! from the origin beyond the rounding of that difference. Coordinates are then
@@ -15,14 +17,14 @@
 
 pub mod batch;
 pub mod circles;
-mod clip;
+pub mod clip;
 pub mod epa;
 pub mod gjk;
-mod hull;
-mod hull_circle;
-mod hulls;
+pub mod hull;
+pub mod hull_circle;
+pub mod hulls;
 pub mod lanes;
-mod rectangles;
+pub mod rectangles;
 
 use crate::contacts::Manifold;
 use crate::shapes::{Pose, Shape};
