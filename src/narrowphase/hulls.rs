@@ -25,7 +25,8 @@ use crate::lanes::Lanes;
 pub struct Hulls<L> {
     hulls: [Hull<L>; 2],
     incident: Hull<L>,
-    /// Slots in use.
+    /// Slots in use: the most that one hull of the batch has. Loops unrolled for 3, 4 and 5 of them
+    /// were tried: 3 % slower on triangles and pentagons.
     count: usize,
 }
 

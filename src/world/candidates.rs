@@ -84,6 +84,7 @@ impl World {
             };
             kept += usize::from(candidate.contact != NO_CONTACT);
             let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
+            // Two segments never touch.
             let Some(kind) = Kind::of(a, b) else { continue };
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);

@@ -38,6 +38,7 @@ struct Surface {
     reach: f32,
     /// What the narrow phase knows it as.
     class: Class,
+    /// What the narrow phase calls it.
     number: u32,
 }
 
