@@ -95,14 +95,4 @@ impl Manifold {
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]
     }
-
-    /// Takes over the impulses of `old` at points that name the same features.
-    pub fn take_impulses(&mut self, old: &Manifold) {
-        for point in &mut self.points[..self.count as usize] {
-            if let Some(same) = old.points().iter().find(|p| p.feature_id == point.feature_id) {
-                point.normal_impulse = same.normal_impulse;
-                point.tangent_impulse = same.tangent_impulse;
-            }
-        }
-    }
 }

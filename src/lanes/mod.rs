@@ -19,7 +19,7 @@ mod rows;
 mod store;
 
 pub use aligned::{Block, LaneVec};
-pub use quads::Quad;
+pub use quads::{Quad, prefetch};
 pub use rows::BodyRow;
 pub use store::{RowColumns, RowStore};
 
@@ -141,6 +141,9 @@ pub trait Lanes:
     /// `self > 0 ? positive : otherwise`.
     fn select_positive(self, positive: Self, otherwise: Self) -> Self;
 
+    /// Whether any lane is above 0.
+    fn any_positive(self) -> bool;
+
     /// The rows of `WIDTH` bodies, transposed: `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`.
     ///
     /// # Safety
@@ -243,6 +246,11 @@ impl Lanes for f32 {
     #[inline(always)]
     fn select_positive(self, positive: Self, otherwise: Self) -> Self {
         if self > 0.0 { positive } else { otherwise }
+    }
+
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self > 0.0
     }
 
     #[inline(always)]
@@ -350,6 +358,11 @@ macro_rules! wide_lanes {
             #[inline(always)]
             fn select_positive(self, positive: Self, otherwise: Self) -> Self {
                 wide::Select::select(self.simd_gt(Self::zeroed()), positive, otherwise)
+            }
+
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self.simd_gt(Self::zeroed()).any()
             }
 
             #[inline(always)]

@@ -43,6 +43,23 @@ unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(
     unsafe { quads.as_mut_ptr().add(*index.get_unchecked(lane) as usize * STRIDE + OFFSET).cast() }
 }
 
+/// Asks for records of `STRIDE` quads, up to two cache lines of each, before they are needed.
+#[inline(always)]
+pub fn prefetch<const STRIDE: usize>(quads: &[Quad], index: impl Iterator<Item = u32>) {
+    #[cfg(target_arch = "x86_64")]
+    for i in index {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let record = quads.as_ptr().wrapping_add(i as usize * STRIDE);
+        // SAFETY: a hint; it faults at no address.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(record.cast());
+            _mm_prefetch::<_MM_HINT_T0>(record.wrapping_add(4).cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (quads, index);
+}
+
 /// # Safety
 /// `index` holds at least 1 entry, whose quad exists.
 #[inline(always)]

@@ -1,11 +1,28 @@
 //! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
 
-use super::lanes::{Pair, PoseRow, ShapeRow, Touch};
+use super::hull::HullRow;
+use super::hull_circle::HullCircle;
+use super::hulls::Hulls;
+use super::lanes::{Pair, PoseRow, Poses, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{LaneWidth, Lanes, Quad};
+use crate::lanes::{LaneWidth, Lanes, Quad, prefetch};
 use crate::shapes::Shape;
+use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
+
+/// What kernels tell apart in a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// A polygon with four right angles.
+    Rectangle,
+    /// A circle.
+    Circle,
+    /// Any other polygon, or a capsule.
+    Hull,
+    /// A segment.
+    Segment,
+}
 
 /// Which kernel a pair of shapes has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,23 +31,59 @@ pub enum Kind {
     Rectangles,
     /// [`circles`]
     Circles,
-    /// None: [`super::collide`], one by one.
-    Other,
+    /// [`super::hulls`]
+    Hulls,
+    /// [`super::hull_circle`]
+    HullCircle,
+    /// The same with a and b exchanged.
+    CircleHull,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 3] = [Kind::Rectangles, Kind::Circles, Kind::Other];
+    pub const ALL: [Kind; 5] =
+        [Kind::Rectangles, Kind::Circles, Kind::Hulls, Kind::HullCircle, Kind::CircleHull];
+
+    /// The kernel of such a pair. Two segments have none, because they never touch.
+    pub fn of(a: Class, b: Class) -> Option<Self> {
+        match (a, b) {
+            (Class::Rectangle, Class::Rectangle) => Some(Kind::Rectangles),
+            (Class::Circle, Class::Circle) => Some(Kind::Circles),
+            (Class::Segment, Class::Segment) => None,
+            (_, Class::Circle) => Some(Kind::HullCircle),
+            (Class::Circle, _) => Some(Kind::CircleHull),
+            _ => Some(Kind::Hulls),
+        }
+    }
 }
 
-/// The kind of pairs of two such shapes, and the shape's row.
-pub fn classify(shape: &Shape) -> (Kind, ShapeRow) {
-    if let Some(row) = ShapeRow::rectangle(shape) {
-        (Kind::Rectangles, row)
-    } else if let Some(row) = ShapeRow::circle(shape) {
-        (Kind::Circles, row)
-    } else {
-        (Kind::Other, ShapeRow::default())
+/// Shapes as the kernels read them, by number.
+#[derive(Debug, Default)]
+pub struct Shapes {
+    rows: Vec<ShapeRow>,
+    hulls: Vec<HullRow>,
+}
+
+/// A shape's row is looked for among so many of the last ones.
+const RECENT: usize = 64;
+
+impl Shapes {
+    /// Adds a shape; returns its class and its number. Shapes that are alike to the bit share one, as
+    /// far as they come one soon after the other: most scenes then have few rows, which stay in the
+    /// cache, and many batches of a single one.
+    pub fn push(&mut self, shape: &Shape) -> (Class, u32) {
+        let (class, row) = ShapeRow::new(shape);
+        let hull = HullRow::new(shape);
+        let is_same = |&i: &usize| {
+            bytes_of(&self.rows[i]) == bytes_of(&row) && bytes_of(&self.hulls[i]) == bytes_of(&hull)
+        };
+        let count = self.rows.len();
+        let number = (count.saturating_sub(RECENT)..count).rev().find(is_same).unwrap_or_else(|| {
+            self.rows.push(row);
+            self.hulls.push(hull);
+            count
+        });
+        (class, number as u32)
     }
 }
 
@@ -41,7 +94,7 @@ pub struct Jobs {
     pub name: Vec<u32>,
     /// Bodies of a and b.
     pub bodies: [Vec<u32>; 2],
-    /// Shapes a and b.
+    /// Numbers of shapes a and b ([`Shapes::push`]).
     pub shapes: [Vec<u32>; 2],
     /// The contact that holds the manifold, or [`NO_CONTACT`].
     pub contact: Vec<u32>,
@@ -51,22 +104,31 @@ pub struct Jobs {
 pub const NO_CONTACT: u32 = u32::MAX;
 
 impl Jobs {
-    /// Forgets all pairs.
-    pub fn clear(&mut self) {
+    /// Lists those of `pairs` that `job` keeps, instead of what was listed. `job` returns whether it
+    /// does, and the pair's bodies, shapes and contact.
+    ///
+    /// Every pair is written, behind those kept before it: no branch waits for the decision.
+    #[inline(always)]
+    pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
         let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
-        for list in [name, a, b, c, d, contact] {
-            list.clear();
+        let mut lists = [name, a, b, c, d, contact];
+        let mut kept = 0;
+        {
+            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
+                list.resize(pairs.len(), 0);
+                &mut list[..pairs.len()]
+            });
+            for &pair in pairs {
+                let (keep, bodies, shapes, of_pair) = job(pair);
+                name[kept] = pair;
+                [a[kept], b[kept]] = bodies;
+                [c[kept], d[kept]] = shapes;
+                contact[kept] = of_pair;
+                kept += usize::from(keep);
+            }
         }
-    }
-
-    /// Adds a pair.
-    #[inline]
-    pub fn push(&mut self, name: u32, bodies: [u32; 2], shapes: [u32; 2], contact: u32) {
-        self.name.push(name);
-        self.contact.push(contact);
-        for side in 0..2 {
-            self.bodies[side].push(bodies[side]);
-            self.shapes[side].push(shapes[side]);
+        for list in lists {
+            list.truncate(kept);
         }
     }
 }
@@ -76,8 +138,8 @@ impl Jobs {
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
-    /// Shapes by number; those of another kind are not looked at.
-    pub shapes: &'a [ShapeRow],
+    /// Shapes by number.
+    pub shapes: &'a Shapes,
     /// Points farther apart are left out (m).
     pub speculative: f32,
 }
@@ -101,14 +163,16 @@ pub fn update(
     change: impl FnMut(u32, &Contact),
 ) -> usize {
     let count = jobs.name.len();
+    // The largest of each list is found in lanes, where a search for the first bad one would not be.
     let below = |list: &[u32], limit: usize| {
-        assert!(list.len() == count && list.iter().all(|&i| (i as usize) < limit));
+        let largest = list.iter().fold(0, |most, &i| i.max(most));
+        assert!(list.len() == count && (count == 0 || (largest as usize) < limit));
     };
     jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
-    jobs.shapes.iter().for_each(|list| below(list, input.shapes.len()));
-    assert!(jobs.contact.len() == count);
+    jobs.shapes.iter().for_each(|list| below(list, input.shapes.rows.len()));
     let made = contacts.len();
-    assert!(jobs.contact.iter().all(|&i| (i as usize) < made || i == NO_CONTACT));
+    let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
+    assert!(jobs.contact.len() == count && beyond as usize <= made);
     contacts.resize(made + width.lanes(), Contact::default());
     let run = match width {
         LaneWidth::W1 => run::<f32>,
@@ -129,32 +193,64 @@ fn run<L: Lanes>(
     made: usize,
     change: impl FnMut(u32, &Contact),
 ) -> usize {
+    let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
+    // SAFETY, of all closures: `update` checked all indices; there are as many rows as hulls, and
+    // padding repeats a pair.
     match kind {
-        Kind::Rectangles => run_kernel(rectangles::collide::<L>, jobs, input, contacts, made, change),
-        Kind::Circles => run_kernel(circles::collide::<L>, jobs, input, contacts, made, change),
-        Kind::Other => unreachable!("a kind without a kernel"),
+        Kind::Rectangles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            rectangles::collide(&Pair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Circles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            circles::collide(&Pair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Hulls => {
+            let mut pair = Hulls::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(&poses, hulls, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::HullCircle => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(hulls, rows, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::CircleHull => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, [a, b]| unsafe {
+                let poses = Poses::gather(poses, bodies).swapped();
+                pair.gather(hulls, rows, [b, a]);
+                pair.collide(&poses, speculative).swapped()
+            })
+        }
     }
 }
 
-/// `contacts[made..]` is the room for a batch of new manifolds.
+/// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
+/// given their bodies and shapes.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
-    kernel: impl Fn(&Pair<L>, f32) -> Touch<L>,
     jobs: &Jobs,
-    input: Input,
     contacts: &mut [Contact],
     made: usize,
     mut change: impl FnMut(u32, &Contact),
+    mut kernel: impl FnMut([&[u32]; 2], [&[u32]; 2]) -> Touch<L>,
 ) -> usize {
-    let mut points = 0;
+    let mut points = 0_u32;
     let count = jobs.name.len();
     for first in (0..count).step_by(L::WIDTH) {
-        // The last batch is filled up with its first pair, whose result goes to the spare room.
-        let mut padded = [[0; 16]; 5];
-        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1], &jobs.contact];
+        // The last batch is filled up with its first pair, whose result goes to the spare room, as
+        // do those of pairs without a contact. No impulse is ever left there.
+        let mut padded = [[0; 16]; 4];
+        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1]];
         let filled = (count - first).min(L::WIDTH);
-        let [body_a, body_b, shape_a, shape_b, _] = lists.map(|list| &list[first..]);
-        let ends = [body_a, body_b, shape_a, shape_b];
+        let ends = lists.map(|list| &list[first..]);
         let [body_a, body_b, shape_a, shape_b] = if filled == L::WIDTH {
             ends
         } else {
@@ -164,34 +260,38 @@ fn run_kernel<L: Lanes>(
             }
             [&padded[0][..], &padded[1][..], &padded[2][..], &padded[3][..]]
         };
-        let known = &jobs.contact[first..first + filled];
+        let mut known = [NO_CONTACT; 16];
+        known[..filled].copy_from_slice(&jobs.contact[first..first + filled]);
         let mut target = [0; 16];
-        for (lane, target) in target.iter_mut().enumerate().take(L::WIDTH) {
-            let spare = (made + lane) as u32;
-            *target = match known.get(lane) {
-                Some(&contact) if contact != NO_CONTACT => contact,
-                _ => {
-                    contacts[made + lane].manifold.count = 0;
-                    spare
-                }
-            };
+        for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
+            *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
-        // SAFETY: `update` checked all indices; padding repeats one of them.
-        let pair =
-            unsafe { Pair::<L>::gather(input.poses, input.shapes, [body_a, body_b], [shape_a, shape_b]) };
-        let touch = kernel(&pair, input.speculative);
+        // Contacts lie farther away than poses and shapes: those of the next batch are asked for now.
+        let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
+        let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
+        prefetch::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
+        let touch = kernel([body_a, body_b], [shape_a, shape_b]);
         // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
         // no two lanes have the same.
         unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };
+        // Counts in memory once more, so that a batch without changes is one comparison.
+        let mut count = [0.0_f32; 16];
+        count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);
+        let mut is_changed = false;
+        for (&count, &known) in count.iter().zip(&known) {
+            points += count as u32;
+            is_changed |= (count > 0.0) != (known != NO_CONTACT);
+        }
+        if !is_changed {
+            continue;
+        }
         for lane in 0..filled {
-            let contact = &contacts[target[lane] as usize];
-            points += contact.manifold.count as usize;
-            if (contact.manifold.count > 0) != (known[lane] != NO_CONTACT) {
-                change(jobs.name[first + lane], contact);
+            if (count[lane] > 0.0) != (known[lane] != NO_CONTACT) {
+                change(jobs.name[first + lane], &contacts[target[lane] as usize]);
             }
         }
     }
-    points
+    points as usize
 }
 
 /// Writes manifolds into contacts; a point keeps the impulses of the old one of its name.

@@ -1,16 +1,17 @@
 //! Two circles, in lanes.
 
-use super::lanes::{Pair, Touch, rotate};
+use super::lanes::{Pair, Poses, Touch, rotate};
 use crate::lanes::Lanes;
 
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &Pair<L>, speculative: f32) -> Touch<L> {
     let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
+    let Poses { centers, rotation } = pair.poses;
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
-    let center_a = rotate(pair.rotation[0], [place_a[0], place_a[1]]);
-    let center_b = rotate(pair.rotation[1], [place_b[0], place_b[1]]);
-    let d = [pair.centers[0] + (center_b[0] - center_a[0]), pair.centers[1] + (center_b[1] - center_a[1])];
+    let center_a = rotate(rotation[0], [place_a[0], place_a[1]]);
+    let center_b = rotate(rotation[1], [place_b[0], place_b[1]]);
+    let d = [centers[0] + (center_b[0] - center_a[0]), centers[1] + (center_b[1] - center_a[1])];
     let distance = d[0].mul_add(d[0], d[1] * d[1]).sqrt();
     let apart = distance - L::splat(f32::MIN_POSITIVE);
     let inverse = one / apart.select_positive(distance, one);

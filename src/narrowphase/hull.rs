@@ -1,156 +1,113 @@
-//! The view of a polygon, capsule or segment that the separating axis test reads.
+//! Polygons, capsules and segments as the lane kernels read them.
 
-use crate::shapes::{Polygon, Shape};
+use super::lanes::only;
+use crate::lanes::{Lanes, Quad};
+use crate::params::MAX_POLYGON_VERTICES;
+use crate::shapes::Shape;
+use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
-/// A rounded convex hull of at most `N` vertices, counter-clockwise, by coordinates.
+/// A rounded convex hull in its body's frame, counter-clockwise: nine quads.
 ///
-/// Slots past the last vertex repeat it and its face. A repeated vertex changes no
-/// minimum over vertices and a repeated face no maximum over faces, so the loops
-/// below run over all `N` without asking for a count, and become vector code.
+/// Slots past the last vertex repeat it and its face. A repeated vertex changes no minimum over
+/// vertices and a repeated face no maximum over faces, so kernels may run over more slots than a
+/// hull has. Where values tie they prefer the later slot: the last slot that they run over,
+/// after which comes vertex 0, then stands for the last vertex however many there are.
 ///
-/// A capsule or segment is the rectangle a, b, b, a of no width. Its two end faces
-/// have no length but a normal along the axis; without them the test could not see
-/// that two collinear capsules are apart.
-#[derive(Clone, Copy)]
-pub(super) struct Hull<const N: usize> {
-    pub x: [f32; N],
-    pub y: [f32; N],
-    pub nx: [f32; N],
-    pub ny: [f32; N],
-    pub radius: f32,
-    /// Index of the last vertex.
-    last: usize,
-    /// Whether vertices 1 and 2, and 3 and 0, are one.
-    flat: bool,
+/// A capsule or segment is the rectangle a, a, b, b of no width. Its two end faces have no length
+/// but a normal along the axis; without them no axis would tell collinear capsules apart. The side
+/// to the left of a → b is the last, and so the one that a point on the axis is nearest to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct HullRow {
+    /// Rounding radius (m), slot of the last vertex, 1 for a capsule or segment, and 0.
+    pub head: [f32; 4],
+    /// Each vertex and the outward normal of the face from it to the next: `[x, y, nx, ny]` (m, 1).
+    pub corners: [[f32; 4]; MAX_POLYGON_VERTICES],
 }
 
-impl<const N: usize> Hull<N> {
-    /// The hull of a shape that is no circle and has at most `N` vertices.
-    pub fn of(shape: &Shape) -> Option<Self> {
-        match shape {
-            Shape::Polygon(polygon) if polygon.count as usize <= N => Some(Self::polygon(polygon)),
-            Shape::Capsule { a, b, radius } => Some(Self::capsule(*a, *b, *radius)),
-            Shape::Segment { a, b } => Some(Self::capsule(*a, *b, 0.0)),
-            _ => None,
+/// Quads of a [`HullRow`].
+const STRIDE: usize = size_of::<HullRow>() / 16;
+
+impl HullRow {
+    /// The row of a shape; a circle has none.
+    pub fn new(shape: &Shape) -> Self {
+        let corner = |v: Vec2, n: Vec2| [v.x, v.y, n.x, n.y];
+        let flat = |a: Vec2, b: Vec2, radius: f32| {
+            let along = (b - a).normalize_or(Vec2::X);
+            let [end_a, right, end_b, left] = [-along, -along.perp(), along, along.perp()];
+            let corners = [corner(a, end_a), corner(a, right), corner(b, end_b), corner(b, left)];
+            HullRow { head: [radius, 3.0, 1.0, 0.0], corners: std::array::from_fn(|i| corners[i.min(3)]) }
+        };
+        match *shape {
+            Shape::Polygon(p) => HullRow {
+                head: [p.radius, p.count as f32 - 1.0, 0.0, 0.0],
+                corners: std::array::from_fn(|i| corner(p.vertices[i], p.normals[i])),
+            },
+            Shape::Capsule { a, b, radius } => flat(a, b, radius),
+            Shape::Segment { a, b } => flat(a, b, 0.0),
+            Shape::Circle { .. } => HullRow::default(),
         }
     }
+}
 
-    /// The hull of a polygon of at most `N` vertices.
+/// Hulls in lanes.
+pub struct Hull<L> {
+    /// As [`HullRow::corners`]. Only so many slots are filled as the batch has.
+    pub corners: [[L; 4]; MAX_POLYGON_VERTICES],
+    /// As [`HullRow::head`].
+    pub head: [L; 4],
+}
+
+impl<L: Lanes> Hull<L> {
+    /// Room for hulls.
+    pub fn empty() -> Self {
+        Hull { corners: [[L::zero(); 4]; MAX_POLYGON_VERTICES], head: [L::zero(); 4] }
+    }
+
+    /// Reads the heads of `L::WIDTH` hulls and returns the largest number of slots that one has.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub fn polygon(polygon: &Polygon) -> Self {
-        let (v, n) = (&polygon.vertices, &polygon.normals);
-        Self {
-            x: std::array::from_fn(|i| v[i].x),
-            y: std::array::from_fn(|i| v[i].y),
-            nx: std::array::from_fn(|i| n[i].x),
-            ny: std::array::from_fn(|i| n[i].y),
-            radius: polygon.radius,
-            last: polygon.count as usize - 1,
-            flat: false,
+    pub unsafe fn gather_heads(&mut self, rows: &[HullRow], index: &[u32]) -> usize {
+        if let Some(row) = only(index, L::WIDTH) {
+            self.head = rows[row].head.map(L::splat);
+            return (rows[row].head[1] as usize + 1).min(MAX_POLYGON_VERTICES);
         }
+        // SAFETY: the caller keeps the indices in bounds.
+        self.head = unsafe { L::gather_quads::<STRIDE, 0>(bytemuck::cast_slice(rows), index) };
+        let last = bytemuck::cast_slice(std::slice::from_ref(&self.head[1]));
+        let most = last.iter().fold(0.0_f32, |most, &last| if last > most { last } else { most });
+        (most as usize + 1).min(MAX_POLYGON_VERTICES)
     }
 
-    fn capsule(a: Vec2, b: Vec2, radius: f32) -> Self {
-        let along = (b - a).normalize_or(Vec2::X);
-        let v: [Vec2; N] = std::array::from_fn(|i| if i == 1 || i == 2 { b } else { a });
-        let normals = [-along.perp(), along, along.perp(), -along];
-        let n: [Vec2; N] = std::array::from_fn(|i| normals[i.min(3)]);
-        Self {
-            x: v.map(|v| v.x),
-            y: v.map(|v| v.y),
-            nx: n.map(|n| n.x),
-            ny: n.map(|n| n.y),
-            radius,
-            last: 3,
-            flat: true,
-        }
-    }
-
-    /// The hull moved by `offset`.
+    /// Reads the first `count` corners of `L::WIDTH` hulls and moves each by `place`.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub fn moved(mut self, offset: Vec2) -> Self {
-        for i in 0..N {
-            self.x[i] += offset.x;
-            self.y[i] += offset.y;
-        }
-        self
-    }
-
-    /// The hull turned by `rotation` (cos, sin) about the origin.
-    #[inline(always)]
-    pub fn turned(&self, rotation: Vec2) -> Self {
-        let (c, s) = (rotation.x, rotation.y);
-        let mut turned = *self;
-        for i in 0..N {
-            turned.x[i] = c * self.x[i] - s * self.y[i];
-            turned.y[i] = s * self.x[i] + c * self.y[i];
-            turned.nx[i] = c * self.nx[i] - s * self.ny[i];
-            turned.ny[i] = s * self.nx[i] + c * self.ny[i];
-        }
-        turned
-    }
-
-    #[inline(always)]
-    pub fn vertex(&self, i: usize) -> Vec2 {
-        Vec2::new(self.x[i], self.y[i])
-    }
-
-    #[inline(always)]
-    pub fn normal(&self, i: usize) -> Vec2 {
-        Vec2::new(self.nx[i], self.ny[i])
-    }
-
-    #[inline(always)]
-    pub fn next(&self, i: usize) -> usize {
-        if i >= self.last { 0 } else { i + 1 }
-    }
-
-    #[inline(always)]
-    pub fn previous(&self, i: usize) -> usize {
-        if i == 0 { self.last } else { i - 1 }
-    }
-
-    /// What feature ids call vertex `i`: both copies of a capsule's end are one.
-    #[inline(always)]
-    pub fn name(&self, i: usize) -> u32 {
-        (if self.flat { (i + 1) >> 1 & 1 } else { i }) as u32
-    }
-
-    /// The face of `self` from which `other` is farthest, and how far that is (m):
-    /// max over faces i of min over vertices j of nᵢ·(wⱼ − vᵢ).
-    #[inline(always)]
-    pub fn best_face(&self, other: &Self) -> (usize, f32) {
-        let mut nearest = [f32::INFINITY; N];
-        for (&x, &y) in other.x.iter().zip(&other.y) {
-            nearest = std::array::from_fn(|i| {
-                let height = self.nx[i] * x + self.ny[i] * y;
-                if height < nearest[i] { height } else { nearest[i] }
-            });
-        }
-        nearest = std::array::from_fn(|i| nearest[i] - (self.nx[i] * self.x[i] + self.ny[i] * self.y[i]));
-        self.first_max(nearest)
-    }
-
-    /// The face whose normal is most opposed to `direction`.
-    #[inline(always)]
-    pub fn opposing_face(&self, direction: Vec2) -> usize {
-        self.first_max(std::array::from_fn(|i| -(self.nx[i] * direction.x + self.ny[i] * direction.y))).0
-    }
-
-    /// Largest value and its slot, by halving: a chain of log₂ N comparisons.
-    #[inline(always)]
-    fn first_max(&self, mut values: [f32; N]) -> (usize, f32) {
-        let mut slots: [u32; N] = std::array::from_fn(|i| i as u32);
-        let mut width = N / 2;
-        while width > 0 {
-            for i in 0..width {
-                let upper = values[i + width] > values[i];
-                slots[i] = if upper { slots[i + width] } else { slots[i] };
-                values[i] = if upper { values[i + width] } else { values[i] };
+    pub unsafe fn gather_corners(
+        &mut self,
+        rows: &[HullRow],
+        index: &[u32],
+        count: usize,
+        place: impl Fn([L; 4]) -> [L; 4],
+    ) {
+        if let Some(row) = only(index, L::WIDTH) {
+            for (corner, from) in self.corners[..count].iter_mut().zip(&rows[row].corners) {
+                *corner = place(from.map(L::splat));
             }
-            width /= 2;
+            return;
         }
-        ((slots[0] as usize).min(self.last), values[0])
+        let quads: &[Quad] = bytemuck::cast_slice(rows);
+        let mut first = [0; 16];
+        for (first, &row) in first.iter_mut().zip(&index[..L::WIDTH]) {
+            *first = row * STRIDE as u32 + 1;
+        }
+        for (slot, corner) in self.corners[..count].iter_mut().enumerate() {
+            // SAFETY: the caller keeps the indices in bounds, and a row has more slots than `count`.
+            *corner = place(unsafe { L::gather_quads::<1, 0>(&quads[slot..], &first) });
+        }
     }
 }

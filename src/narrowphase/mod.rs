@@ -1,9 +1,11 @@
 //! Contact geometry: two shapes at two poses in, one [`Manifold`] out.
 //!
 //! Every shape is a convex core grown by a radius, so a signed distance is that
-//! of the cores less both radii. Two circles need one square root; a circle
-//! against anything needs the closest point of a core; all other pairs are two
-//! hulls (polygon, capsule, segment) under the separating axis test.
+//! of the cores less both radii. Two circles ([`circles`]) need one square root; a
+//! circle against anything ([`hull_circle`]) needs the closest point of a core; all
+//! other pairs are two hulls (polygon, capsule, segment) under the separating axis
+//! test ([`hulls`]), which for two [`rectangles`] has a closed form. Each kernel is
+//! written in lanes; [`batch`] runs it over the pairs of a step.
 //!
 //! Only the difference of the positions enters, so a scene loses nothing far
 //! from the origin beyond the rounding of that difference. Coordinates are then
@@ -14,20 +16,23 @@
 //! to check this one.
 
 pub mod batch;
-mod circle;
 pub mod circles;
+pub mod clip;
 pub mod epa;
 pub mod gjk;
-mod hull;
-mod hull_hull;
+pub mod hull;
+pub mod hull_circle;
+pub mod hulls;
 pub mod lanes;
 pub mod rectangles;
 
-use crate::contacts::{Manifold, ManifoldPoint};
+use crate::contacts::Manifold;
 use crate::shapes::{Pose, Shape};
-use glam::Vec2;
-use hull::Hull;
-use lanes::{Pair, ShapeRow};
+use batch::Kind;
+use hull::HullRow;
+use hull_circle::HullCircle;
+use hulls::Hulls;
+use lanes::{Pair, Poses, ShapeRow};
 
 /// Contact of shape `a` with shape `b`, each in the frame of its body's centre of mass.
 ///
@@ -47,78 +52,25 @@ use lanes::{Pair, ShapeRow};
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
-    let frame = Frame::new(pose_a, pose_b);
     // What lanes do in a step is done here with one lane: the same bits.
-    if let (Some(a), Some(b)) = (ShapeRow::rectangle(a), ShapeRow::rectangle(b)) {
-        return rectangles::collide(&frame.pair(a, b), speculative_distance).manifold();
-    }
-    if let (Some(a), Some(b)) = (ShapeRow::circle(a), ShapeRow::circle(b)) {
-        return circles::collide(&frame.pair(a, b), speculative_distance).manifold();
-    }
-    match (a, b) {
-        (Shape::Polygon(p), Shape::Polygon(q)) => {
-            if p.count.max(q.count) <= 4 {
-                let (p, q) = (Hull::<4>::polygon(p), Hull::<4>::polygon(q));
-                hull_hull::collide(p, q, &frame, speculative_distance)
-            } else {
-                let (p, q) = (Hull::<8>::polygon(p), Hull::<8>::polygon(q));
-                hull_hull::collide(p, q, &frame, speculative_distance)
-            }
+    let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
+    let Some(kind) = Kind::of(class_a, class_b) else { return Manifold::default() };
+    let poses = Poses::<f32>::new(pose_a, pose_b);
+    let touch = match kind {
+        Kind::Rectangles | Kind::Circles => {
+            let pair = Pair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
+            let collide = if kind == Kind::Circles { circles::collide } else { rectangles::collide };
+            collide(&pair, speculative_distance)
         }
-        (_, Shape::Circle { center, radius }) => {
-            circle::collide(a, *center, *radius, &frame, speculative_distance)
+        Kind::Hulls => {
+            Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]).collide(&poses, speculative_distance)
         }
-        (Shape::Circle { center, radius }, _) => {
-            circle::collide(b, *center, *radius, &frame.swapped(), speculative_distance).swapped()
+        Kind::HullCircle => HullCircle::new(HullRow::new(a), row_b).collide(&poses, speculative_distance),
+        Kind::CircleHull => {
+            HullCircle::new(HullRow::new(b), row_a).collide(&poses.swapped(), speculative_distance).swapped()
         }
-        (Shape::Segment { .. }, Shape::Segment { .. }) => Manifold::default(),
-        _ => collide_capsule(a, b, &frame, speculative_distance),
-    }
-}
-
-/// At least one of the two is a capsule or a segment, none is a circle.
-fn collide_capsule(a: &Shape, b: &Shape, frame: &Frame, speculative_distance: f32) -> Manifold {
-    if let (Some(a), Some(b)) = (Hull::<4>::of(a), Hull::<4>::of(b)) {
-        hull_hull::collide(a, b, frame, speculative_distance)
-    } else if let (Some(a), Some(b)) = (Hull::<8>::of(a), Hull::<8>::of(b)) {
-        hull_hull::collide(a, b, frame, speculative_distance)
-    } else {
-        Manifold::default()
-    }
-}
-
-/// What a pair of poses means to the contact between them.
-struct Frame {
-    /// From the centre of mass of a to that of b, world axes (m).
-    centers: Vec2,
-    /// Rotation of a.
-    rotation_a: Vec2,
-    /// Rotation of b.
-    rotation_b: Vec2,
-}
-
-impl Frame {
-    #[inline(always)]
-    fn new(pose_a: &Pose, pose_b: &Pose) -> Self {
-        Self {
-            centers: pose_b.position - pose_a.position,
-            rotation_a: pose_a.rotation,
-            rotation_b: pose_b.rotation,
-        }
-    }
-
-    fn pair(&self, a: ShapeRow, b: ShapeRow) -> Pair<f32> {
-        Pair {
-            centers: self.centers.into(),
-            rotation: [self.rotation_a.into(), self.rotation_b.into()],
-            place: [a.place, b.place],
-            size: [a.size, b.size],
-        }
-    }
-
-    fn swapped(&self) -> Self {
-        Self { centers: -self.centers, rotation_a: self.rotation_b, rotation_b: self.rotation_a }
-    }
+    };
+    touch.manifold()
 }
 
 impl Manifold {
@@ -133,14 +85,4 @@ impl Manifold {
         }
         self
     }
-
-    fn single(normal: Vec2, point: ManifoldPoint) -> Manifold {
-        Manifold { normal, count: 1, points: [point, ManifoldPoint::default()] }
-    }
-}
-
-/// Rotates by the inverse of `rotation`.
-#[inline(always)]
-fn unrotate(rotation: Vec2, v: Vec2) -> Vec2 {
-    Vec2::new(rotation.x * v.x + rotation.y * v.y, rotation.x * v.y - rotation.y * v.x)
 }

@@ -1,4 +1,4 @@
-//! Two rounded rectangles, in lanes: what `hull_hull` does, in closed form and without branches.
+//! Two rounded rectangles, in lanes: what [`super::hulls`] does, in closed form and without branches.
 //!
 //! A rectangle is its centre, an axis u, and half extents along u and u⊥. All four of its faces
 //! face along ±u or ±u⊥, so with d from the centre of a to that of b, the face of a toward b
@@ -8,41 +8,31 @@
 //! |d·w| − h_w − (|w·u_b| h_bx + |w·u_b⊥| h_by)                                          (1)
 //! ```
 //!
-//! The face of largest (1) over both rectangles is the reference face (why, see `hull_hull`); b's
-//! only if it is better by a tolerance where both are flush. From here on coordinates (N, T) are
-//! along its outward normal n and t = n⊥, with their origin at the centre of b, so that what is
-//! small keeps its digits where a is the large ground. The incident face is the one of the other
-//! rectangle most opposed to n: its outward normal f has f_N < 0, and it runs from its left end
-//! (large T) to its right one (small T).
+//! The face of largest (1) over both rectangles is the reference face (why, see [`super::hulls`]); b's
+//! only if it is better by a tolerance where both are flush. The incident face is the one of the
+//! other rectangle most opposed to its normal. What the two have in common is the matter of
+//! [`super::clip`].
 //!
-//! *Clipped.* The incident face, cut to the range of T that the reference face covers. Ends that
-//! are cut take their T from the reference face exactly, not from an interpolation.
-//!
-//! *Past an end.* If the deepest incident end lies above and beside the reference face, the nearest
-//! point of the reference rectangle is that end of the face, whatever the other shape is; and the
-//! nearest point of a rectangle to a point e is e clamped to it.
-//!
-//! Sources: Gottschalk, Lin, Manocha 1996 (separating axes); Sutherland, Hodgman 1974 (clipping).
+//! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
-use super::hull_hull::{FLUSH, REFERENCE_TOLERANCE, VERTEX_TOLERANCE};
-use super::lanes::{Pair, Touch, dot, perp, rotate};
+use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
+use super::lanes::{Pair, Poses, Touch, abs, dot, perp, rotate};
 use crate::lanes::Lanes;
 
 /// Contacts of the rectangles of `pair`; points farther apart than `speculative` (m) are left out.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &Pair<L>, speculative: f32) -> Touch<L> {
-    let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
-    let speculative = L::splat(speculative);
+    let (zero, one) = (L::zero(), L::splat(1.0));
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
-    let [rotation_a, rotation_b] = pair.rotation;
+    let Poses { centers, rotation: [rotation_a, rotation_b] } = pair.poses;
     let u_a = rotate(rotation_a, [place_a[2], place_a[3]]);
     let u_b = rotate(rotation_b, [place_b[2], place_b[3]]);
     let offset_a = rotate(rotation_a, [place_a[0], place_a[1]]);
     let offset_b = rotate(rotation_b, [place_b[0], place_b[1]]);
-    let d = [pair.centers[0] + (offset_b[0] - offset_a[0]), pair.centers[1] + (offset_b[1] - offset_a[1])];
+    let d = [centers[0] + (offset_b[0] - offset_a[0]), centers[1] + (offset_b[1] - offset_a[1])];
     let [h_a, h_b] = [[size_a[0], size_a[1]], [size_b[0], size_b[1]]];
     let radii = size_a[2] + size_b[2];
-    let reach = speculative + radii;
+    let reach = L::splat(speculative) + radii;
 
     // (1) for every axis. |u_a·u_b| and |u_a·u_b⊥| are all the projections there are.
     let (c, s) = (abs(dot(u_a, u_b)), abs(dot(perp(u_a), u_b)));
@@ -92,93 +82,27 @@ pub fn collide<L: Lanes>(pair: &Pair<L>, speculative: f32) -> Touch<L> {
     let left = [h_e.mul_add(f[1], face[0]), h_e.neg_mul_add(f[0], face[1])];
     let right = [h_e.neg_mul_add(f[1], face[0]), h_e.mul_add(f[0], face[1])];
 
-    let top = r_center[0] + h_n;
-    let (low, high) = (r_center[1] - h_t, r_center[1] + h_t);
-    let (height_left, height_right) = (left[0] - top, right[0] - top);
-
-    // The deepest end q, and where that is past an end of the reference face: see `hull_hull`.
-    let parallel = L::splat(FLUSH) - f[0];
-    let left_is_past = low - left[1];
-    let q_is_left = parallel.select_positive(left_is_past, height_right - height_left);
-    let q = q_is_left.select_positive(left[1], right[1]);
-    let q_height = q_is_left.select_positive(height_left, height_right);
-    let (past_low, past_high) = (low - q, q - high);
-    let outside = past_low.max(past_high);
-    // Flush and within the range: clipped, whatever rounding says of q.
-    let sticks_out = left_is_past.max(right[1] - high);
-    let beside = parallel.select_positive(sticks_out.max(zero), one);
-    let apart = q_height.min(outside).min(beside);
-
-    // Clipped.
-    let t_left = left[1].min(high).max(right[1]);
-    let t_right = right[1].max(low).min(left[1]);
-    let slope = (height_right - height_left) / (left[1] - right[1]);
-    let height_at = |t: L, end: L| (end - t).mul_add(slope, height_left);
-    let (height_0, height_1) = (height_at(t_left, left[1]), height_at(t_right, left[1]));
-    let level = half * (r_radius - i_radius);
-    let clipped = |height: L, t: L| [half.mul_add(height, top + level), t];
-    let (p_0, p_1) = (clipped(height_0, t_left), clipped(height_1, t_right));
-    let (s_0, s_1) = (height_0 - radii, height_1 - radii);
     let second = next(first);
-    let name = |reference: L, incident: L| {
-        let bits = L::splat(256.0);
-        pick(bits.mul_add(reference, incident), bits.mul_add(incident, reference))
+    let faces = Faces {
+        normal: n,
+        origin: offset_b,
+        centers,
+        flip,
+        beyond: gap_a.max(gap_b) - reach,
+        top: r_center[0] + h_n,
+        range: [r_center[1] - h_t, r_center[1] + h_t],
+        ends: [left, right],
+        opposed: f[0],
+        names: [[first, second], [left_index, right_index]],
+        radii: [r_radius, i_radius],
     };
-    let (id_0, id_1) = (name(second, left_index), name(first, right_index));
-
-    // Past an end: the incident point nearest to it.
-    let end = [top, past_low.select_positive(low, high)];
-    let e = [end[0] - i_center[0], end[1] - i_center[1]];
-    let e = [dot(e, u), dot(e, perp(u))];
-    let clamp = |x: L, h: L| x.min(h).max(-h) - x;
-    let g = rotate(u, [clamp(e[0], h_i[0]), clamp(e[1], h_i[1])]);
-    let distance = dot(g, g).sqrt();
-    let away = distance - L::splat(VERTEX_TOLERANCE);
-    let inverse = one / away.select_positive(distance, one);
-    let g = [away.select_positive(g[0] * inverse, one), away.select_positive(g[1] * inverse, zero)];
-    let s_past = distance - radii;
-    let out = half.mul_add(s_past, r_radius);
-    let p_past = [out.mul_add(g[0], end[0]), out.mul_add(g[1], end[1])];
-    let id_past =
-        name(past_low.select_positive(first, second), q_is_left.select_positive(left_index, right_index));
-
-    // Which points there are. A cut that leaves next to nothing leaves the deeper end.
-    let one_point = L::splat(VERTEX_TOLERANCE) - (t_left - t_right);
-    let none = -one;
-    let near = |s: L| (s - speculative).select_positive(none, one);
-    let keep_0 = one_point.select_positive((s_0 - s_1).select_positive(none, one), one).min(near(s_0));
-    let keep_1 = one_point.select_positive((s_0 - s_1).select_positive(one, none), one).min(near(s_1));
-    let choose = |past: L, clipped: L| apart.select_positive(past, clipped);
-    let touching = (gap_a.max(gap_b) - reach).select_positive(none, one);
-    let keep_0 = choose(near(s_past), keep_0).min(touching);
-    let keep_1 = choose(none, keep_1).min(touching);
-    let point_0 =
-        [choose(p_past[0], p_0[0]), choose(p_past[1], p_0[1]), choose(s_past, s_0), choose(id_past, id_0)];
-    let point_1 = [p_1[0], p_1[1], s_1, id_1];
-
-    // In the order of a's face, and without holes. Seen from b the two come the other way round.
-    let both = keep_0.min(keep_1);
-    let second_first = flip.min(both).max(-keep_0);
-    let points = [
-        std::array::from_fn::<L, 4, _>(|k| second_first.select_positive(point_1[k], point_0[k])),
-        std::array::from_fn::<L, 4, _>(|k| second_first.select_positive(point_0[k], point_1[k])),
-    ];
-    let count = keep_0.max(zero) + keep_1.max(zero);
-    let normal = [choose(g[0], one), choose(g[1], zero)];
-    let world = |v: [L; 2]| [n[0].mul_add(v[0], t[0] * v[1]), n[1].mul_add(v[0], t[1] * v[1])];
-    let normal = world(normal);
-    let anchor_b = points.map(|p| {
-        let p = world([p[0], p[1]]);
-        [p[0] + offset_b[0], p[1] + offset_b[1]]
-    });
-    Touch {
-        normal: [pick(-normal[0], normal[0]), pick(-normal[1], normal[1])],
-        count,
-        anchor_a: anchor_b.map(|p| [p[0] + pair.centers[0], p[1] + pair.centers[1]]),
-        anchor_b,
-        separation: points.map(|p| p[2]),
-        feature: points.map(|p| p[3]),
-    }
+    // The nearest point of a rectangle to a point e is e clamped to it.
+    clip::touch(&faces, speculative, |end, _| {
+        let e = [end[0] - i_center[0], end[1] - i_center[1]];
+        let e = [dot(e, u), dot(e, perp(u))];
+        let clamp = |x: L, h: L| x.min(h).max(-h) - x;
+        rotate(u, [clamp(e[0], h_i[0]), clamp(e[1], h_i[1])])
+    })
 }
 
 /// The face of a rectangle that looks along `toward`, given by its parts along u and u⊥.
@@ -218,9 +142,4 @@ fn index<L: Lanes>(is_x: L, x: L, y: L) -> L {
 fn next<L: Lanes>(i: L) -> L {
     let next = i + L::splat(1.0);
     (next - L::splat(3.5)).select_positive(L::zero(), next)
-}
-
-#[inline(always)]
-fn abs<L: Lanes>(x: L) -> L {
-    x.max(-x)
 }

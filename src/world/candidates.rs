@@ -12,6 +12,8 @@ pub(super) struct Candidate {
     pub shapes: [u32; 2],
     /// Their bodies.
     pub bodies: [u32; 2],
+    /// What the narrow phase calls the shapes.
+    pub numbers: [u32; 2],
     /// Centres of mass farther apart than the root of this cannot be in touch (m²).
     pub reach_squared: f32,
     /// Mixed Coulomb coefficient.
@@ -63,6 +65,7 @@ impl World {
                     Candidate {
                         shapes: [a, b],
                         bodies: [a, b].map(|shape| self.shape_body[shape as usize]),
+                        numbers: [sa.number, sb.number],
                         reach_squared: reach * reach * REACH_ROUNDING,
                         friction: (sa.friction * sb.friction).sqrt(),
                         restitution: sa.restitution.max(sb.restitution),
@@ -71,8 +74,9 @@ impl World {
                 }
             };
             kept += usize::from(candidate.contact != NO_CONTACT);
-            let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].kind);
-            let kind = if a == b { a } else { Kind::Other };
+            let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
+            // Two segments never touch.
+            let Some(kind) = Kind::of(a, b) else { continue };
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
         }

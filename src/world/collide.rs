@@ -3,9 +3,8 @@
 use super::World;
 use super::candidates::Candidate;
 use crate::contacts::Contact;
-use crate::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT};
-use crate::narrowphase::collide;
-use crate::narrowphase::lanes::{PoseRow, ShapeRow};
+use crate::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
+use crate::narrowphase::lanes::PoseRow;
 use crate::params::SPECULATIVE_DISTANCE;
 
 /// What the narrow phase keeps from step to step.
@@ -15,15 +14,15 @@ pub(super) struct Narrow {
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
     /// Candidates by [`Kind`].
-    pub of_kind: [Vec<u32>; 3],
+    pub of_kind: [Vec<u32>; Kind::ALL.len()],
     /// Shapes as the lane kernels read them.
-    pub shapes: Vec<ShapeRow>,
+    pub shapes: Shapes,
     /// The set of contacts is not that of the lanes.
     pub is_changed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
     poses: Vec<PoseRow>,
-    jobs: [Jobs; 3],
+    jobs: [Jobs; Kind::ALL.len()],
     /// New contacts, in the order in which they were met.
     fresh: Vec<Contact>,
     last_contacts: Vec<Contact>,
@@ -76,30 +75,8 @@ impl World {
         };
         let input = Input { poses, shapes, speculative: SPECULATIVE_DISTANCE };
         let mut points = 0;
-        for kind in [Kind::Rectangles, Kind::Circles] {
-            let jobs = &jobs[kind as usize];
+        for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
-        }
-        let others = &jobs[Kind::Other as usize];
-        for (job, &name) in others.name.iter().enumerate() {
-            let [a, b] = [0, 1].map(|side| &self.shapes[others.shapes[side][job] as usize]);
-            let [body_a, body_b] = [0, 1].map(|side| others.bodies[side][job] as usize);
-            let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
-            let mut manifold = collide(a, &pose_a, b, &pose_b, SPECULATIVE_DISTANCE);
-            points += manifold.count as usize;
-            let contact = others.contact[job];
-            if contact == NO_CONTACT {
-                if manifold.count > 0 {
-                    change(name, &Contact { manifold, ..Contact::default() });
-                }
-                continue;
-            }
-            let contact = &mut self.contacts[contact as usize];
-            manifold.take_impulses(&contact.manifold);
-            contact.manifold = manifold;
-            if manifold.count == 0 {
-                change(name, contact);
-            }
         }
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);
@@ -124,20 +101,17 @@ impl Narrow {
         }
         self.jobs_are_current = !cull;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
-            jobs.clear();
-            for &name in names {
+            jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];
-                if cull {
-                    let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
-                    let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                    if d[0] * d[0] + d[1] * d[1] > candidate.reach_squared {
-                        self.is_changed |= candidate.contact != NO_CONTACT;
-                        candidate.contact = NO_CONTACT;
-                        continue;
-                    }
+                let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
+                let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
+                let is_near = !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
+                if !is_near & (candidate.contact != NO_CONTACT) {
+                    self.is_changed = true;
+                    candidate.contact = NO_CONTACT;
                 }
-                jobs.push(name, candidate.bodies, candidate.shapes, candidate.contact);
-            }
+                (is_near, candidate.bodies, candidate.numbers, candidate.contact)
+            });
         }
     }
 

@@ -13,7 +13,7 @@ use crate::constraints::observe::ObservedRule;
 use crate::constraints::{Needs, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
-use crate::narrowphase::batch::{self, Kind};
+use crate::narrowphase::batch::Class;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::{Shape, combine};
 use collide::Narrow;
@@ -38,8 +38,10 @@ struct Surface {
     restitution: f32,
     /// Farthest point from the body's centre of mass (m).
     reach: f32,
-    /// Kernel of pairs of such shapes.
-    kind: Kind,
+    /// What the narrow phase knows it as.
+    class: Class,
+    /// What the narrow phase calls it.
+    number: u32,
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
@@ -117,15 +119,15 @@ impl World {
             let aabb = shape.aabb(&self.bodies.pose(index));
             let mut reach = 0.0_f32;
             shape.for_each_vertex(|v| reach = reach.max(v.length()));
-            let (kind, row) = batch::classify(&shape);
-            self.narrow.shapes.push(row);
+            let (class, number) = self.narrow.shapes.push(&shape);
             self.shapes.push(shape);
             self.shape_body.push(index as u32);
             self.surfaces.push(Surface {
                 friction: part.friction as f32,
                 restitution: part.restitution as f32,
                 reach: reach + shape.radius(),
-                kind,
+                class,
+                number,
             });
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
