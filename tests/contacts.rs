@@ -38,7 +38,12 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
             continue;
         }
         if let Some(old) = last.iter().find(|c| (c.shape_a, c.shape_b) == (a, b)) {
-            manifold.take_impulses(&old.manifold);
+            for point in &mut manifold.points[..manifold.count as usize] {
+                if let Some(same) = old.manifold.points().iter().find(|p| p.feature_id == point.feature_id) {
+                    point.normal_impulse = same.normal_impulse;
+                    point.tangent_impulse = same.tangent_impulse;
+                }
+            }
         }
         contacts.push(Contact { shape_a: a, shape_b: b, body_a, body_b, manifold, ..Contact::default() });
     }

@@ -4,10 +4,13 @@ use super::batches::{Batches, PADDING, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::sweep::over_segments;
 use crate::contacts::{Contact, quad};
-use crate::lanes::{BodyRow, Lanes, Quad};
+use crate::lanes::{BodyRow, Lanes, Quad, prefetch_records};
 
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;
+
+/// Batches between asking for contacts and reading them.
+const AHEAD: usize = 2;
 
 /// Fills the records of a segment, in lanes throughout: contacts are gathered by quads.
 ///
@@ -27,10 +30,15 @@ fn prepare_segment<L: Lanes, N: KernelNeeds, O: Opposite>(
     let layout = const { Layout::of::<N, O>() };
     let stride = layout.stride;
     let quads: &[Quad] = bytemuck::cast_slice(contacts);
+    let last_lane = segment.first_lane + segment.batches * L::WIDTH;
     let slab: &mut [L] = bytemuck::cast_slice_mut(&mut batches.slab);
     let records = &mut slab[segment.first_vector..][..segment.batches * stride];
     for (batch, record) in records.chunks_exact_mut(stride).enumerate() {
         let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
+        // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
+        let ahead = lanes.start + AHEAD * L::WIDTH..(lanes.end + AHEAD * L::WIDTH).min(last_lane);
+        let coming = batches.contact.get(ahead).unwrap_or(&[]);
+        prefetch_records::<STRIDE>(quads, coming.iter().map(|&i| if i == PADDING { 0 } else { i }));
         let mut index = &batches.contact[lanes.clone()];
         // Only a segment's last batch has empty lanes. They read some contact and ignore it.
         let (mut replaced, mut present) = ([0; 16], L::splat(1.0));

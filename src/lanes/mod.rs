@@ -19,7 +19,7 @@ mod rows;
 mod store;
 
 pub use aligned::{Block, LaneVec};
-pub use quads::{Quad, prefetch};
+pub use quads::{Quad, prefetch_records};
 pub use rows::BodyRow;
 pub use store::{RowColumns, RowStore};
 

@@ -45,7 +45,7 @@ unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(
 
 /// Asks for records of `STRIDE` quads, up to two cache lines of each, before they are needed.
 #[inline(always)]
-pub fn prefetch<const STRIDE: usize>(quads: &[Quad], index: impl Iterator<Item = u32>) {
+pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterator<Item = u32>) {
     #[cfg(target_arch = "x86_64")]
     for i in index {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -6,7 +6,7 @@ use super::hulls::Hulls;
 use super::lanes::{Pair, PoseRow, Poses, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{LaneWidth, Lanes, Quad, prefetch};
+use crate::lanes::{LaneWidth, Lanes, Quad, prefetch_records};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
@@ -269,7 +269,7 @@ fn run_kernel<L: Lanes>(
         // Contacts lie farther away than poses and shapes: those of the next batch are asked for now.
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
-        prefetch::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
+        prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
         let touch = kernel([body_a, body_b], [shape_a, shape_b]);
         // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
         // no two lanes have the same.
