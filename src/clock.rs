@@ -85,10 +85,16 @@ impl Timings {
 }
 
 /// Adds the time since the last lap to a phase; costs nothing while it is off.
+///
+/// It can also be set to a single phase: then the passes of all others are skipped, so that one
+/// phase can be run again and again on the records of a step that has been prepared.
 #[derive(Debug)]
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
+    /// The only phase that runs, and how often each lapped: others must not.
+    only: Option<(Phase, [u32; Phase::ALL.len()])>,
+    counts: bool,
 }
 
 impl Clock {
@@ -98,7 +104,31 @@ impl Clock {
             let now = Instant::now();
             (now, now)
         });
-        Clock { timings: Timings::default(), start }
+        Clock { timings: Timings::default(), start, only: None, counts: false }
+    }
+
+    /// A clock that runs one phase and takes no times. With `counts`, one lane is
+    /// [`crate::lanes::Counted`]. What the phase works on must have been prepared by a whole step.
+    pub(crate) fn only(phase: Phase, counts: bool) -> Self {
+        let only = Some((phase, [0; Phase::ALL.len()]));
+        Clock { timings: Timings::default(), start: None, only, counts }
+    }
+
+    /// Whether passes of `phase` are to be left out.
+    #[inline]
+    pub fn skips(&self, phase: Phase) -> bool {
+        self.only.as_ref().is_some_and(|only| only.0 != phase)
+    }
+
+    /// Whether floating-point operations are counted.
+    #[inline]
+    pub fn counts(&self) -> bool {
+        self.counts
+    }
+
+    /// Laps of each phase, where one phase runs alone; indexed by `Phase as usize`.
+    pub(crate) fn laps(&self) -> [u32; Phase::ALL.len()] {
+        self.only.as_ref().map_or([0; Phase::ALL.len()], |only| only.1)
     }
 
     /// Books the time since the last lap on `phase`.
@@ -108,6 +138,9 @@ impl Clock {
             let now = Instant::now();
             self.timings.phase_ns[phase as usize] += (now - *last).as_nanos() as u64;
             *last = now;
+        }
+        if let Some((_, laps)) = &mut self.only {
+            laps[phase as usize] += 1;
         }
     }
 

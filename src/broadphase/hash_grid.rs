@@ -29,6 +29,7 @@
 //! (`teschner2003`); a grid per size class, Mirtich 1996 (`mirtich1996`).
 
 use super::Proxy;
+use crate::lanes::held;
 use glam::Vec2;
 use std::ops::Range;
 
@@ -144,6 +145,12 @@ fn size_class(proxy: &Proxy) -> u16 {
 }
 
 impl HashGrid {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let small = held(&self.levels) + held(&self.class) + held(&self.bucket) + held(&self.starts);
+        small + held(&self.entries) + held(&self.found) + held(&self.first)
+    }
+
     /// An empty grid.
     pub fn new() -> Self {
         Self::default()

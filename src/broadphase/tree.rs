@@ -25,6 +25,7 @@
 //! is built in.
 
 use super::{Proxy, overlap};
+use crate::lanes::held;
 use crate::shapes::Aabb;
 use glam::Vec2;
 
@@ -89,6 +90,12 @@ impl Default for Tree {
 }
 
 impl Tree {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let lists = held(&self.pairs) + held(&self.fresh) + held(&self.merged) + held(&self.stack);
+        lists + held(&self.nodes) + held(&self.stored) + held(&self.leaves) + held(&self.moved)
+    }
+
     /// An empty tree.
     pub fn new() -> Self {
         Self::default()

@@ -14,9 +14,11 @@
 //! CPU; [`native_width`] tells the widest that is not emulated.
 
 mod aligned;
+mod counted;
 mod rows;
 
-pub use aligned::{Block, LaneVec};
+pub use aligned::{Block, LaneVec, held};
+pub use counted::{Counted, Operations};
 pub use rows::BodyRow;
 
 use bytemuck::Pod;

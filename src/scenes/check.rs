@@ -50,9 +50,7 @@ impl Scene {
         let bodies = self.body_defs()?;
         let gravity = self.gravity.map(|g| g as f32);
         let mut world = World::new(Settings { gravity, dt: self.dt as f32, ..settings });
-        for body in &bodies {
-            world.add_body(body);
-        }
+        world.add_bodies(&bodies);
         Ok(world)
     }
 }

@@ -6,6 +6,7 @@ use crate::coloring::{Coloring, EXEMPT};
 use crate::constraints::restitution::Bounces;
 use crate::constraints::{Layout, Needs, OppositeKind, Workspace};
 use crate::contacts::Contact;
+use crate::lanes::held;
 
 /// Contacts against one kind of body, and their colours.
 #[derive(Default)]
@@ -13,6 +14,13 @@ pub(super) struct Group {
     contacts: Vec<u32>,
     edges: Vec<[u32; 2]>,
     coloring: Coloring,
+}
+
+impl Group {
+    /// Bytes held.
+    pub(super) fn held_bytes(&self) -> usize {
+        held(&self.contacts) + held(&self.edges) + self.coloring.held_bytes()
+    }
 }
 
 const OPPOSITES: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];

@@ -9,7 +9,7 @@ use crate::broadphase::{BroadPhase, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::motion::{self, MotionInput};
 use crate::constraints::observe::ObservedRule;
-use crate::constraints::{Needs, StepInput, Workspace};
+use crate::constraints::{Effort, Needs, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::params::{AABB_MARGIN, DIVERGED_SPEED, SPECULATIVE_DISTANCE};
 use crate::shapes::{Shape, combine};
@@ -19,10 +19,14 @@ use lanes::Group;
 mod collide;
 mod counts;
 mod lanes;
+mod memory;
 mod pairs;
+mod phases;
 mod settings;
 
 pub use counts::{Divergence, StepCounts};
+pub use memory::{Component, Memory};
+pub use phases::{Frozen, Probe};
 pub use settings::{Order, Settings};
 
 /// What a shape's surface is like.
@@ -89,8 +93,23 @@ impl World {
         }
     }
 
-    /// Adds a body whose shapes are valid; returns its index.
+    /// Adds a body whose shapes are valid; returns its index. Many are added faster by
+    /// [`Self::add_bodies`].
     pub fn add_body(&mut self, body: &BodyDef) -> usize {
+        let index = self.push_body(body);
+        self.needs = self.find_needs();
+        index
+    }
+
+    /// Adds bodies whose shapes are valid. What the scene needs is found once, not once per body.
+    pub fn add_bodies(&mut self, bodies: &[BodyDef]) {
+        for body in bodies {
+            self.push_body(body);
+        }
+        self.needs = self.find_needs();
+    }
+
+    fn push_body(&mut self, body: &BodyDef) -> usize {
         let parts: Vec<_> = body.shapes.iter().map(|s| s.shape.mass(s.density)).collect();
         let mass = combine(&parts);
         let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
@@ -108,7 +127,6 @@ impl World {
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }
-        self.needs = self.find_needs();
         self.pairs_are_stale = true;
         index
     }
@@ -189,10 +207,17 @@ impl World {
         clock.lap(Phase::Pairs);
         self.update_contacts();
         clock.lap(Phase::Collide);
-        let needs = self.kernel_needs();
-        self.assign_lanes(&needs);
+        self.assign_lanes(&self.kernel_needs());
         clock.lap(Phase::Color);
-        let s = &self.settings;
+        self.load_rows();
+        clock.lap(Phase::Prepare);
+        let effort = self.run_solver(clock);
+        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
+    }
+
+    /// Body rows and what moves them, from the bodies.
+    fn load_rows(&mut self) {
+        let (needs, s) = (self.kernel_needs(), &self.settings);
         let motion = MotionInput {
             gravity: s.gravity,
             h: s.h(),
@@ -201,17 +226,20 @@ impl World {
             rotation: s.rotation,
         };
         self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
-        clock.lap(Phase::Prepare);
+    }
+
+    /// The solver's stages, on rows and lanes that are ready.
+    fn run_solver(&mut self, clock: &mut Clock) -> Effort {
+        let s = &self.settings;
         let input = StepInput {
-            needs,
+            needs: self.kernel_needs(),
             budget: s.budget,
             h: s.h(),
             contact_hertz: s.contact_hertz,
             record_impulses: s.record_impulses,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
-        let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
-        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
+        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width)
     }
 
     /// The scene's needs and the extra ones, completed to a set that has a kernel:

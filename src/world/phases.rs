@@ -1,0 +1,192 @@
+//! One phase of a step, again and again on a state that is held still.
+//!
+//! ```text
+//! freeze: a whole step without moving bodies   every phase finds what it needs
+//! repeat: one phase, nothing else              what a profiler shall see
+//! reset:  what the phase changed, copied back  cheap, and outside of the repeats
+//! drop:   bodies and contacts as they were     the next step gives the bits it would have given
+//! ```
+//!
+//! What repeats do to the state:
+//!
+//! * *pairs* looks for all pairs anew each time, as a step does in which some shape left its
+//!   bounds; *collide* and *color* find what they found before. Colouring finds the same contacts and
+//!   keeps its colours, as it does in a pile at rest.
+//! * *prepare* reads bodies and contacts and writes rows and records: always the same.
+//! * Sweeps go on from each other's velocities and impulses and converge; *warm start* and
+//!   *integrate* add the same velocity each time, *position* and *store* move bodies. None of them
+//!   branches on values, so the work is the same; after some hundred repeats the numbers should
+//!   be brought back by a reset, so that they remain those of a simulation.
+
+use super::World;
+use crate::bodies::Bodies;
+use crate::clock::{Clock, Phase};
+use crate::constraints::motion;
+use crate::constraints::{Batches, Effort, Needs, Workspace};
+use crate::contacts::Contact;
+use crate::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
+use crate::world::{Order, StepCounts};
+
+/// A world that is held still; dropping it lets the world go on as if nothing had happened.
+pub struct Frozen<'w> {
+    world: &'w mut World,
+    before: Saved,
+    rows: Vec<BodyRow>,
+    slabs: [Vec<Block>; 2],
+}
+
+/// What a step starts from, as far as phases write to it.
+struct Saved {
+    bodies: Bodies,
+    contacts: Vec<Contact>,
+    counts: StepCounts,
+}
+
+/// What a step does in one phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Probe {
+    /// The phase.
+    pub phase: Phase,
+    /// Sweeps or body passes of a step; 1 for what is run once.
+    pub passes: u32,
+    /// Rows that one pass solves; 0 for a phase that solves none.
+    pub rows: usize,
+    /// Operations of all passes; none where the phase does not work on lanes.
+    pub operations: Option<Operations>,
+    /// Contacts on which they were counted: those that have a colour.
+    pub counted_contacts: usize,
+}
+
+impl World {
+    /// Runs a whole step without moving the bodies, and holds the world there.
+    pub fn freeze(&mut self) -> Frozen<'_> {
+        let saved =
+            Saved { bodies: self.bodies.clone(), contacts: self.contacts.clone(), counts: self.counts };
+        let timings = self.timings;
+        self.frozen_step();
+        self.timings = timings;
+        let rows = self.work.rows.clone();
+        let slabs = [&self.work.lanes, &self.work.serial].map(|batches| used(batches).to_vec());
+        Frozen { world: self, before: saved, rows, slabs }
+    }
+
+    fn run_phase(&mut self, clock: &mut Clock, phase: Phase) -> Effort {
+        match phase {
+            Phase::Pairs => {
+                self.pairs_are_stale = true;
+                self.update_pairs();
+            }
+            Phase::Collide => self.update_contacts(),
+            Phase::Color => self.assign_lanes(&self.kernel_needs()),
+            Phase::Prepare => {
+                self.load_rows();
+                return self.run_solver(clock);
+            }
+            Phase::Store => {
+                let effort = self.run_solver(clock);
+                self.work.motion.finish(&mut self.work.rows);
+                motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
+                return effort;
+            }
+            _ => return self.run_solver(clock),
+        }
+        Effort::default()
+    }
+}
+
+/// The blocks of a slab that hold records.
+fn used(batches: &Batches) -> &[Block] {
+    &batches.slab[..(batches.vectors * batches.width).div_ceil(16)]
+}
+
+impl Frozen<'_> {
+    /// The world, as the phases left it.
+    pub fn world(&self) -> &World {
+        self.world
+    }
+
+    /// Its records and rows.
+    pub fn workspace(&self) -> &Workspace {
+        &self.world.work
+    }
+
+    /// Runs everything that a step does in `phase`, `times` times.
+    pub fn repeat(&mut self, phase: Phase, times: u32) {
+        for _ in 0..times {
+            self.world.run_phase(&mut Clock::only(phase, false), phase);
+        }
+    }
+
+    /// Brings back what repeats of `phase` have changed.
+    pub fn reset(&mut self, phase: Phase) {
+        match phase {
+            Phase::Pairs | Phase::Collide | Phase::Color | Phase::Prepare => return,
+            Phase::Store => {
+                self.world.bodies.clone_from(&self.before.bodies);
+                self.world.contacts.clone_from(&self.before.contacts);
+            }
+            _ => {}
+        }
+        let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
+        rows.clone_from(&self.rows);
+        for (batches, saved) in [lanes, serial].into_iter().zip(&self.slabs) {
+            batches.slab[..saved.len()].copy_from_slice(saved);
+        }
+    }
+
+    /// What each phase does, in the order of a step; phases that the solver or the scene does not
+    /// have are not in it. Every phase is run once, at one lane that counts its operations.
+    ///
+    /// # Panics
+    /// If a phase runs a pass of another, which then did not ask [`Clock::skips`].
+    pub fn probes(&mut self) -> Vec<Probe> {
+        // The same contacts in the same colours, one to a batch.
+        let (width, order) = (self.world.settings.width, self.world.settings.order);
+        (self.world.settings.width, self.world.settings.order) = (LaneWidth::W1, Order::Colored);
+        self.world.frozen_step();
+        let probes = Phase::ALL.into_iter().filter_map(|phase| self.probe(phase)).collect();
+        (self.world.settings.width, self.world.settings.order) = (width, order);
+        self.restore();
+        self.world.frozen_step();
+        probes
+    }
+
+    fn probe(&mut self, phase: Phase) -> Option<Probe> {
+        let mut clock = Clock::only(phase, true);
+        Counted::take();
+        let effort = self.world.run_phase(&mut clock, phase);
+        let operations = Counted::take();
+        let laps = clock.laps();
+        for other in Phase::ALL {
+            assert!(other == phase || laps[other as usize] == 0, "{phase:?} runs a pass of {other:?}");
+        }
+        let passes = match phase {
+            Phase::Pairs | Phase::Collide | Phase::Color => 1,
+            // Rows are loaded before records are made, bounces are tracked before they are applied,
+            // bodies are stored after impulses: several laps, but one run.
+            Phase::Prepare | Phase::Restitution | Phase::Store => laps[phase as usize].min(1),
+            _ => laps[phase as usize],
+        };
+        let counted_contacts = self.world.work.lanes.contact.len();
+        let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
+        let rows = effort.row_updates / passes.max(1) as usize;
+        (passes > 0).then_some(Probe { phase, passes, rows, operations, counted_contacts })
+    }
+
+    /// What the constraints of the step need.
+    pub fn needs(&self) -> Needs {
+        self.world.kernel_needs()
+    }
+
+    fn restore(&mut self) {
+        self.world.bodies.clone_from(&self.before.bodies);
+        self.world.contacts.clone_from(&self.before.contacts);
+    }
+}
+
+impl Drop for Frozen<'_> {
+    fn drop(&mut self) {
+        self.restore();
+        self.world.counts = self.before.counts;
+    }
+}
