@@ -31,14 +31,11 @@ fn width(lanes: usize) -> Result<LaneWidth, Error> {
     LaneWidth::from_lanes(lanes).ok_or_else(refused)
 }
 
-/// Steps at the end of settling whose errors are taken.
-const OBSERVED_STEPS: u32 = 10;
-
-/// Runs `steps` steps; the errors of the last [`OBSERVED_STEPS`] of them, none without steps.
-fn settled(world: &mut World, steps: u32) -> Result<Option<Errors>, Error> {
+/// Runs `steps` steps; the errors of the last `observed` of them, none without steps.
+fn settled(world: &mut World, steps: u32, observed: u32) -> Result<Option<Errors>, Error> {
     let mut observation = None;
     for step in 0..steps {
-        if step + OBSERVED_STEPS >= steps {
+        if step + observed >= steps {
             world.settings.record_impulses = true;
             observation.get_or_insert_with(|| Observation::new(world));
         }

@@ -75,6 +75,9 @@ pub struct ProfileArgs {
     pub roofline: Option<PathBuf>,
 }
 
+/// Steps at the end of settling whose errors are printed.
+const OBSERVED_STEPS: u32 = 10;
+
 /// Longest measurement (s).
 const MAX_SECONDS: f64 = 86_400.0;
 
@@ -94,9 +97,8 @@ fn parse(name: &str) -> Result<Vec<Phase>, Error> {
         return Ok(Phase::ALL.to_vec());
     }
     let found = Phase::ALL.into_iter().find(|&p| key(p) == name.trim().replace([' ', '_'], "-"));
-    let refused = || {
-        Error::invalid("phase", format!("'{name}' is none of {}", names(Phase::ALL.into_iter())))
-    };
+    let refused =
+        || Error::invalid("phase", format!("'{name}' is none of {}", names(Phase::ALL.into_iter())));
     found.map(|phase| vec![phase]).ok_or_else(refused)
 }
 
@@ -128,7 +130,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     let file = args.roofline.as_deref().map(Pending::new).transpose()?;
     eprintln!("settling {}: {} steps", scene.name, args.settle);
     let mut world = scene.build(settings)?;
-    let errors = settled(&mut world, args.settle)?;
+    let errors = settled(&mut world, args.settle, OBSERVED_STEPS)?;
     let mut frozen = world.freeze();
     let probes = frozen.probes();
     let missing = |phase: &&Phase| probes.iter().all(|p| p.phase != **phase);

@@ -12,6 +12,9 @@
 //! min(P, I B) with the intensity I = F/D. Source: `williams2009`.
 
 pub mod ceilings;
+pub mod growth;
+pub mod growth_report;
+pub mod islands;
 pub mod roofline;
 pub mod text;
 pub mod traffic;

@@ -12,7 +12,7 @@ const SIZE: (i32, i32) = (900, 560);
 const LEFT: i32 = 84;
 const RIGHT: i32 = 250;
 const TOP: i32 = 64;
-const BOTTOM: i32 = 64;
+const BOTTOM: i32 = 76;
 /// Least distance of two labels beside the panel.
 const LINE: i32 = 17;
 
@@ -41,13 +41,15 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
         .collect();
     let root = SVGBackend::with_string(text, (SIZE.0 as u32, SIZE.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
-    let title = format!("{}, {}, {} lanes: phases under their roofs", report.scene, report.solver, report.lanes);
+    let title =
+        format!("{}, {}, {} lanes: phases under their roofs", report.scene, report.solver, report.lanes);
     write(&root, &title, (12, 20), 18, HPos::Left)?;
     let note = "thin: reading from each level of memory; thick: multiply-adds; short bars: the roof of a phase's own working set";
     write(&root, note, (12, 44), 13, HPos::Left)?;
     // The ridges of all levels, the points, and some room.
     let ridges = report.levels.iter().map(|(_, b)| peak / b.read).filter(|r| r.is_finite());
-    let xs: Vec<f64> = points.iter().flat_map(|p| [p.intensity / 2.0, p.intensity * 2.0]).chain(ridges).collect();
+    let xs: Vec<f64> =
+        points.iter().flat_map(|p| [p.intensity / 2.0, p.intensity * 2.0]).chain(ridges).collect();
     let x = Scale::of(xs.iter().copied(), 6);
     let slowest = report.levels.iter().map(|l| l.1.read).fold(f64::INFINITY, f64::min);
     let ys = points.iter().map(|p| p.rate).chain([peak * 1.3, slowest * x.limits[0]]);
@@ -65,20 +67,27 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
         write(&root, &number(tick), (left - 6, at), 12, HPos::Right)?;
     }
     let at = |intensity: f64, rate: f64| (x.pixel(intensity, left, right), y.pixel(rate, bottom, top));
+    let mut free = top;
     for (level, bandwidth) in &report.levels {
         roof(&root, [x.limits, y.limits], bandwidth.read, peak, &at)?;
         let rate = format!("{} {} GB/s", level.name, digits(bandwidth.read));
         // Where the roof enters the picture, from the left or from below.
         let enters = x.limits[0].max(y.limits[0] / bandwidth.read) * 1.12;
         let (px, py) = at(enters, enters * bandwidth.read);
-        write(&root, &rate, (px + 4, (py - 14).max(top + 8)), 11, HPos::Left)?;
+        free = (py + 10).max(free + 13).min(bottom - 8);
+        write(&root, &rate, (px + 8, free), 11, HPos::Left)?;
     }
     let (_, py) = at(1.0, peak);
     root.draw(&PathElement::new(vec![(left, py), (right, py)], INK.stroke_width(3)))?;
     write(&root, &format!("multiply-adds {} GFLOP/s", digits(peak)), (left + 8, py - 10), 12, HPos::Left)?;
     root.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write(&root, "operations per byte (flop/B)", ((left + right) / 2, bottom + 40), 13, HPos::Center)?;
-    crate::report::axes::write_upwards(&root, "operations per second (GFLOP/s)", (22, (top + bottom) / 2), 13)?;
+    write(&root, "operations per byte (flop/B)", ((left + right) / 2, bottom + 36), 13, HPos::Center)?;
+    crate::report::axes::write_upwards(
+        &root,
+        "operations per second (GFLOP/s)",
+        (22, (top + bottom) / 2),
+        13,
+    )?;
     labels(&root, report, &points, &at)?;
     root.present()?;
     Ok(())

@@ -61,9 +61,7 @@ fn floats(phase: Phase, layout: &Layout, friction: bool) -> [usize; 2] {
             [read, points * impulses]
         }
         // Without friction only the arms along the normal.
-        Phase::WarmStart => {
-            [2 + points * (impulses + if layout.has_friction { arms } else { arms / 2 }), 0]
-        }
+        Phase::WarmStart => [2 + points * (impulses + if layout.has_friction { arms } else { arms / 2 }), 0],
         Phase::Position => [2 + points * (arms + 2), 0],
         _ => [0, 0],
     }

@@ -166,12 +166,17 @@ impl World {
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
-        self.work.motion.finish(&mut self.work.rows);
-        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
+        self.store();
         clock.lap(Phase::Store);
         self.step_index += 1;
         self.timings = clock.stop();
         self.check()
+    }
+
+    /// Velocities and motions of the rows to the bodies.
+    fn store(&mut self) {
+        self.work.motion.finish(&mut self.work.rows);
+        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
     }
 
     /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that

@@ -20,8 +20,7 @@
 
 use super::World;
 use crate::bodies::Bodies;
-use crate::clock::{Clock, Phase};
-use crate::constraints::motion;
+use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::{Batches, Effort, Needs, Workspace};
 use crate::contacts::Contact;
 use crate::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
@@ -84,8 +83,7 @@ impl World {
             }
             Phase::Store => {
                 let effort = self.run_solver(clock);
-                self.work.motion.finish(&mut self.work.rows);
-                motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
+                self.store();
                 return effort;
             }
             _ => return self.run_solver(clock),
@@ -115,6 +113,18 @@ impl Frozen<'_> {
         for _ in 0..times {
             self.world.run_phase(&mut Clock::only(phase, false), phase);
         }
+    }
+
+    /// Runs every phase of a step once and says what each took, pairs looked for anew; then the
+    /// bodies and contacts are brought back.
+    pub fn step(&mut self) -> Timings {
+        let mut clock = Clock::start(true);
+        self.world.pairs_are_stale = true;
+        self.world.solve(&mut clock);
+        self.world.store();
+        clock.lap(Phase::Store);
+        self.restore();
+        clock.stop()
     }
 
     /// Brings back what repeats of `phase` have changed.
