@@ -160,8 +160,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
         scene(&args.scene)?;
     }
-    files::prepare_folder(&args.out)?;
     let family = Family::new(&args.scene, &settings, args.settle)?;
+    files::prepare_folder(&args.out)?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut notes = String::new();
     for target in targets {
@@ -186,12 +186,12 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
             Err(failure) => notes += &format!("left out: {}: {failure}\n", scene.name),
         }
     }
-    let rows = measure(&mut entries, args.repeats, &|round| {
+    let (rows, memory) = measure(&mut entries, args.repeats, &|round| {
         eprintln!("round {} of {}: whole steps on held states", round + 1, args.repeats);
     });
     drop(entries);
     let title = format!("{} · {}, {} lanes: cost of a contact", args.scene, solver.name, args.lanes);
-    let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows)));
+    let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows, &memory)));
     out += &notes;
     let contents = [
         ("growth.csv", growth_report::csv(&rows)?),

@@ -5,6 +5,7 @@
 //! widest lanes there are, since they ask what memory can do; the third the width of the run.
 
 use crate::lanes::{Block, LaneWidth, Lanes};
+use crate::study::race::median;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use wide::{f32x4, f32x8, f32x16};
@@ -114,6 +115,54 @@ impl Buffer {
     }
 }
 
+/// How fast working sets are read, by their size.
+pub struct ReadCurve {
+    buffer: Buffer,
+    /// Sizes (bytes), each twice the last, and what was measured (GB/s).
+    sizes: Vec<(usize, Vec<f64>)>,
+}
+
+impl ReadCurve {
+    /// For sizes from 16 KiB up to `largest`, or a quarter gigabyte.
+    pub fn new(largest: usize) -> Self {
+        let buffer = Buffer::new(&[], largest.max(16 << 10));
+        let most = size_of_val(buffer.blocks.as_slice());
+        let doubled = std::iter::successors(Some(16 << 10), |&bytes: &usize| bytes.checked_mul(2));
+        ReadCurve {
+            buffer,
+            sizes: doubled.take_while(|&bytes| bytes <= most).map(|b| (b, Vec::new())).collect(),
+        }
+    }
+
+    /// Measures every size once more.
+    pub fn sample(&mut self, time: Duration) {
+        for (bytes, rates) in &mut self.sizes {
+            rates.push(self.buffer.read(*bytes, time));
+        }
+    }
+
+    /// Rate at which a set of `bytes` is read (GB/s): medians, interpolated on the logarithm of the
+    /// size, and never faster than a smaller set.
+    pub fn at(&self, bytes: usize) -> f64 {
+        let mut least = f64::INFINITY;
+        let rates: Vec<(f64, f64)> = self
+            .sizes
+            .iter()
+            .map(|(size, rates)| {
+                least = least.min(median(rates));
+                ((*size as f64).ln(), least)
+            })
+            .collect();
+        let x = (bytes.max(1) as f64).ln();
+        let after = rates.partition_point(|r| r.0 < x);
+        match (after.checked_sub(1).and_then(|i| rates.get(i)), rates.get(after)) {
+            (Some(a), Some(b)) => a.1 + (x - a.0) / (b.0 - a.0) * (b.1 - a.1),
+            (Some(one), None) | (None, Some(one)) => one.1,
+            (None, None) => f64::NAN,
+        }
+    }
+}
+
 fn blocks_of(bytes: usize) -> usize {
     bytes.div_ceil(size_of::<Block>())
 }
@@ -204,6 +253,19 @@ mod tests {
         assert!(levels.len() >= 2 && levels.last().unwrap().name == "DRAM");
         assert!(levels.windows(2).all(|w| w[0].bytes <= w[1].bytes), "{levels:?}");
         assert!(levels.iter().all(|l| l.bytes <= LARGEST));
+    }
+
+    #[test]
+    fn a_curve_is_interpolated_and_never_rises() {
+        let mut curve = ReadCurve::new(70 << 10);
+        assert_eq!(curve.sizes.iter().map(|s| s.0 >> 10).collect::<Vec<_>>(), [16, 32, 64]);
+        curve.sizes[0].1 = vec![80.0, 100.0, 900.0];
+        curve.sizes[1].1 = vec![50.0];
+        curve.sizes[2].1 = vec![70.0];
+        let at = |kib: f64| curve.at((kib * 1024.0) as usize);
+        assert_eq!([at(1.0), at(16.0), at(32.0), at(64.0), at(1e6)], [100.0, 100.0, 50.0, 50.0, 50.0]);
+        assert!((at(16.0 * 2.0_f64.sqrt()) - 75.0).abs() < 0.01);
+        assert!(ReadCurve::new(0).at(0).is_nan() || ReadCurve::new(0).at(0) >= 0.0);
     }
 
     #[test]

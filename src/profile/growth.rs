@@ -5,7 +5,7 @@
 //! all of them. A turn is a few whole steps on the same state, pairs looked for anew in each; the
 //! first finds cold caches and is not timed.
 
-use super::ceilings::Buffer;
+use super::ceilings::ReadCurve;
 use crate::clock::Phase;
 use crate::metrics::Errors;
 use crate::study::race::median;
@@ -71,14 +71,19 @@ impl Row {
 
 /// Time of one world in one round, beyond its first step.
 const TURN: Duration = Duration::from_millis(40);
+/// Time of one size of memory in one round.
+const READ: Duration = Duration::from_millis(1);
 /// Steps of a turn, at most: the caches are warm long before.
 const STEPS: usize = 400;
 
-/// Times all worlds in turn, `repeats` rounds.
-pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> Vec<Row> {
+/// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
+pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> (Vec<Row>, ReadCurve) {
+    let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
+    let mut curve = ReadCurve::new(largest);
     let mut samples: Vec<Vec<[f64; Phase::ALL.len() + 1]>> = vec![Vec::new(); entries.len()];
     for round in 0..repeats {
         progress(round);
+        curve.sample(READ);
         for (entry, samples) in entries.iter_mut().zip(&mut samples) {
             samples.push(turn(&mut entry.world));
         }
@@ -95,7 +100,7 @@ pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> V
             errors: entry.errors,
         }
     };
-    entries.iter().zip(&samples).map(row).collect()
+    (entries.iter().zip(&samples).map(row).collect(), curve)
 }
 
 /// Median of each phase, and of the whole step, over the steps of one turn.
@@ -160,6 +165,7 @@ const TOLERANCE: f64 = 1.15;
 pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Growth {
     let [before, after] = contacts.map(|n| (n.max(2) as f64).ln());
     let room = TOLERANCE + 2.0 * spread;
+    // Not a number, where nothing was measured, excuses nothing.
     let (memory, logarithm) = (memory.max(1.0), (after / before).max(1.0));
     let change = match ratio {
         r if r <= room => Change::Flat,
@@ -187,10 +193,7 @@ pub struct Verdict {
 const NEGLIGIBLE: f64 = 0.5;
 
 /// Judges every phase and the whole step; rows are in ascending order of contacts.
-pub fn verdicts(rows: &[Row]) -> Vec<Verdict> {
-    let largest = rows.iter().map(|r| r.memory.used()).max().unwrap_or(0);
-    let mut buffer = Buffer::new(&[], largest);
-    let mut rate = |bytes: usize| buffer.read(bytes, Duration::from_millis(5));
+pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
     let kinds = std::iter::once(None).chain(Phase::ALL.into_iter().map(Some));
     let mut verdicts = Vec::new();
     for phase in kinds {
@@ -201,7 +204,7 @@ pub fn verdicts(rows: &[Row]) -> Vec<Verdict> {
         if costs.len() < 2 || range[1] < NEGLIGIBLE {
             continue;
         }
-        let speeds: Vec<f64> = rows.iter().map(|r| rate(working_set(&r.memory, phase))).collect();
+        let speeds: Vec<f64> = rows.iter().map(|r| memory.at(working_set(&r.memory, phase))).collect();
         let steps = (1..rows.len())
             .map(|i| {
                 let spread = |r: &Row| time(r).spread_ns / time(r).ns.max(1.0);

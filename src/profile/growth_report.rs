@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::report::axes::{Area, Drawn, GRID, INK, Scale, color, write, write_upwards};
 use crate::report::table::{finish, table};
 use crate::report::units::{digits, ratio, si};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
@@ -72,7 +73,7 @@ fn sentence(verdict: &Verdict) -> String {
     };
     let mut parts = Vec::new();
     let caches: Vec<String> = of(Change::Cache)
-        .map(|s| format!("{} (memory of its working set reads {} times slower)", place(s), digits(s.memory)))
+        .map(|s| format!("{} (its working set streams {} times slower)", place(s), digits(s.memory)))
         .collect();
     if !caches.is_empty() {
         parts.push(format!("steps where a cache ends: {}", caches.join(", ")));
@@ -82,10 +83,10 @@ fn sentence(verdict: &Verdict) -> String {
         parts.push(format!("within n log n: {}", logarithms.join(", ")));
     }
     let faster: Vec<String> = of(Change::Faster)
-        .map(|s| format!("{}, where memory accounts for {}", place(s), digits(s.memory)))
+        .map(|s| format!("{}, where streams account for {}", place(s), digits(s.memory)))
         .collect();
     if !faster.is_empty() {
-        parts.push(format!("FASTER than n log n and memory account for: {}", faster.join("; ")));
+        parts.push(format!("FASTER than n log n and streams account for: {}", faster.join("; ")));
     }
     if of(Change::Flat).next().is_some() {
         parts.push("else flat".into());
@@ -223,7 +224,11 @@ fn panel(
         if let Some(&end) = points.last() {
             ends.push((end, name, color));
         }
-        area.draw(&PathElement::new(points, color.stroke_width(width)))?;
+        // Colours come again after eight.
+        match i {
+            0..=8 => area.draw(&PathElement::new(points, color.stroke_width(width)))?,
+            _ => area.draw(&DashedPathElement::new(points, 6, 4, color.stroke_width(width)))?,
+        }
     }
     ends.sort_by_key(|(end, ..)| end.1);
     let (mut free, count) = (top, ends.len() as i32);

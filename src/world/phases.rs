@@ -131,10 +131,7 @@ impl Frozen<'_> {
     pub fn reset(&mut self, phase: Phase) {
         match phase {
             Phase::Pairs | Phase::Collide | Phase::Color | Phase::Prepare => return,
-            Phase::Store => {
-                self.world.bodies.clone_from(&self.before.bodies);
-                self.world.contacts.clone_from(&self.before.contacts);
-            }
+            Phase::Store => self.restore(),
             _ => {}
         }
         let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
@@ -188,8 +185,23 @@ impl Frozen<'_> {
         self.world.kernel_needs()
     }
 
+    /// Brings back all that a step writes to, into the memory that it has: a new place would cost
+    /// the next step page faults.
     fn restore(&mut self) {
-        self.world.bodies.clone_from(&self.before.bodies);
+        let (to, from) = (&mut self.world.bodies, &self.before.bodies);
+        for (to, from) in [
+            (&mut to.position_x, &from.position_x),
+            (&mut to.position_y, &from.position_y),
+            (&mut to.position_x_rest, &from.position_x_rest),
+            (&mut to.position_y_rest, &from.position_y_rest),
+            (&mut to.rotation_cos, &from.rotation_cos),
+            (&mut to.rotation_sin, &from.rotation_sin),
+            (&mut to.velocity_x, &from.velocity_x),
+            (&mut to.velocity_y, &from.velocity_y),
+            (&mut to.angular_velocity, &from.angular_velocity),
+        ] {
+            to.copy_from_slice(from);
+        }
         self.world.contacts.clone_from(&self.before.contacts);
     }
 }
