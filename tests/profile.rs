@@ -133,7 +133,11 @@ fn the_next_step_does_not_notice() {
                     frozen.reset(probe.phase);
                     frozen.repeat(probe.phase, 1);
                 }
+                // Whole steps leave what phases can go on from.
                 frozen.step();
+                frozen.step();
+                frozen.repeat(Phase::Collide, 2);
+                frozen.repeat(Phase::Store, 2);
                 drop(frozen);
                 for step in 0..5 {
                     // A run that diverges does so in both.

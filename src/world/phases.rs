@@ -20,6 +20,7 @@
 
 use super::World;
 use crate::bodies::Bodies;
+use crate::broadphase::Proxy;
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::{Batches, Effort, Needs, Workspace};
 use crate::contacts::Contact;
@@ -30,6 +31,8 @@ use crate::world::{Order, StepCounts};
 pub struct Frozen<'w> {
     world: &'w mut World,
     before: Saved,
+    /// Contacts of the step that is held still, with the impulses it ended with.
+    contacts: Vec<Contact>,
     rows: Vec<BodyRow>,
     slabs: [Vec<Block>; 2],
 }
@@ -38,6 +41,7 @@ pub struct Frozen<'w> {
 struct Saved {
     bodies: Bodies,
     contacts: Vec<Contact>,
+    proxies: Vec<Proxy>,
     counts: StepCounts,
 }
 
@@ -59,14 +63,19 @@ pub struct Probe {
 impl World {
     /// Runs a whole step without moving the bodies, and holds the world there.
     pub fn freeze(&mut self) -> Frozen<'_> {
-        let saved =
-            Saved { bodies: self.bodies.clone(), contacts: self.contacts.clone(), counts: self.counts };
+        let before = Saved {
+            bodies: self.bodies.clone(),
+            contacts: self.contacts.clone(),
+            proxies: self.proxies.clone(),
+            counts: self.counts,
+        };
         let timings = self.timings;
         self.frozen_step();
         self.timings = timings;
         let rows = self.work.rows.clone();
         let slabs = [&self.work.lanes, &self.work.serial].map(|batches| used(batches).to_vec());
-        Frozen { world: self, before: saved, rows, slabs }
+        let contacts = self.contacts.clone();
+        Frozen { world: self, before, contacts, rows, slabs }
     }
 
     fn run_phase(&mut self, clock: &mut Clock, phase: Phase) -> Effort {
@@ -115,23 +124,29 @@ impl Frozen<'_> {
         }
     }
 
-    /// Runs every phase of a step once and says what each took, pairs looked for anew; then the
-    /// bodies and contacts are brought back.
+    /// Runs every phase of a step once, from what the step itself would start with, and says what each
+    /// took, pairs looked for anew. The bodies are brought back.
     pub fn step(&mut self) -> Timings {
+        self.restore_bodies();
+        self.world.contacts.clone_from(&self.before.contacts);
         let mut clock = Clock::start(true);
         self.world.pairs_are_stale = true;
         self.world.solve(&mut clock);
         self.world.store();
         clock.lap(Phase::Store);
-        self.restore();
-        clock.stop()
+        let timings = clock.stop();
+        self.restore_bodies();
+        timings
     }
 
     /// Brings back what repeats of `phase` have changed.
     pub fn reset(&mut self, phase: Phase) {
         match phase {
             Phase::Pairs | Phase::Collide | Phase::Color | Phase::Prepare => return,
-            Phase::Store => self.restore(),
+            Phase::Store => {
+                self.restore_bodies();
+                self.world.contacts.clone_from(&self.contacts);
+            }
             _ => {}
         }
         let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
@@ -153,7 +168,8 @@ impl Frozen<'_> {
         self.world.frozen_step();
         let probes = Phase::ALL.into_iter().filter_map(|phase| self.probe(phase)).collect();
         (self.world.settings.width, self.world.settings.order) = (width, order);
-        self.restore();
+        self.restore_bodies();
+        self.world.contacts.clone_from(&self.before.contacts);
         self.world.frozen_step();
         probes
     }
@@ -185,9 +201,9 @@ impl Frozen<'_> {
         self.world.kernel_needs()
     }
 
-    /// Brings back all that a step writes to, into the memory that it has: a new place would cost
+    /// Brings back what a step moves, into the memory that it has: a new place would cost
     /// the next step page faults.
-    fn restore(&mut self) {
+    fn restore_bodies(&mut self) {
         let (to, from) = (&mut self.world.bodies, &self.before.bodies);
         for (to, from) in [
             (&mut to.position_x, &from.position_x),
@@ -202,13 +218,16 @@ impl Frozen<'_> {
         ] {
             to.copy_from_slice(from);
         }
-        self.world.contacts.clone_from(&self.before.contacts);
     }
 }
 
 impl Drop for Frozen<'_> {
     fn drop(&mut self) {
-        self.restore();
+        self.restore_bodies();
+        self.world.contacts.clone_from(&self.before.contacts);
+        // Bounds may have followed bodies that repeats have moved.
+        self.world.proxies.clone_from(&self.before.proxies);
+        self.world.pairs_are_stale = true;
         self.world.counts = self.before.counts;
     }
 }
