@@ -3,9 +3,10 @@
 use super::{is_path, scene, settled};
 use crate::error::Error;
 use crate::files;
-use crate::profile::growth::{Entry, measure, size_for, verdicts};
+use crate::profile::growth::{Entry, Measurement, measure, size_for, verdicts};
 use crate::profile::growth_report;
 use crate::profile::islands::islands;
+use crate::profile::waiting;
 use crate::scenes::{CATALOG, MAX_BODIES, Scene, Size};
 use crate::solvers::{DEFAULT, find};
 use crate::world::{Settings, World};
@@ -186,13 +187,14 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
             Err(failure) => notes += &format!("left out: {}: {failure}\n", scene.name),
         }
     }
-    let (rows, memory) = measure(&mut entries, args.repeats, &|round| {
+    let Measurement { rows, memory, waiting } = measure(&mut entries, args.repeats, &|round| {
         eprintln!("round {} of {}: whole steps on held states", round + 1, args.repeats);
     });
     drop(entries);
     let title = format!("{} · {}, {} lanes: cost of a contact", args.scene, solver.name, args.lanes);
     let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows, &memory)));
     out += &notes;
+    out += &waiting::note(waiting);
     let contents = [
         ("growth.csv", growth_report::csv(&rows)?),
         ("growth.svg", growth_report::svg(&rows, &title)?.into_bytes()),

@@ -41,9 +41,24 @@ thread_local! {
     };
 }
 
-fn book(entry: impl FnOnce(&mut Operations)) {
+enum Kind {
+    Add,
+    Multiply,
+    MultiplyAdd,
+    Divide,
+    Choose,
+}
+
+fn book(kind: Kind) {
     let mut operations = BOOK.get();
-    entry(&mut operations);
+    let count = match kind {
+        Kind::Add => &mut operations.adds,
+        Kind::Multiply => &mut operations.multiplies,
+        Kind::MultiplyAdd => &mut operations.multiply_adds,
+        Kind::Divide => &mut operations.divisions,
+        Kind::Choose => &mut operations.choices,
+    };
+    *count += 1;
     BOOK.set(operations);
 }
 
@@ -62,7 +77,7 @@ impl Counted {
 impl Add for Counted {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        book(|o| o.adds += 1);
+        book(Kind::Add);
         Counted(self.0 + other.0)
     }
 }
@@ -70,7 +85,7 @@ impl Add for Counted {
 impl Sub for Counted {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        book(|o| o.adds += 1);
+        book(Kind::Add);
         Counted(self.0 - other.0)
     }
 }
@@ -78,7 +93,7 @@ impl Sub for Counted {
 impl Mul for Counted {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        book(|o| o.multiplies += 1);
+        book(Kind::Multiply);
         Counted(self.0 * other.0)
     }
 }
@@ -86,7 +101,7 @@ impl Mul for Counted {
 impl Div for Counted {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        book(|o| o.divisions += 1);
+        book(Kind::Divide);
         Counted(self.0 / other.0)
     }
 }
@@ -106,32 +121,32 @@ impl Lanes for Counted {
     }
 
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        book(|o| o.multiply_adds += 1);
+        book(Kind::MultiplyAdd);
         Counted(Lanes::mul_add(self.0, factor.0, term.0))
     }
 
     fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        book(|o| o.multiply_adds += 1);
+        book(Kind::MultiplyAdd);
         Counted(Lanes::neg_mul_add(self.0, factor.0, term.0))
     }
 
     fn max(self, other: Self) -> Self {
-        book(|o| o.choices += 1);
+        book(Kind::Choose);
         Counted(Lanes::max(self.0, other.0))
     }
 
     fn min(self, other: Self) -> Self {
-        book(|o| o.choices += 1);
+        book(Kind::Choose);
         Counted(Lanes::min(self.0, other.0))
     }
 
     fn sqrt(self) -> Self {
-        book(|o| o.divisions += 1);
+        book(Kind::Divide);
         Counted(self.0.sqrt())
     }
 
     fn select_positive(self, positive: Self, otherwise: Self) -> Self {
-        book(|o| o.choices += 1);
+        book(Kind::Choose);
         Counted(Lanes::select_positive(self.0, positive.0, otherwise.0))
     }
 

@@ -6,7 +6,8 @@
 //! first finds cold caches and is not timed.
 
 use super::ceilings::ReadCurve;
-use crate::clock::Phase;
+use super::waiting::{self, waited};
+use crate::clock::{Phase, Timings};
 use crate::metrics::Errors;
 use crate::study::race::median;
 use crate::world::{Memory, StepCounts, World};
@@ -56,6 +57,8 @@ pub struct Row {
     pub memory: Memory,
     /// Errors beside the times.
     pub errors: Option<Errors>,
+    /// Largest share of a timed step in which the thread waited for a processor.
+    pub paused: f64,
 }
 
 impl Row {
@@ -73,49 +76,77 @@ impl Row {
 const TURN: Duration = Duration::from_millis(40);
 /// Time of one size of memory in one round.
 const READ: Duration = Duration::from_millis(1);
+/// A step that waited for a processor for more than this share of its time is left out, where enough
+/// others are left.
+const PAUSE: f64 = 0.01;
+/// Steps that are kept at least.
+const FEWEST: usize = 3;
 /// Steps of a turn, at most: the caches are warm long before.
 const STEPS: usize = 400;
 
-/// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
-pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> (Vec<Row>, ReadCurve) {
-    let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
-    let mut curve = ReadCurve::new(largest);
-    let mut samples: Vec<Vec<[f64; Phase::ALL.len() + 1]>> = vec![Vec::new(); entries.len()];
-    for round in 0..repeats {
-        progress(round);
-        curve.sample(READ);
-        for (entry, samples) in entries.iter_mut().zip(&mut samples) {
-            samples.push(turn(&mut entry.world));
-        }
-    }
-    let row = |(entry, samples): (&Entry, &Vec<[f64; Phase::ALL.len() + 1]>)| {
-        let time = |k: usize| Time::of(&samples.iter().map(|s| s[k]).collect::<Vec<_>>());
-        Row {
-            scene: entry.scene.clone(),
-            bodies: entry.world.bodies.len(),
-            counts: entry.world.counts,
-            step: time(Phase::ALL.len()),
-            phases: std::array::from_fn(time),
-            memory: entry.world.memory(),
-            errors: entry.errors,
-        }
-    };
-    (entries.iter().zip(&samples).map(row).collect(), curve)
+/// What was measured.
+pub struct Measurement {
+    /// In the order of the entries.
+    pub rows: Vec<Row>,
+    /// How fast memory was read, in the same rounds.
+    pub memory: ReadCurve,
+    /// Share of the time in which the thread waited for a processor, where that is known.
+    pub waiting: Option<f64>,
 }
 
-/// Median of each phase, and of the whole step, over the steps of one turn.
-fn turn(world: &mut World) -> [f64; Phase::ALL.len() + 1] {
+/// A step, and the share of its time in which the thread waited.
+type Sample = (Timings, f64);
+
+/// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
+pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> Measurement {
+    let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
+    let mut memory = ReadCurve::new(largest);
+    let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); entries.len()];
+    let (start, before) = (Instant::now(), waited());
+    for round in 0..repeats {
+        progress(round);
+        memory.sample(READ);
+        for (entry, samples) in entries.iter_mut().zip(&mut samples) {
+            turn(&mut entry.world, samples);
+        }
+    }
+    let waiting = waiting::share(before, start.elapsed());
+    let rows = entries.iter().zip(samples).map(|(entry, samples)| row(entry, samples)).collect();
+    Measurement { rows, memory, waiting }
+}
+
+fn row(entry: &Entry, mut samples: Vec<Sample>) -> Row {
+    // Steps without a pause, or those with the shortest ones.
+    samples.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let whole = samples.iter().take_while(|s| s.1 <= PAUSE).count();
+    samples.truncate(whole.max(FEWEST));
+    let time = |of: &dyn Fn(&Timings) -> u64| {
+        Time::of(&samples.iter().map(|(timings, _)| of(timings) as f64).collect::<Vec<_>>())
+    };
+    Row {
+        scene: entry.scene.clone(),
+        bodies: entry.world.bodies.len(),
+        counts: entry.world.counts,
+        step: time(&|t| t.step_ns),
+        phases: std::array::from_fn(|k| time(&|t| t.phase_ns[k])),
+        memory: entry.world.memory(),
+        errors: entry.errors,
+        paused: samples.last().map_or(0.0, |s| s.1),
+    }
+}
+
+/// One turn: a step that finds cold caches and is not timed, then as many as fit.
+fn turn(world: &mut World, samples: &mut Vec<Sample>) {
     let mut frozen = world.freeze();
     frozen.step();
-    let start = Instant::now();
-    let mut steps = Vec::new();
-    while steps.is_empty() || (start.elapsed() < TURN && steps.len() < STEPS) {
-        steps.push(frozen.step());
+    let (start, mut steps) = (Instant::now(), 0);
+    while steps == 0 || (start.elapsed() < TURN && steps < STEPS) {
+        let before = waited();
+        let timings = frozen.step();
+        let elapsed = Duration::from_nanos(timings.step_ns);
+        samples.push((timings, waiting::share(before, elapsed).unwrap_or(0.0)));
+        steps += 1;
     }
-    std::array::from_fn(|k| {
-        let of = |t: &crate::clock::Timings| t.phase_ns.get(k).copied().unwrap_or(t.step_ns) as f64;
-        median(&steps.iter().map(of).collect::<Vec<_>>())
-    })
 }
 
 /// The size at which a scene has `target` contacts, if contacts grow as a power of the size, from

@@ -18,6 +18,7 @@ pub mod islands;
 pub mod roofline;
 pub mod text;
 pub mod traffic;
+pub mod waiting;
 
 use crate::clock::Phase;
 use crate::study::race::median;
@@ -118,12 +119,17 @@ pub struct Report {
     pub reset_share: f64,
     /// Time of the measurement (s).
     pub seconds: f64,
+    /// Share of it in which the thread waited for a processor, where that is known.
+    pub waiting: Option<f64>,
 }
 
 /// Repeats between two resets: the state drifts no further, and a reset costs about as much as one.
 const REPEATS: u32 = 100;
 /// Time of a phase in one round.
 const TURN: Duration = Duration::from_millis(50);
+/// Repeats are timed in pieces of about this length, as the ceilings are: most pieces are shorter than
+/// the turns that a busy machine gives its processes, so that their median has no pause in it.
+const PIECE: Duration = Duration::from_micros(500);
 /// Time of one ceiling in one round.
 const CEILING: Duration = Duration::from_micros(500);
 
@@ -131,6 +137,8 @@ const CEILING: Duration = Duration::from_micros(500);
 struct Entrant {
     probe: Probe,
     traffic: Traffic,
+    /// Repeats in a piece.
+    piece: u32,
     pass_ns: Vec<f64>,
     passes: u64,
     read: Vec<f64>,
@@ -147,6 +155,7 @@ pub fn profile(frozen: &mut Frozen<'_>, probes: &[Probe], scene: &str, options: 
         .map(|&probe| Entrant {
             probe,
             traffic: traffic::of(frozen, &probe),
+            piece: 1,
             pass_ns: Vec::new(),
             passes: 0,
             read: Vec::new(),
@@ -159,7 +168,7 @@ pub fn profile(frozen: &mut Frozen<'_>, probes: &[Probe], scene: &str, options: 
     let mut level_rates = vec![[Vec::new(), Vec::new()]; levels.len()];
     let mut arithmetic = Vec::new();
     let width = frozen.world().settings.width;
-    let (start, mut resets) = (Instant::now(), Duration::ZERO);
+    let (start, mut resets, waited) = (Instant::now(), Duration::ZERO, waiting::waited());
     loop {
         for entrant in &mut entrants {
             resets += entrant.turn(frozen, options.seconds);
@@ -180,6 +189,7 @@ pub fn profile(frozen: &mut Frozen<'_>, probes: &[Probe], scene: &str, options: 
             break;
         }
     }
+    let waiting = waiting::share(waited, start.elapsed());
     let seconds = start.elapsed().as_secs_f64();
     let world = frozen.world();
     let contacts = world.counts.contacts as f64;
@@ -200,6 +210,7 @@ pub fn profile(frozen: &mut Frozen<'_>, probes: &[Probe], scene: &str, options: 
         multiply_adds: options.ceilings.then(|| median(&arithmetic)),
         reset_share: resets.as_secs_f64() / seconds.max(1e-9),
         seconds,
+        waiting,
     }
 }
 
@@ -208,20 +219,25 @@ impl Entrant {
     fn turn(&mut self, frozen: &mut Frozen<'_>, seconds: f64) -> Duration {
         let (start, mut resets) = (Instant::now(), Duration::ZERO);
         let turn = TURN.min(Duration::from_secs_f64(seconds));
-        let mut timed = Duration::ZERO;
-        let mut passes = 0;
         while start.elapsed() < turn {
+            let mut left = REPEATS;
+            while left > 0 {
+                let times = self.piece.min(left);
+                let begin = Instant::now();
+                frozen.repeat(self.probe.phase, times);
+                let elapsed = begin.elapsed();
+                let passes = u64::from(times) * u64::from(self.probe.passes);
+                self.pass_ns.push(elapsed.as_nanos() as f64 / passes as f64);
+                self.passes += passes;
+                let fit = PIECE.as_nanos() as f64 / elapsed.as_nanos().max(1) as f64;
+                // No more than twice as many at once: a pause must not make all pieces small, nor
+                // a clock that stands still make one endless.
+                self.piece = (f64::from(times) * fit.clamp(0.5, 2.0)).clamp(1.0, f64::from(REPEATS)) as u32;
+                left -= times;
+            }
             let begin = Instant::now();
-            frozen.repeat(self.probe.phase, REPEATS);
-            let end = Instant::now();
             frozen.reset(self.probe.phase);
-            timed += end - begin;
-            passes += u64::from(REPEATS) * u64::from(self.probe.passes);
-            resets += end.elapsed();
-        }
-        if passes > 0 {
-            self.pass_ns.push(timed.as_nanos() as f64 / passes as f64);
-            self.passes += passes;
+            resets += begin.elapsed();
         }
         resets
     }

@@ -1,6 +1,6 @@
 //! What `simpulse profile` prints.
 
-use super::{PhaseReport, Report};
+use super::{PhaseReport, Report, waiting};
 use crate::clock::Phase;
 use crate::report::table::{finish, table};
 use crate::report::units::digits;
@@ -25,6 +25,7 @@ pub fn text(report: &Report) -> String {
         [phase] => single(report, phase),
         phases => several(report, phases),
     };
+    text += &waiting::note(report.waiting);
     if let Some(rate) = report.multiply_adds {
         text += &ceilings(report, rate);
         for phase in &report.phases {
