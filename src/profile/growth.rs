@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_power_law_has_its_exponent() {
-        let points: Vec<[f64; 2]> = (1..6).map(|i| f64::from(i)).map(|x| [x, 1.5 * x + 0.3]).collect();
+        let points: Vec<[f64; 2]> = (1..6).map(f64::from).map(|x| [x, 1.5 * x + 0.3]).collect();
         assert!((slope(&points) - 1.5).abs() < 1e-12);
     }
 }
