@@ -134,8 +134,8 @@ fn the_next_step_does_not_notice() {
                     frozen.repeat(probe.phase, 1);
                 }
                 // Whole steps leave what phases can go on from.
-                frozen.step();
-                frozen.step();
+                frozen.step(false);
+                frozen.step(true);
                 frozen.repeat(Phase::Collide, 2);
                 frozen.repeat(Phase::Store, 2);
                 drop(frozen);

@@ -57,8 +57,6 @@ pub struct Row {
     pub memory: Memory,
     /// Errors beside the times.
     pub errors: Option<Errors>,
-    /// Largest share of a timed step in which the thread waited for a processor.
-    pub paused: f64,
 }
 
 impl Row {
@@ -76,6 +74,9 @@ impl Row {
 const TURN: Duration = Duration::from_millis(40);
 /// Time of one size of memory in one round.
 const READ: Duration = Duration::from_millis(1);
+/// Pauses are taken out of steps longer than this (ns), in which reading them costs little; shorter
+/// ones mostly have none, and those that have are left out.
+const LONG_NS: u64 = 4_000_000;
 /// A step that waited for a processor for more than this share of its time is left out, where enough
 /// others are left.
 const PAUSE: f64 = 0.01;
@@ -131,20 +132,20 @@ fn row(entry: &Entry, mut samples: Vec<Sample>) -> Row {
         phases: std::array::from_fn(|k| time(&|t| t.phase_ns[k])),
         memory: entry.world.memory(),
         errors: entry.errors,
-        paused: samples.last().map_or(0.0, |s| s.1),
     }
 }
 
 /// One turn: a step that finds cold caches and is not timed, then as many as fit.
 fn turn(world: &mut World, samples: &mut Vec<Sample>) {
     let mut frozen = world.freeze();
-    frozen.step();
+    let net = frozen.step(false).step_ns > LONG_NS;
     let (start, mut steps) = (Instant::now(), 0);
     while steps == 0 || (start.elapsed() < TURN && steps < STEPS) {
         let before = waited();
-        let timings = frozen.step();
-        let elapsed = Duration::from_nanos(timings.step_ns);
-        samples.push((timings, waiting::share(before, elapsed).unwrap_or(0.0)));
+        let begin = Instant::now();
+        let timings = frozen.step(net);
+        let share = waiting::share(before, begin.elapsed()).unwrap_or(0.0);
+        samples.push((timings, if net { 0.0 } else { share }));
         steps += 1;
     }
 }

@@ -19,7 +19,7 @@ fn phases(rows: &[Row]) -> Vec<Phase> {
 /// Times and memory per contact, and what that means.
 pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
     let phases = phases(rows);
-    let mut header = vec!["scene", "bodies", "contacts", "step", "±", "waited"];
+    let mut header = vec!["scene", "bodies", "contacts", "step", "±"];
     header.extend(phases.iter().map(|p| p.name()));
     header.extend(["pen.max", "law"]);
     let mut times = table(&header);
@@ -27,14 +27,13 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         let mut cells = vec![row.scene.clone(), row.bodies.to_string(), row.counts.contacts.to_string()];
         cells.push(digits(row.per_contact(row.step)));
         cells.push(digits(row.step.spread_ns / row.counts.contacts.max(1) as f64));
-        cells.push(format!("{:.0}%", 100.0 * row.paused));
         cells.extend(phases.iter().map(|&p| digits(row.per_contact(row.phases[p as usize]))));
         cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max, "m")));
         cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms)));
         times.add_row(cells);
     }
     let mut text = format!(
-        "ns per contact; a step looks for all pairs anew; waited: for a processor, at most, in the steps that were kept\n{}\n",
+        "ns per contact; a step looks for all pairs anew; pauses in which the thread waited for a processor are left out\n{}\n",
         finish(times, 1)
     );
     let names: Vec<&str> =
