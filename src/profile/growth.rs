@@ -219,6 +219,8 @@ pub struct Verdict {
     pub range: [f64; 2],
     /// From each size to the next.
     pub steps: Vec<Growth>,
+    /// From the smallest size to the largest: many small rises are none of them a step.
+    pub whole: Growth,
 }
 
 /// Below this a phase's cost is not judged (ns per contact).
@@ -237,20 +239,20 @@ pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
             continue;
         }
         let speeds: Vec<f64> = rows.iter().map(|r| memory.at(working_set(&r.memory, phase))).collect();
-        let steps = (1..rows.len())
-            .map(|i| {
-                let spread = |r: &Row| time(r).spread_ns / time(r).ns.max(1.0);
-                judge(
-                    [rows[i - 1].counts.contacts, rows[i].counts.contacts],
-                    costs[i] / costs[i - 1],
-                    spread(&rows[i - 1]) + spread(&rows[i]),
-                    speeds[i - 1] / speeds[i],
-                )
-            })
-            .collect();
+        let between = |i: usize, j: usize| {
+            let spread = |r: &Row| time(r).spread_ns / time(r).ns.max(1.0);
+            judge(
+                [rows[i].counts.contacts, rows[j].counts.contacts],
+                costs[j] / costs[i],
+                spread(&rows[i]) + spread(&rows[j]),
+                speeds[i] / speeds[j],
+            )
+        };
+        let steps = (1..rows.len()).map(|j| between(j - 1, j)).collect();
+        let whole = between(0, rows.len() - 1);
         let points: Vec<[f64; 2]> =
             rows.iter().map(|r| [r.counts.contacts as f64, time(r).ns].map(|x| x.max(1.0).ln())).collect();
-        verdicts.push(Verdict { phase, exponent: slope(&points), range, steps });
+        verdicts.push(Verdict { phase, exponent: slope(&points), range, steps, whole });
     }
     verdicts
 }

@@ -63,13 +63,27 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
 fn sentence(verdict: &Verdict) -> String {
     let name = verdict.phase.map_or("whole step", Phase::name);
     let range = verdict.range.map(digits);
+    let whole = &verdict.whole;
+    let meaning = match whole.change {
+        Change::Flat => "flat".to_string(),
+        Change::Cache => {
+            format!("no more than its memory, which streams {} times slower", digits(whole.memory))
+        }
+        Change::Logarithm => "within n log n".to_string(),
+        Change::Faster => {
+            format!("FASTER than n log n and streams, which account for {}", digits(whole.memory))
+        }
+    };
     let mut text = format!(
-        "{name}: {} to {} ns per contact, time ~ contacts^{:.2}; ",
-        range[0], range[1], verdict.exponent
+        "{name}: {} to {} ns per contact, time ~ contacts^{:.2}; × {} over all sizes, {meaning}",
+        range[0],
+        range[1],
+        verdict.exponent,
+        digits(whole.ratio)
     );
     let of = |change: Change| verdict.steps.iter().filter(move |s| s.change == change);
     if of(Change::Flat).count() == verdict.steps.len() {
-        return text + "flat\n";
+        return text + "; no single step\n";
     }
     let place = |s: &super::growth::Growth| {
         format!("× {} from {} to {} contacts", digits(s.ratio), s.contacts[0], s.contacts[1])
@@ -91,11 +105,8 @@ fn sentence(verdict: &Verdict) -> String {
     if !faster.is_empty() {
         parts.push(format!("FASTER than n log n and streams account for: {}", faster.join("; ")));
     }
-    if of(Change::Flat).next().is_some() {
-        parts.push("else flat".into());
-    }
-    text += &parts.join("; ");
-    text + "\n"
+    text += &format!("; {}\n", parts.join("; "));
+    text
 }
 
 /// Everything, a row per size.
