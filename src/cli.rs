@@ -4,6 +4,8 @@ use clap::{Args, Parser, Subcommand};
 use simpulse::commands::advise::AdviseArgs;
 use simpulse::commands::capture::CaptureArgs;
 use simpulse::commands::converge::ConvergeArgs;
+use simpulse::commands::growth::GrowthArgs;
+use simpulse::commands::profile::ProfileArgs;
 use simpulse::commands::verify::VerifyArgs;
 use simpulse::error::Error;
 use simpulse::lanes::LaneWidth;
@@ -65,6 +67,10 @@ pub enum Command {
     Converge(ConvergeArgs),
     /// Run the hard cases whose truth is known
     Verify(VerifyArgs),
+    /// Repeat one phase of a step and hold it against what this machine can do
+    Profile(ProfileArgs),
+    /// Measure the cost of a contact from a thousand contacts to a million
+    Growth(GrowthArgs),
     /// List the scenes
     Scenes,
     /// List the solvers

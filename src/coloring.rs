@@ -21,6 +21,8 @@
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
+use crate::lanes::held;
+
 /// Stands for a side that any number of edges of a colour may share: a static
 /// or kinematic body is read but never written.
 pub const EXEMPT: u32 = u32::MAX;
@@ -101,6 +103,17 @@ impl Coloring {
             self.order[*next as usize] = edge as u32;
             *next += 1;
         }
+    }
+
+    /// Makes the next call of [`Self::assign`] colour anew whatever its arguments.
+    pub fn forget(&mut self) {
+        self.starts.clear();
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let small = held(&self.color_of) + held(&self.starts) + held(&self.order);
+        small + held(&self.edges) + held(&self.used)
     }
 
     /// Whether the colouring is that of these edges.

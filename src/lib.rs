@@ -64,6 +64,7 @@ pub mod lanes;
 pub mod metrics;
 pub mod narrowphase;
 pub mod params;
+pub mod profile;
 pub mod report;
 pub mod scenes;
 pub mod shapes;

@@ -56,6 +56,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Capture(args)) => commands::capture::run(&args),
         Some(Command::Converge(args)) => commands::converge::run(&args),
         Some(Command::Verify(args)) => commands::verify::run(&args),
+        Some(Command::Profile(args)) => commands::profile::run(&args),
+        Some(Command::Growth(args)) => commands::growth::run(&args),
         Some(Command::Scenes) => print(&scenes()),
         Some(Command::Solvers) => print(&solvers()),
         Some(Command::Scene(args)) => print(&scene(&args)?),

@@ -34,7 +34,7 @@
 
 use super::Proxy;
 use crate::bodies::{Bodies, BodyKind};
-use crate::lanes::LaneVec;
+use crate::lanes::{LaneVec, held};
 use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
 use crate::shapes::{Aabb, Pose, Shape};
 use glam::Vec2;
@@ -68,6 +68,13 @@ pub struct FatBoxes {
 }
 
 impl FatBoxes {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
+        let lists = held(&self.first_shape) + held(&self.failed) + held(&self.moved);
+        columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
+    }
+
     /// Takes in the bodies after those it knows. Their shapes are in order of bodies.
     pub fn add(&mut self, bodies: &Bodies, shape_body: &[u32], shapes: &[Shape]) {
         for body in self.first_shape.len()..bodies.len() {

@@ -30,6 +30,7 @@
 
 use super::Proxy;
 use super::sort::PairSort;
+use crate::lanes::held;
 use glam::Vec2;
 use std::ops::Range;
 
@@ -144,6 +145,11 @@ fn size_class(proxy: &Proxy) -> u16 {
 }
 
 impl HashGrid {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        self.bytes() + held(&self.found)
+    }
+
     /// An empty grid.
     pub fn new() -> Self {
         Self::default()

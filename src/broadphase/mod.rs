@@ -110,6 +110,15 @@ impl BroadPhase {
         }
     }
 
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        match self {
+            BroadPhase::HashGrid(grid) => grid.held_bytes(),
+            BroadPhase::Tree(tree) => tree.held_bytes(),
+            BroadPhase::AllPairs => 0,
+        }
+    }
+
     /// Writes to `out` every `[i, j]`, i < j, with `proxies[i].may_touch(&proxies[j])`,
     /// each once and in ascending order. What `out` held is dropped, its memory is kept.
     ///

@@ -27,7 +27,7 @@
 
 use super::Proxy;
 use super::sort::PairSort;
-use crate::lanes::Block;
+use crate::lanes::{Block, held};
 use wide::f32x16;
 
 /// Children of a node.
@@ -121,6 +121,14 @@ pub struct Tree {
 }
 
 impl Tree {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let nodes: usize = self.levels.iter().map(held).sum();
+        let pairs = [&self.keys, &self.sorted, &self.found, &self.fresh, &self.merged, &self.stack];
+        let lists: usize = pairs.into_iter().map(held).sum();
+        nodes + lists + held(&self.order) + held(&self.place) + held(&self.moved) + self.sort.bytes()
+    }
+
     /// An empty tree.
     pub fn new() -> Self {
         Self::default()

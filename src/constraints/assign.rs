@@ -3,7 +3,7 @@
 use super::{Layout, Needs, OppositeKind, Workspace};
 use crate::coloring::{Coloring, EXEMPT};
 use crate::contacts::Contact;
-use crate::lanes::LaneWidth;
+use crate::lanes::{LaneWidth, held};
 
 /// Contacts against one kind of body, and their colours.
 #[derive(Debug, Default)]
@@ -36,6 +36,17 @@ pub struct Sides<F> {
 }
 
 impl Assignment {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let one = |g: &Group| held(&g.contacts) + held(&g.rows) + held(&g.edges) + g.coloring.held_bytes();
+        self.groups.iter().map(one).sum()
+    }
+
+    /// Forgets all colours, so that the next call finds them anew even for the same contacts.
+    pub fn forget(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.coloring.forget());
+    }
+
     /// Lanes of `width` colour by colour; what gets no colour goes one after the other.
     pub fn colored(
         &mut self,

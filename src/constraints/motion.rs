@@ -12,7 +12,7 @@
 
 use super::needs::Needs;
 use crate::bodies::{Bodies, BodyKind};
-use crate::lanes::BodyRow;
+use crate::lanes::{BodyRow, held};
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
@@ -114,6 +114,11 @@ impl Motion {
             self.damp.push([1.0; 4]);
         }
         self.free.resize(count + 1, [0.0; 4]);
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        held(&self.kick) + held(&self.damp) + held(&self.free) + held(&self.round)
     }
 
     /// Changes of velocity in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.

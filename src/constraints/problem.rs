@@ -91,23 +91,26 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
         clock: &'a mut Clock,
         input: &StepInput,
     ) -> Self {
-        for (batches, width) in [(&work.lanes, L::WIDTH), (&work.serial, 1)] {
-            let rows = work.rows.len() as u32;
-            assert!(batches.width == width || batches.segments.is_empty());
-            let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
-            assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
-            let made = contacts.len();
-            assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
+        // A phase that is repeated finds the records, and the check, of the step before it.
+        if !clock.skips(Phase::Prepare) {
+            for (batches, width) in [(&work.lanes, L::WIDTH), (&work.serial, 1)] {
+                let rows = work.rows.len() as u32;
+                assert!(batches.width == width || batches.segments.is_empty());
+                let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
+                assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
+                let made = contacts.len();
+                assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
+            }
+            let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = &mut *work;
+            prepare::prepare::<L, N>(rows, lanes, contacts);
+            prepare::prepare::<f32, N>(rows, serial, contacts);
+            if input.needs.restitution {
+                let (kicks, h) = (motion.kicks(), input.h);
+                restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts, kicks, h);
+                restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts, kicks, h);
+            }
+            clock.lap(Phase::Prepare);
         }
-        let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = work;
-        prepare::prepare::<L, N>(rows, lanes, contacts);
-        prepare::prepare::<f32, N>(rows, serial, contacts);
-        if input.needs.restitution {
-            let (kicks, h) = (motion.kicks(), input.h);
-            restitution::prepare::<L, N>(rows, lanes, lane_bounces, contacts, kicks, h);
-            restitution::prepare::<f32, N>(rows, serial, serial_bounces, contacts, kicks, h);
-        }
-        clock.lap(Phase::Prepare);
         Problem {
             work,
             contacts,
@@ -140,6 +143,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Body pass: v ← damped v + h a.
     pub fn integrate_velocities(&mut self) {
+        if self.clock.skips(Phase::Integrate) {
+            return;
+        }
         self.work.motion.integrate_velocities(&mut self.work.rows);
         self.clock.lap(Phase::Integrate);
     }
@@ -147,18 +153,27 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
     /// Body pass: as [`Self::integrate_velocities`] and a warm start in one, valid from
     /// the second substep on (see [`Motion::extrapolate_velocities`]).
     pub fn integrate_and_warm_start(&mut self) {
+        if self.clock.skips(Phase::Integrate) {
+            return;
+        }
         self.work.motion.extrapolate_velocities(&mut self.work.rows);
         self.clock.lap(Phase::Integrate);
     }
 
     /// Body pass: x ← x + h v.
     pub fn integrate_positions(&mut self) {
+        if self.clock.skips(Phase::Integrate) {
+            return;
+        }
         self.work.motion.integrate_positions(&mut self.work.rows);
         self.clock.lap(Phase::Integrate);
     }
 
     /// Sets all accumulated impulses to zero, for solvers without memory.
     pub fn forget_impulses(&mut self) {
+        if self.clock.skips(Phase::Prepare) {
+            return;
+        }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
             let width = batches.width;
             batches.for_each_lane(&self.needs, |_, layout, record, lane| {
@@ -175,6 +190,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Constraint pass: applies the accumulated impulses.
     pub fn warm_start(&mut self) {
+        if self.clock.skips(Phase::WarmStart) {
+            return;
+        }
         sweep::warm_start::<L, N>(&mut self.work.rows, &mut self.work.lanes);
         sweep::warm_start::<f32, N>(&mut self.work.rows, &mut self.work.serial);
         self.clock.lap(Phase::WarmStart);
@@ -182,6 +200,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Constraint pass: one velocity sweep under `rule`, booked on `phase`.
     pub fn sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
+        if self.clock.skips(phase) {
+            return;
+        }
         sweep::sweep::<L, N, _>(&mut self.work.rows, &mut self.work.lanes, rule);
         sweep::sweep::<f32, N, _>(&mut self.work.rows, &mut self.work.serial, rule);
         self.count_sweep(if N::FRICTION && R::FRICTION { 2 } else { 1 });
@@ -193,6 +214,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Constraint pass: one position sweep that removes `fraction` of each overlap.
     pub fn position_sweep(&mut self, fraction: f32) {
+        if self.clock.skips(Phase::Position) {
+            return;
+        }
         sweep::position_sweep::<L, N>(&mut self.work.rows, &mut self.work.lanes, fraction);
         sweep::position_sweep::<f32, N>(&mut self.work.rows, &mut self.work.serial, fraction);
         self.count_sweep(1);
@@ -206,7 +230,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
-        if self.needs.restitution {
+        if self.needs.restitution && !self.clock.skips(Phase::Restitution) {
             let Workspace { rows, lanes, serial, lane_bounces, serial_bounces, .. } = self.work;
             restitution::track::<L, N>(rows, lanes, lane_bounces);
             restitution::track::<f32, N>(rows, serial, serial_bounces);
@@ -217,7 +241,7 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
             }
             self.clock.lap(Phase::Restitution);
         }
-        if self.record_impulses {
+        if self.record_impulses && !self.clock.skips(Phase::Store) {
             let Workspace { lanes, serial, .. } = self.work;
             for batches in [lanes, serial] {
                 let width = batches.width;
@@ -238,6 +262,9 @@ impl<'a, L: Lanes, N: KernelNeeds> Problem<'a, L, N> {
 
     /// Writes accumulated impulses back to the contacts; returns what was done.
     pub fn finish(self) -> Effort {
+        if self.clock.skips(Phase::Store) {
+            return self.effort;
+        }
         let Workspace { rows, lanes, serial, lane_bounces, serial_bounces, .. } = self.work;
         if self.needs.restitution {
             restitution::forget::<L, N>(rows, lanes, lane_bounces);

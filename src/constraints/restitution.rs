@@ -31,7 +31,7 @@ use super::batches::{Batches, PADDING, Segment};
 use super::needs::{KernelNeeds, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::sweep::{arms, over_segments, turn, with_arms};
 use crate::contacts::Contact;
-use crate::lanes::{Block, BodyRow, Lanes};
+use crate::lanes::{Block, BodyRow, Lanes, held};
 use crate::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
 
@@ -49,6 +49,11 @@ const fn stride<N: KernelNeeds>() -> usize {
 impl Bounces {
     fn records<L: Lanes>(&mut self) -> &mut [L] {
         bytemuck::cast_slice_mut(&mut self.slab)
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        held(&self.slab)
     }
 
     /// Bytes in use for `lanes` lanes of `points`-point contacts.

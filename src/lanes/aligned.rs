@@ -60,6 +60,11 @@ impl LaneVec {
     }
 }
 
+/// Bytes that an array holds, in use or not.
+pub fn held<T>(array: &Vec<T>) -> usize {
+    array.capacity() * size_of::<T>()
+}
+
 impl Deref for LaneVec {
     type Target = [f32];
     fn deref(&self) -> &[f32] {

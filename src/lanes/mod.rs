@@ -14,11 +14,13 @@
 //! CPU; [`native_width`] tells the widest that is not emulated.
 
 mod aligned;
+mod counted;
 mod quads;
 mod rows;
 mod store;
 
-pub use aligned::{Block, LaneVec};
+pub use aligned::{Block, LaneVec, held};
+pub use counted::{Counted, Operations};
 pub use quads::{Quad, prefetch_records};
 pub use rows::BodyRow;
 pub use store::{RowColumns, RowStore};

@@ -6,7 +6,7 @@ use super::hulls::Hulls;
 use super::lanes::{Pair, PoseRow, Poses, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{LaneWidth, Lanes, Quad, prefetch_records};
+use crate::lanes::{LaneWidth, Lanes, Quad, held, prefetch_records};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
@@ -104,6 +104,12 @@ pub struct Jobs {
 pub const NO_CONTACT: u32 = u32::MAX;
 
 impl Jobs {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        [name, a, b, c, d, contact].map(held).iter().sum()
+    }
+
     /// Lists those of `pairs` that `job` keeps, instead of what was listed. `job` returns whether it
     /// does, and the pair's bodies, shapes and contact.
     ///

@@ -1,6 +1,6 @@
 //! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
 
-mod axes;
+pub(crate) mod axes;
 pub mod environment;
 pub mod export;
 pub mod plot;

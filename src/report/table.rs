@@ -17,7 +17,7 @@ p penetration, l law residual, t truth; errors are the same for all coloured wid
 ";
 
 /// Lines of a table without the frame.
-pub(super) fn table(header: &[&str]) -> Table {
+pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header(header.to_vec());
@@ -25,7 +25,7 @@ pub(super) fn table(header: &[&str]) -> Table {
 }
 
 /// Every column but the first `left` to the right, and two blanks between columns.
-pub(super) fn finish(mut table: Table, left: usize) -> String {
+pub(crate) fn finish(mut table: Table, left: usize) -> String {
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));
         if i >= left {
@@ -151,6 +151,20 @@ pub fn ablation_table(costs: &[NeedCost]) -> String {
     }
     text += &finish(rows, 2);
     text
+}
+
+/// The errors that stand beside a time, on one line.
+pub fn error_line(errors: Option<&Errors>) -> String {
+    match errors {
+        Some(e) => format!(
+            "errors of the last {} steps: penetration {} at most, {} in the mean; law residual {}\n",
+            e.steps,
+            si(e.penetration_max, "m"),
+            si(e.penetration_mean, "m"),
+            ratio(e.law_rms)
+        ),
+        None => "errors: none observed, since no step was taken\n".to_string(),
+    }
 }
 
 /// The errors of one run, a line each; what is absent has none.

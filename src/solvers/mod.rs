@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::constraints::{Effort, Kernel, KernelNeeds, Problem, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::error::Error;
-use crate::lanes::{LaneWidth, Lanes};
+use crate::lanes::{Counted, LaneWidth, Lanes};
 use crate::params::Budget;
 
 pub mod pgs;
@@ -118,6 +118,7 @@ fn dispatch<S: Solver>(
     width: LaneWidth,
 ) -> Effort {
     match width {
+        LaneWidth::W1 if clock.counts() => with_width::<S, Counted>(work, contacts, clock, input),
         LaneWidth::W1 => with_width::<S, f32>(work, contacts, clock, input),
         LaneWidth::W4 => with_width::<S, wide::f32x4>(work, contacts, clock, input),
         LaneWidth::W8 => with_width::<S, wide::f32x8>(work, contacts, clock, input),

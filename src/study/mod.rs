@@ -126,6 +126,11 @@ impl StudyPlan {
     }
 }
 
+/// Whether a name means a file: it ends in `.json` or has a separator.
+pub fn is_path(name: &str) -> bool {
+    name.ends_with(".json") || name.contains(['/', '\\'])
+}
+
 /// A scene of the catalogue or of a file (a name with a separator, or that ends in `.json`), for
 /// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
 pub fn open_scene(
@@ -134,8 +139,7 @@ pub fn open_scene(
     steps: Option<u32>,
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
-    let is_path = name.ends_with(".json") || name.contains(['/', '\\']);
-    let mut loaded = if is_path {
+    let mut loaded = if is_path(name) {
         Loaded { scene: Scene::from_file(name)?, truth: None }
     } else {
         match seed {

@@ -2,7 +2,8 @@
 
 use super::World;
 use super::candidates::Candidate;
-use crate::contacts::Contact;
+use crate::contacts::{Contact, pair_key};
+use crate::lanes::held;
 use crate::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
 use crate::narrowphase::lanes::PoseRow;
 use crate::params::SPECULATIVE_DISTANCE;
@@ -90,6 +91,34 @@ impl World {
 }
 
 impl Narrow {
+    /// Bytes held for candidates.
+    pub fn candidate_bytes(&self) -> usize {
+        let lists: usize = self.of_kind.iter().map(held).sum();
+        let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
+        lists + jobs + held(&self.candidates) + held(&self.last_candidates) + held(&self.poses)
+    }
+
+    /// Bytes held for contacts, besides the list itself.
+    pub fn contact_bytes(&self) -> usize {
+        held(&self.fresh) + held(&self.last_contacts)
+    }
+
+    /// Lets candidates find their contacts in a list that was put in the place of the last one;
+    /// both are sorted by shape pair. Contacts without a candidate are forgotten.
+    pub fn relink(&mut self, contacts: &mut Vec<Contact>) {
+        self.last_contacts.clone_from(contacts);
+        let mut last = self.last_contacts.iter().enumerate().peekable();
+        for candidate in &mut self.candidates {
+            let key = pair_key(candidate.shapes[0], candidate.shapes[1]);
+            while last.next_if(|(_, contact)| contact.key() < key).is_some() {}
+            let found = last.next_if(|(_, contact)| contact.key() == key);
+            candidate.contact = found.map_or(NO_CONTACT, |(i, _)| i as u32);
+        }
+        std::mem::swap(contacts, &mut self.last_contacts);
+        self.sort_contacts(contacts);
+        (self.is_changed, self.count) = (true, contacts.len());
+    }
+
     /// Lists the candidates that are worth a look.
     ///
     /// Where most candidates do not touch, those whose centres are too far apart are left out

@@ -10,7 +10,7 @@ use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::assign::Assignment;
 use crate::constraints::motion::{self, MotionInput};
 use crate::constraints::observe::ObservedRule;
-use crate::constraints::{Needs, StepInput, Workspace};
+use crate::constraints::{Effort, Needs, StepInput, Workspace};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 use crate::narrowphase::batch::Class;
@@ -24,11 +24,15 @@ mod candidates;
 mod collide;
 mod counts;
 mod lanes;
+mod memory;
 mod pairs;
+mod phases;
 mod settings;
 mod traits;
 
 pub use counts::{Divergence, StepCounts};
+pub use memory::{Component, Memory};
+pub use phases::{Frozen, Probe};
 pub use settings::{Order, Settings};
 
 /// What is known of a shape for its contacts.
@@ -148,12 +152,17 @@ impl World {
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
-        self.work.motion.finish(&mut self.work.rows);
-        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
+        self.store();
         clock.lap(Phase::Store);
         self.step_index += 1;
         self.timings = clock.stop();
         self.check()
+    }
+
+    /// Velocities and motions of the rows to the bodies.
+    fn store(&mut self) {
+        self.work.motion.finish(&mut self.work.rows);
+        motion::store(&mut self.bodies, &self.work.rows, self.needs.rotation);
     }
 
     /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that
@@ -189,10 +198,17 @@ impl World {
         clock.lap(Phase::Pairs);
         self.update_contacts();
         clock.lap(Phase::Collide);
-        let needs = self.kernel_needs();
-        self.assign_lanes(&needs);
+        self.assign_lanes(&self.kernel_needs());
         clock.lap(Phase::Color);
-        let s = &self.settings;
+        self.load_rows();
+        clock.lap(Phase::Prepare);
+        let effort = self.run_solver(clock);
+        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
+    }
+
+    /// Body rows and what moves them, from the bodies.
+    fn load_rows(&mut self) {
+        let (needs, s) = (self.kernel_needs(), &self.settings);
         let motion = MotionInput {
             gravity: s.gravity,
             h: s.h(),
@@ -201,9 +217,13 @@ impl World {
             rotation: s.rotation,
         };
         self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
-        clock.lap(Phase::Prepare);
+    }
+
+    /// The solver's stages, on rows and lanes that are ready.
+    fn run_solver(&mut self, clock: &mut Clock) -> Effort {
+        let s = &self.settings;
         let input = StepInput {
-            needs,
+            needs: self.kernel_needs(),
             budget: s.budget,
             h: s.h(),
             contact_hertz: s.contact_hertz,
@@ -211,8 +231,7 @@ impl World {
             points: self.counts.points,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
-        let effort = s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width);
-        (self.counts.sweeps, self.counts.row_updates) = (effort.sweeps, effort.row_updates);
+        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width)
     }
 
     /// The scene's needs and the extra ones, completed to a set that has a kernel:

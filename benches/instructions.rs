@@ -1,0 +1,162 @@
+//! Instructions of one phase, counted by `valgrind --tool=callgrind`: the same on every run, whatever
+//! else the machine does. `instructions/<phase>/<scene>/<width>/<passes>`.
+//!
+//! Valgrind knows no AVX-512, so the build must not use it, and keeps to a folder of its own:
+//!
+//! ```sh
+//! RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench --features instructions --bench instructions \
+//!     --target-dir target/instructions
+//! ```
+//!
+//! An argument keeps the ids that contain it. Each id runs in a process of its own under
+//! valgrind, in which only `measured` is counted. Counts are kept beside the program, and the
+//! next run prints what has changed. Instructions are no time: where a sweep waits for memory
+//! or for its own results, fewer of them need not be faster (`simpulse profile` measures that).
+
+mod common;
+
+use simpulse::clock::Phase;
+use simpulse::coloring::{Coloring, EXEMPT};
+use simpulse::lanes::LaneWidth;
+use simpulse::world::World;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::{Command, ExitCode};
+
+const SCENE: &str = "pyramid:30";
+const WIDTHS: [LaneWidth; 3] = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8];
+/// Phases and the names they have in the other benches.
+const PHASES: [(&str, Phase); 5] = [
+    ("soft", Phase::Solve),
+    ("relax", Phase::Relax),
+    ("prepare", Phase::Prepare),
+    ("collide", Phase::Collide),
+    ("color_kept", Phase::Color),
+];
+/// Colours of contacts that have changed: the same at every width.
+const COLOR_ANEW: &str = "color_anew";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.as_slice() {
+        [flag, id] if flag == "--one" => one(id),
+        // `cargo bench -- --test` asks for nothing to be measured.
+        _ if arguments.iter().any(|a| a == "--test") => ExitCode::SUCCESS,
+        _ => all(arguments.iter().find(|a| !a.starts_with("--")).map_or("", String::as_str)),
+    }
+}
+
+fn ids() -> Vec<String> {
+    let mut ids = Vec::new();
+    for (name, _) in PHASES {
+        ids.extend(WIDTHS.map(|width| format!("instructions/{name}/{SCENE}/{}/1", width.lanes())));
+    }
+    ids.push(format!("instructions/{COLOR_ANEW}/{SCENE}/1/1"));
+    ids
+}
+
+/// The only function that is counted.
+#[inline(never)]
+fn measured(run: &mut dyn FnMut()) {
+    run();
+}
+
+/// Runs one id, in the process that valgrind watches.
+fn one(id: &str) -> ExitCode {
+    let parts: Vec<&str> = id.split('/').collect();
+    let [_, name, _, lanes, _] = parts[..] else { return ExitCode::from(2) };
+    let Some(width) = lanes.parse().ok().and_then(LaneWidth::from_lanes) else { return ExitCode::from(2) };
+    let mut world = common::settled(SCENE, "soft_step", width);
+    // One substep has one soft and one relaxing sweep.
+    world.settings.budget.substeps = 1;
+    if name == COLOR_ANEW {
+        color_anew(&world);
+    } else if let Some(&(_, phase)) = PHASES.iter().find(|p| p.0 == name) {
+        let mut frozen = world.freeze();
+        frozen.repeat(phase, 1);
+        frozen.reset(phase);
+        measured(&mut || frozen.repeat(phase, 1));
+    }
+    ExitCode::SUCCESS
+}
+
+fn color_anew(world: &World) {
+    let edge = |c: &simpulse::contacts::Contact| {
+        let dynamic = world.bodies.is_dynamic(c.body_a as usize);
+        [if dynamic { c.body_a } else { EXEMPT }, c.body_b]
+    };
+    let edges: Vec<[u32; 2]> = world.contacts.iter().map(edge).collect();
+    let mut coloring = Coloring::new();
+    // Arrays have their size, colours are forgotten.
+    coloring.assign(&edges, world.bodies.len());
+    coloring.assign(&[], 0);
+    measured(&mut || coloring.assign(&edges, world.bodies.len()));
+}
+
+fn all(filter: &str) -> ExitCode {
+    if cfg!(target_feature = "avx512f") {
+        eprintln!(
+            "error: this build uses AVX-512, which valgrind does not know; see the head of benches/instructions.rs"
+        );
+        return ExitCode::from(2);
+    }
+    let Ok(program) = std::env::current_exe() else { return ExitCode::from(2) };
+    let kept = program.with_file_name("instructions.counts");
+    let last = read(&kept);
+    let mut counts = last.clone();
+    let contacts = common::settled(SCENE, "soft_step", LaneWidth::W8).counts.contacts as f64;
+    println!("{:<40}{:>14}{:>14}{:>12}", "id", "instructions", "per contact", "change");
+    for id in ids().into_iter().filter(|id| id.contains(filter)) {
+        let count = match count(&program, &id) {
+            Ok(count) => count,
+            Err(message) => {
+                eprintln!("error: {id}: {message}");
+                return ExitCode::FAILURE;
+            }
+        };
+        let change = match last.get(&id) {
+            Some(&before) => format!("{:+.2} %", 100.0 * (count as f64 / before as f64 - 1.0)),
+            None => "new".into(),
+        };
+        println!("{id:<40}{count:>14}{:>14.1}{change:>12}", count as f64 / contacts);
+        counts.insert(id, count);
+    }
+    let text: String = counts.iter().map(|(id, count)| format!("{id} {count}\n")).collect();
+    match simpulse::files::write(&kept, text.as_bytes()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn read(kept: &PathBuf) -> BTreeMap<String, u64> {
+    let text = std::fs::read_to_string(kept).unwrap_or_default();
+    let line =
+        |line: &str| Some((line.split_once(' ')?.0.to_string(), line.split_once(' ')?.1.parse().ok()?));
+    text.lines().filter_map(line).filter(|(_, count)| *count > 0).collect()
+}
+
+/// Instructions within `measured`, as callgrind sums them up.
+fn count(program: &PathBuf, id: &str) -> Result<u64, String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let out = folder.path().join("callgrind.out");
+    let run = Command::new("valgrind")
+        .arg("--tool=callgrind")
+        .arg("--toggle-collect=*instructions*measured*")
+        .arg(format!("--callgrind-out-file={}", out.display()))
+        .arg(program)
+        .args(["--one", id])
+        .output()
+        .map_err(|e| format!("valgrind does not start: {e}"))?;
+    if !run.status.success() {
+        let last = String::from_utf8_lossy(&run.stderr).lines().last().unwrap_or("").to_string();
+        return Err(format!("valgrind failed: {last}"));
+    }
+    let text = std::fs::read_to_string(&out).map_err(|e| e.to_string())?;
+    let total = text
+        .lines()
+        .find_map(|line| line.strip_prefix("totals:").or(line.strip_prefix("summary:"))?.trim().parse().ok());
+    total.filter(|&n: &u64| n > 0).ok_or("callgrind counted nothing".into())
+}

@@ -1,0 +1,241 @@
+//! One lane that counts what is done to it: floating-point operations are measured, not guessed.
+//!
+//! The kernels are written once for any [`Lanes`]; run with [`Counted`] they do on one lane what
+//! they do on sixteen, and every operation is booked. A thread has one book.
+//!
+//! What is counted is what the text does. A compiler leaves out what nobody reads: in a sweep the
+//! tangential part of a motion (3 of some 140 operations against a dynamic body), and against a
+//! static one also the sine and versine of its turn (10 of some 100).
+
+use super::{BodyRow, Lanes, Quad};
+use bytemuck::{Pod, Zeroable};
+use std::cell::Cell;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Operations on lanes, by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Operations {
+    /// Additions and subtractions.
+    pub adds: u64,
+    /// Multiplications.
+    pub multiplies: u64,
+    /// Multiply-adds, of either sign.
+    pub multiply_adds: u64,
+    /// Divisions and square roots.
+    pub divisions: u64,
+    /// Minima, maxima and selections: no floating-point operations, but instructions.
+    pub choices: u64,
+}
+
+impl Operations {
+    /// Floating-point operations: a multiply-add is two, a division or root one; choices and changes
+    /// of sign are none.
+    pub fn flops(&self) -> u64 {
+        self.adds + self.multiplies + 2 * self.multiply_adds + self.divisions
+    }
+}
+
+thread_local! {
+    static BOOK: Cell<Operations> = const {
+        Cell::new(Operations { adds: 0, multiplies: 0, multiply_adds: 0, divisions: 0, choices: 0 })
+    };
+}
+
+enum Kind {
+    Add,
+    Multiply,
+    MultiplyAdd,
+    Divide,
+    Choose,
+}
+
+fn book(kind: Kind) {
+    let mut operations = BOOK.get();
+    let count = match kind {
+        Kind::Add => &mut operations.adds,
+        Kind::Multiply => &mut operations.multiplies,
+        Kind::MultiplyAdd => &mut operations.multiply_adds,
+        Kind::Divide => &mut operations.divisions,
+        Kind::Choose => &mut operations.choices,
+    };
+    *count += 1;
+    BOOK.set(operations);
+}
+
+/// An `f32` that counts. Results have the bits of `f32`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Counted(pub f32);
+
+impl Counted {
+    /// What this thread has done since it last asked.
+    pub fn take() -> Operations {
+        BOOK.take()
+    }
+}
+
+impl Add for Counted {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        book(Kind::Add);
+        Counted(self.0 + other.0)
+    }
+}
+
+impl Sub for Counted {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        book(Kind::Add);
+        Counted(self.0 - other.0)
+    }
+}
+
+impl Mul for Counted {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        book(Kind::Multiply);
+        Counted(self.0 * other.0)
+    }
+}
+
+impl Div for Counted {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        book(Kind::Divide);
+        Counted(self.0 / other.0)
+    }
+}
+
+impl Neg for Counted {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Counted(-self.0)
+    }
+}
+
+impl Lanes for Counted {
+    const WIDTH: usize = 1;
+
+    fn splat(value: f32) -> Self {
+        Counted(value)
+    }
+
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        book(Kind::MultiplyAdd);
+        Counted(Lanes::mul_add(self.0, factor.0, term.0))
+    }
+
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        book(Kind::MultiplyAdd);
+        Counted(Lanes::neg_mul_add(self.0, factor.0, term.0))
+    }
+
+    fn max(self, other: Self) -> Self {
+        book(Kind::Choose);
+        Counted(Lanes::max(self.0, other.0))
+    }
+
+    fn min(self, other: Self) -> Self {
+        book(Kind::Choose);
+        Counted(Lanes::min(self.0, other.0))
+    }
+
+    fn sqrt(self) -> Self {
+        book(Kind::Divide);
+        Counted(self.0.sqrt())
+    }
+
+    fn select_positive(self, positive: Self, otherwise: Self) -> Self {
+        book(Kind::Choose);
+        Counted(Lanes::select_positive(self.0, positive.0, otherwise.0))
+    }
+
+    fn any_positive(self) -> bool {
+        self.0 > 0.0
+    }
+
+    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::gather(rows, index) }.map(Counted)
+    }
+
+    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::scatter_velocity(rows, index, velocity.map(|v| v.0)) }
+    }
+
+    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::scatter_delta(rows, index, delta.map(|v| v.0)) }
+    }
+
+    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::gather_quads::<S, O>(quads, index) }.map(Counted)
+    }
+
+    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::scatter_quads::<S, O>(quads, index, v.map(|v| v.0)) }
+    }
+
+    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+        quads: &mut [Quad],
+        index: &[u32],
+        v: [Self; 4],
+    ) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::scatter_halves::<S, O, P>(quads, index, v.map(|v| v.0)) }
+    }
+
+    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
+        // SAFETY: the caller keeps `index` in bounds.
+        Counted(unsafe { f32::load_at(values, index) })
+    }
+
+    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { f32::store_at(values, index, v.0) }
+    }
+
+    fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
+        book(Kind::Choose);
+        Counted(Lanes::select_equal(self.0, other.0, yes.0, no.0))
+    }
+
+    fn integer_bits(self) -> Self {
+        Counted(Lanes::integer_bits(self.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_operation_is_booked_once_and_computed_as_f32_does() {
+        Counted::take();
+        let (a, b, c) = (Counted(1.5), Counted(-2.25), Counted(0.7));
+        let cases = [
+            (a + b, 1.5 + -2.25),
+            (a - b, 1.5 - -2.25),
+            (a * b, 1.5 * -2.25),
+            (a / b, 1.5 / -2.25),
+            (-a, -1.5),
+            (a.mul_add(b, c), Lanes::mul_add(1.5_f32, -2.25, 0.7)),
+            (a.neg_mul_add(b, c), Lanes::neg_mul_add(1.5_f32, -2.25, 0.7)),
+            (a.max(b), 1.5),
+            (a.min(b), -2.25),
+            (a.sqrt(), 1.5_f32.sqrt()),
+            (b.select_positive(a, c), 0.7),
+        ];
+        for (i, (counted, plain)) in cases.into_iter().enumerate() {
+            assert_eq!(counted.0.to_bits(), plain.to_bits(), "{i}");
+        }
+        let counted = Counted::take();
+        let expected = Operations { adds: 2, multiplies: 1, multiply_adds: 2, divisions: 2, choices: 3 };
+        assert_eq!(counted, expected);
+        assert_eq!(counted.flops(), 2 + 1 + 4 + 2);
+        assert_eq!(Counted::take(), Operations::default());
+    }
+}
