@@ -16,9 +16,7 @@
 mod common;
 
 use simpulse::clock::Phase;
-use simpulse::coloring::{Coloring, EXEMPT};
 use simpulse::lanes::LaneWidth;
-use simpulse::world::World;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
@@ -31,10 +29,8 @@ const PHASES: [(&str, Phase); 5] = [
     ("relax", Phase::Relax),
     ("prepare", Phase::Prepare),
     ("collide", Phase::Collide),
-    ("color_kept", Phase::Color),
+    ("color", Phase::Color),
 ];
-/// Colours of contacts that have changed: the same at every width.
-const COLOR_ANEW: &str = "color_anew";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -51,7 +47,6 @@ fn ids() -> Vec<String> {
     for (name, _) in PHASES {
         ids.extend(WIDTHS.map(|width| format!("instructions/{name}/{SCENE}/{}/1", width.lanes())));
     }
-    ids.push(format!("instructions/{COLOR_ANEW}/{SCENE}/1/1"));
     ids
 }
 
@@ -69,28 +64,13 @@ fn one(id: &str) -> ExitCode {
     let mut world = common::settled(SCENE, "soft_step", width);
     // One substep has one soft and one relaxing sweep.
     world.settings.budget.substeps = 1;
-    if name == COLOR_ANEW {
-        color_anew(&world);
-    } else if let Some(&(_, phase)) = PHASES.iter().find(|p| p.0 == name) {
+    if let Some(&(_, phase)) = PHASES.iter().find(|p| p.0 == name) {
         let mut frozen = world.freeze();
         frozen.repeat(phase, 1);
         frozen.reset(phase);
         measured(&mut || frozen.repeat(phase, 1));
     }
     ExitCode::SUCCESS
-}
-
-fn color_anew(world: &World) {
-    let edge = |c: &simpulse::contacts::Contact| {
-        let dynamic = world.bodies.is_dynamic(c.body_a as usize);
-        [if dynamic { c.body_a } else { EXEMPT }, c.body_b]
-    };
-    let edges: Vec<[u32; 2]> = world.contacts.iter().map(edge).collect();
-    let mut coloring = Coloring::new();
-    // Arrays have their size, colours are forgotten.
-    coloring.assign(&edges, world.bodies.len());
-    coloring.assign(&[], 0);
-    measured(&mut || coloring.assign(&edges, world.bodies.len()));
 }
 
 fn all(filter: &str) -> ExitCode {

@@ -128,6 +128,8 @@ pub fn touch<L: Lanes>(
 
     // Which points there are. A cut that leaves next to nothing leaves the deeper end.
     let one_point = L::splat(VERTEX_TOLERANCE) - (t_left - t_right);
+    // To keep the far point of a pair whose other point is near was tried: it changes overlaps in
+    // piles by −4 % to +4 % and gives the solver a seventh more points.
     let near = |s: L| (s - speculative).select_positive(none, one);
     let keep_0 = one_point.select_positive((s_0 - s_1).select_positive(none, one), one).min(near(s_0));
     let keep_1 = one_point.select_positive((s_0 - s_1).select_positive(one, none), one).min(near(s_1));

@@ -7,8 +7,8 @@
 //! * *indices*: 4 B per body whose row is gathered;
 //! * *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
 //! * *body passes*: what is read and written of each row and of the arrays beside it;
-//! * *pairs, collide, color*: every array that goes in once and every array that comes out once;
-//!   what they look up in between is not known here, so theirs is a lower bound.
+//! * *pairs, collide, color*: what goes in once and what comes out once; what they look up in
+//!   between (nodes of the tree, shapes, colours of a body) is not in it, so theirs is a lower bound.
 //!
 //! It is not counted in cache lines, and a row that is gathered four times in a sweep counts four
 //! times though it mostly comes from a nearer cache than the records. The *working set* is what
@@ -17,6 +17,7 @@
 use crate::bodies::BodyKind;
 use crate::clock::Phase;
 use crate::constraints::{Layout, OppositeKind};
+use crate::contacts::quad;
 use crate::lanes::BodyRow;
 use crate::world::{Frozen, Probe};
 
@@ -40,6 +41,8 @@ impl Traffic {
 
 const ROW: f64 = size_of::<BodyRow>() as f64;
 const HALF: f64 = ROW / 2.0;
+/// The quads of a contact that the narrow phase and preparation share.
+const MANIFOLD: f64 = 16.0 * (quad::HEADER + 1) as f64;
 
 /// Bytes per lane of a pass over constraints.
 struct PerLane {
@@ -76,13 +79,19 @@ pub fn of(frozen: &Frozen<'_>, probe: &Probe) -> Traffic {
     let rows = work.rows.len() as f64;
     let moving = world.bodies.kind.iter().filter(|&&kind| kind != BodyKind::Static).count() as f64;
     let poses = 16.0 * bodies;
-    let contacts = size_of_val(world.contacts.as_slice()) as f64;
+    let contacts = world.contacts.len() as f64;
     let damping = if world.needs().damping { HALF } else { 0.0 };
     let in_and_out = |read: f64, written: f64| Traffic { read, written, working_set: read + written };
     match probe.phase {
-        Phase::Pairs => in_and_out(used("shapes") + poses + used("proxies"), used("candidates")),
-        Phase::Collide => in_and_out(used("candidates") + used("shapes") + poses + contacts, contacts),
-        Phase::Color => in_and_out(contacts, 12.0 * world.counts.lane_slots as f64),
+        Phase::Pairs => in_and_out(poses + used("bounds"), used("candidates")),
+        Phase::Collide => {
+            // Six numbers of a candidate, a pose with its rests. Of a contact the header and the
+            // state of both points are read, and what the narrow phase fills is written.
+            let read = 24.0 * world.counts.pairs as f64 + 24.0 * bodies + 48.0 * contacts;
+            in_and_out(read, 32.0 * bodies + MANIFOLD * contacts)
+        }
+        // Both bodies of each contact.
+        Phase::Color => in_and_out(8.0 * contacts, 12.0 * world.counts.lane_slots as f64),
         Phase::Prepare => {
             // Velocities, masses, forces, gravity: nine floats and two flags; then row and kick.
             let load = in_and_out(bodies * 38.0, rows * (ROW + HALF + damping));
@@ -92,9 +101,9 @@ pub fn of(frozen: &Frozen<'_>, probe: &Probe) -> Traffic {
             };
             let records = constraints(frozen, per_lane);
             Traffic {
-                read: load.read + contacts + records.read,
+                read: load.read + MANIFOLD * contacts + records.read,
                 written: load.written + records.written,
-                working_set: load.working_set + contacts + used("records"),
+                working_set: load.working_set + MANIFOLD * contacts + used("records"),
             }
         }
         Phase::Integrate => {
@@ -114,7 +123,7 @@ pub fn of(frozen: &Frozen<'_>, probe: &Probe) -> Traffic {
             Traffic {
                 read: lanes * 4.0 * (1.0 + floats) + moving * (24.0 + 16.0 + turned),
                 written: world.contacts.len() as f64 * 4.0 * floats + moving * (12.0 + 16.0 + turned),
-                working_set: used("records") + contacts + moving * (ROW + 28.0 + turned),
+                working_set: used("records") + MANIFOLD * contacts + moving * (ROW + 28.0 + turned),
             }
         }
         Phase::Restitution => {

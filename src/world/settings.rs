@@ -34,9 +34,9 @@ pub struct Settings {
     pub dt: f32,
     /// Stiffness of soft contacts (Hz), for solvers that have them.
     pub contact_hertz: f32,
-    /// Sum impulses over the substeps into [`Contact::step_impulse`].
+    /// Sum impulses over the substeps into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
-    /// Keep the rule of each step's last velocity sweep, see [`World::observed_rule`].
+    /// Keep the rule of each step's last velocity sweep, see [`crate::world::World::observed_rule`].
     pub observe_rule: bool,
     /// Read the clock around every phase.
     pub timed: bool,

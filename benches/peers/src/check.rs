@@ -20,8 +20,9 @@ pub const WINDOW: u32 = 60;
 const STRIDE: u32 = 10;
 
 /// Without continuous collision a box at 10 m/s enters a wall by 0.17 m in one step, in any engine:
-/// this share of pairs may be past the middle of a body for a moment.
-const MOST_LOST: f64 = 1e-3;
+/// this share of pairs may be past the middle of a body for a moment. All three engines have up to
+/// half of it in the washer at their defaults; where a pile collapses, it is some percent.
+const MOST_LOST: f64 = 2e-3;
 
 /// How wrong a run was over its last second.
 #[derive(Clone, Debug, Default)]

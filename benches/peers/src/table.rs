@@ -10,7 +10,7 @@ const NONE: &str = "–";
 /// A mean this much above Box2D's is still called no larger: chaotic scenes scatter so.
 const ALLOWED: f64 = 1.1;
 
-/// Times and errors, one row per contender.
+/// Times and errors, one row per contender. `lost` pairs overlap past the middle of a body.
 pub fn comparison(outcomes: &[Outcome]) -> Table {
     let mut table = head(&[
         "engine",
@@ -21,6 +21,7 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
         "stages ×",
         "pen. mean mm",
         "pen. max mm",
+        "lost %",
         "rms v mm/s",
         "top m",
         "pairs",
@@ -41,6 +42,7 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
             row.extend([
                 significant(e.penetration_mean * 1e3),
                 significant(e.penetration_max * 1e3),
+                significant(e.lost * 1e2),
                 significant(e.rms_velocity * 1e3),
                 format!("{:.3}", e.top),
                 e.pairs.to_string(),
@@ -179,6 +181,7 @@ pub struct Row {
     pairs: Option<usize>,
     penetration_mean_m: Option<f64>,
     penetration_max_m: Option<f64>,
+    lost_pairs: Option<f64>,
     rms_velocity: Option<f64>,
     top_m: Option<f64>,
     truth: &'static str,
@@ -222,6 +225,7 @@ impl Row {
             pairs: e.map(|e| e.pairs),
             penetration_mean_m: e.map(|e| e.penetration_mean),
             penetration_max_m: e.map(|e| e.penetration_max),
+            lost_pairs: e.map(|e| e.lost),
             rms_velocity: e.map(|e| e.rms_velocity),
             top_m: e.map(|e| e.top),
             truth: truth.map_or("", |t| t.0),
