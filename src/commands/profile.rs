@@ -23,15 +23,15 @@ use std::process::ExitCode;
 /// set of the same size, and how many multiply-adds a core does at this lane width.
 ///
 /// Bytes are those that the code names: 4 per float of a record read and again per impulse written,
-/// 4 per index, 32 per body row gathered, 16 per body written back; for pairs, collide and color every
-/// array once on its way in and once on its way out. Operations are counted, by running the same
+/// 4 per index, 32 per body row gathered, 16 per body written back; for pairs, collide and color what
+/// goes in once and what comes out once. Operations are counted, by running the same
 /// kernel on a lane that counts: a multiply-add is two, a division or root one, minima, maxima and
 /// selections none. Counted is what the text does; the compiler leaves out what nobody reads, 2 % of a
 /// sweep. Of prepare and restitution only what is done in lanes is counted.
 ///
 /// Velocities and impulses that repeats change are brought back every 100 repeats, outside of the
-/// times. In pairs every repeat looks for all pairs anew; in color the colours are kept, as in
-/// every step of a scene at rest.
+/// times. In pairs and color every repeat finds all pairs and colours anew, which a step does only
+/// where many shapes left their bounds and where a contact came or went.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

@@ -33,7 +33,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         times.add_row(cells);
     }
     let mut text = format!(
-        "ns per contact; a step looks for all pairs anew; pauses in which the thread waited for a processor are left out\n{}\n",
+        "ns per contact; a step looks for all pairs and colours anew; pauses in which the thread waited for a processor are left out\n{}\n",
         finish(times, 1)
     );
     let names: Vec<&str> =
