@@ -1,9 +1,9 @@
-//! One prepared set of batches, one pass: `kernel/<sweep>/<scene>/<rows>/<width>`, and
-//! `kernel/bodies/<pass>/<scene>`.
+//! One prepared set of batches, one pass: `kernel/<sweep>/<scene>/<width>/1`, and
+//! `kernel/<pass over bodies>/<scene>/<width>/1`.
 //!
 //! Before anything is timed, 20 sweeps at the width must give the bits that 20 scalar
-//! sweeps give. `rows` is `packed`, as solvers keep the rows of bodies, or `columns`, the pure
-//! structure of arrays. Criterion's throughput is in contacts (in bodies for passes over
+//! sweeps give. Sweeps named `…_columns` keep the rows of bodies as a pure structure of arrays,
+//! the others packed, as solvers do. Criterion's throughput is in contacts (in bodies for passes over
 //! bodies), so `elem/s` inverts to ns per contact.
 
 mod common;
@@ -52,20 +52,20 @@ fn after_20_sweeps<R: NormalRule>(scene: &str, packed: bool, width: LaneWidth, r
 }
 
 fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, rule: R) {
-    let mut group = c.benchmark_group(format!("kernel/{name}"));
+    let mut group = c.benchmark_group("kernel");
     group.sample_size(20);
     for scene in SCENES {
         let truth = after_20_sweeps(scene, true, LaneWidth::W1, rule);
         for width in LaneWidth::ALL {
             for packed in [true, false] {
-                let label = if packed { "packed" } else { "columns" };
+                let name = if packed { name.to_string() } else { format!("{name}_columns") };
                 let swept = after_20_sweeps(scene, packed, width, rule);
-                assert_eq!(swept, truth, "{name} {scene} {width:?} {label}");
+                assert_eq!(swept, truth, "{name} {scene} {width:?}");
                 let mut world = common::settled(scene, "soft_step", width);
                 group.throughput(Throughput::Elements(world.counts.contacts as u64));
                 let work = world.workspace();
                 let mut columns = (!packed).then(|| RowColumns::from_rows(&work.rows));
-                let id = BenchmarkId::new(scene, format!("{label}/{}", width.lanes()));
+                let id = BenchmarkId::new(format!("{name}/{scene}"), format!("{}/1", width.lanes()));
                 group.bench_function(id, |b| {
                     b.iter(|| one_sweep(black_box(&mut *work), columns.as_mut(), width, rule));
                 });
@@ -76,21 +76,22 @@ fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, rule: R) {
 }
 
 /// Bytes that a pass moves for each body: velocities 16 + kick 16 + free 16 written, and as much
-/// again read and written of the row; positions: the row read, half of it written.
+/// again read and written of the row; positions: the row read, half of it written. A row is half a
+/// register of 8, so these passes have 4 lanes at any width.
 fn bench_bodies(c: &mut Criterion) {
-    let mut group = c.benchmark_group("kernel/bodies");
+    let mut group = c.benchmark_group("kernel");
     group.sample_size(20);
     for scene in SCENES {
         let mut world = common::settled(scene, "soft_step", LaneWidth::W16);
         let Workspace { rows, motion, .. } = world.workspace();
         group.throughput(Throughput::Elements(rows.len() as u64));
-        group.bench_function(BenchmarkId::new("velocities", scene), |b| {
+        group.bench_function(BenchmarkId::new(format!("velocities/{scene}"), "4/1"), |b| {
             b.iter(|| motion.integrate_velocities(black_box(rows)));
         });
-        group.bench_function(BenchmarkId::new("velocities_and_warm_start", scene), |b| {
+        group.bench_function(BenchmarkId::new(format!("velocities_and_warm_start/{scene}"), "4/1"), |b| {
             b.iter(|| motion.extrapolate_velocities(black_box(rows)));
         });
-        group.bench_function(BenchmarkId::new("positions", scene), |b| {
+        group.bench_function(BenchmarkId::new(format!("positions/{scene}"), "4/1"), |b| {
             b.iter(|| motion.integrate_positions(black_box(rows)));
         });
     }
