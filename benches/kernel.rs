@@ -10,7 +10,7 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use simpulse::constraints::sweep::{NormalRule, sweep, sweep_store};
-use simpulse::constraints::{Kernel, Workspace};
+use simpulse::constraints::{Batches, Kernel, Workspace};
 use simpulse::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
 use simpulse::solvers::soft_step::{RigidRule, SoftRule};
 use std::hint::black_box;
@@ -22,54 +22,61 @@ type Boxes = Kernel<true, true, 2>;
 /// Contacts in second-level cache, in third-level cache, and at its edge or beyond.
 const SCENES: [&str; 4] = ["pyramid:30", "large_pyramid", "many_pyramids", "pyramid:316"];
 
-/// One sweep on the workspace's packed rows, or on `columns` if there are any.
-fn one_sweep<R: NormalRule>(
-    work: &mut Workspace,
-    columns: Option<&mut RowColumns>,
-    width: LaneWidth,
-    rule: R,
-) {
-    fn at<L: Lanes, R: NormalRule>(work: &mut Workspace, columns: Option<&mut RowColumns>, rule: R) {
-        match columns {
-            None => sweep::<L, Boxes, R>(&mut work.rows, &mut work.lanes, rule),
-            Some(columns) => sweep_store::<L, Boxes, R, _>(columns, &mut work.lanes, rule),
+/// What a sweep works on.
+#[derive(Clone)]
+struct Start {
+    rows: Vec<BodyRow>,
+    lanes: Batches,
+}
+
+impl Start {
+    fn of(scene: &str, width: LaneWidth) -> Self {
+        let mut world = common::settled(scene, "soft_step", width);
+        let Workspace { rows, lanes, .. } = world.workspace();
+        Start { rows: std::mem::take(rows), lanes: std::mem::take(lanes) }
+    }
+
+    /// One sweep on packed rows, or on `columns` if there are any.
+    fn sweep<R: NormalRule>(&mut self, columns: Option<&mut RowColumns>, rule: R) {
+        fn at<L: Lanes, R: NormalRule>(start: &mut Start, columns: Option<&mut RowColumns>, rule: R) {
+            match columns {
+                None => sweep::<L, Boxes, R>(&mut start.rows, &mut start.lanes, rule),
+                Some(columns) => sweep_store::<L, Boxes, R, _>(columns, &mut start.lanes, rule),
+            }
+        }
+        match self.lanes.width {
+            1 => at::<f32, R>(self, columns, rule),
+            4 => at::<f32x4, R>(self, columns, rule),
+            8 => at::<f32x8, R>(self, columns, rule),
+            _ => at::<f32x16, R>(self, columns, rule),
         }
     }
-    match width {
-        LaneWidth::W1 => at::<f32, R>(work, columns, rule),
-        LaneWidth::W4 => at::<f32x4, R>(work, columns, rule),
-        LaneWidth::W8 => at::<f32x8, R>(work, columns, rule),
-        LaneWidth::W16 => at::<f32x16, R>(work, columns, rule),
+
+    fn columns(&self, packed: bool) -> Option<RowColumns> {
+        (!packed).then(|| RowColumns::from_rows(&self.rows))
+    }
+
+    fn after_20_sweeps<R: NormalRule>(mut self, packed: bool, rule: R) -> Vec<BodyRow> {
+        let mut columns = self.columns(packed);
+        (0..20).for_each(|_| self.sweep(columns.as_mut(), rule));
+        columns.map_or(self.rows, |columns| columns.to_rows())
     }
 }
 
-fn after_20_sweeps<R: NormalRule>(scene: &str, packed: bool, width: LaneWidth, rule: R) -> Vec<BodyRow> {
-    let mut world = common::settled(scene, "soft_step", width);
-    let work = world.workspace();
-    let mut columns = (!packed).then(|| RowColumns::from_rows(&work.rows));
-    (0..20).for_each(|_| one_sweep(work, columns.as_mut(), width, rule));
-    columns.map_or_else(|| work.rows.clone(), |columns| columns.to_rows())
-}
-
-fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, rule: R) {
+fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, scene: &str, starts: &[Start], rule: R) {
     let mut group = c.benchmark_group("kernel");
     group.sample_size(20);
-    for scene in SCENES {
-        let truth = after_20_sweeps(scene, true, LaneWidth::W1, rule);
-        for width in LaneWidth::ALL {
-            for packed in [true, false] {
-                let name = if packed { name.to_string() } else { format!("{name}_columns") };
-                let swept = after_20_sweeps(scene, packed, width, rule);
-                assert_eq!(swept, truth, "{name} {scene} {width:?}");
-                let mut world = common::settled(scene, "soft_step", width);
-                group.throughput(Throughput::Elements(world.counts.contacts as u64));
-                let work = world.workspace();
-                let mut columns = (!packed).then(|| RowColumns::from_rows(&work.rows));
-                let id = BenchmarkId::new(format!("{name}/{scene}"), format!("{}/1", width.lanes()));
-                group.bench_function(id, |b| {
-                    b.iter(|| one_sweep(black_box(&mut *work), columns.as_mut(), width, rule));
-                });
-            }
+    let truth = starts[0].clone().after_20_sweeps(true, rule);
+    for start in starts {
+        for packed in [true, false] {
+            let name = if packed { name.to_string() } else { format!("{name}_columns") };
+            let lanes = start.lanes.width;
+            assert!(start.clone().after_20_sweeps(packed, rule) == truth, "{name} {scene} {lanes}");
+            group.throughput(Throughput::Elements(starts[0].lanes.contact.len() as u64));
+            let (mut start, mut columns) = (start.clone(), start.columns(packed));
+            group.bench_function(BenchmarkId::new(format!("{name}/{scene}"), format!("{lanes}/1")), |b| {
+                b.iter(|| black_box(&mut start).sweep(columns.as_mut(), rule));
+            });
         }
     }
     group.finish();
@@ -101,8 +108,11 @@ fn bench_bodies(c: &mut Criterion) {
 fn bench(c: &mut Criterion) {
     bench_bodies(c);
     let h = 1.0 / 240.0;
-    bench_rule(c, "soft", SoftRule::new(30.0, h));
-    bench_rule(c, "relax", RigidRule { inv_h: 1.0 / h });
+    for scene in SCENES {
+        let starts = LaneWidth::ALL.map(|width| Start::of(scene, width));
+        bench_rule(c, "soft", scene, &starts, SoftRule::new(30.0, h));
+        bench_rule(c, "relax", scene, &starts, RigidRule { inv_h: 1.0 / h });
+    }
 }
 
 criterion_group!(benches, bench);

@@ -22,7 +22,7 @@ pub struct Segment {
 }
 
 /// Constraint records of one width, with the lane each contact has.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Batches {
     /// Lanes per batch.
     pub width: usize,

@@ -150,19 +150,31 @@ pub trait Lanes:
     ///
     /// # Safety
     /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
-    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8];
+    #[inline(always)]
+    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
+        // SAFETY: the caller keeps `index` in bounds.
+        unsafe { gather_halves(rows, index) }
+    }
 
     /// Writes back the first half `[vx, vy, ω, m⁻¹]` of `WIDTH` rows, in lane order.
     ///
     /// # Safety
     /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
-    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]);
+    #[inline(always)]
+    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds; a row is two quads.
+        unsafe { Self::scatter_quads::<2, 0>(bytemuck::cast_slice_mut(rows), index, velocity) }
+    }
 
     /// Writes back the second half `[Δx, Δy, Δθ, I⁻¹]` of `WIDTH` rows, in lane order.
     ///
     /// # Safety
     /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
-    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]);
+    #[inline(always)]
+    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
+        // SAFETY: the caller keeps `index` in bounds; a row is two quads.
+        unsafe { Self::scatter_quads::<2, 1>(bytemuck::cast_slice_mut(rows), index, delta) }
+    }
 
     /// Quad `O` of `WIDTH` records of `S` quads each, transposed.
     ///
@@ -256,24 +268,6 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { rows::gather_1(rows, index) }
-    }
-
-    #[inline(always)]
-    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { rows::scatter_1::<0>(rows, index, velocity) }
-    }
-
-    #[inline(always)]
-    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { rows::scatter_1::<1>(rows, index, delta) }
-    }
-
-    #[inline(always)]
     unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4] {
         // SAFETY: the caller keeps `index` in bounds.
         unsafe { quads::gather_1::<S, O>(quads, index) }
@@ -323,9 +317,18 @@ const INTEGERS: f32 = 8_388_608.0;
 const MANTISSA: u32 = 0x007F_FFFF;
 
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, $gather:path, $scatter:ident, $gather_quads:ident, $halves:ident, $load:ident, $store:ident) => {
+    ($type:ty, $width:literal, quads: $gather_quads:ident, $scatter:ident, $halves:ident,
+     columns: $load:ident, $store:ident $(, rows: $gather:ident)?) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
+
+            $(
+                #[inline(always)]
+                unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
+                    // SAFETY: the caller keeps `index` in bounds.
+                    unsafe { rows::$gather(rows, index) }
+                }
+            )?
 
             #[inline(always)]
             fn splat(value: f32) -> Self {
@@ -365,24 +368,6 @@ macro_rules! wide_lanes {
             #[inline(always)]
             fn any_positive(self) -> bool {
                 self.simd_gt(Self::zeroed()).any()
-            }
-
-            #[inline(always)]
-            unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { $gather(rows, index) }
-            }
-
-            #[inline(always)]
-            unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { rows::$scatter::<0>(rows, index, velocity) }
-            }
-
-            #[inline(always)]
-            unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { rows::$scatter::<1>(rows, index, delta) }
             }
 
             #[inline(always)]
@@ -440,9 +425,22 @@ macro_rules! wide_lanes {
 }
 
 use bytemuck::Zeroable;
-wide_lanes!(f32x4, 4, rows::gather_4, scatter_4, gather_4, scatter_halves_4, load_each, store_each);
-wide_lanes!(f32x8, 8, rows::gather_8, scatter_8, gather_8, scatter_halves_8, load_each, store_each);
-wide_lanes!(f32x16, 16, rows::gather_16, scatter_16, gather_16, scatter_halves_16, load_at_16, store_at_16);
+wide_lanes!(f32x4, 4, quads: gather_4, scatter_4, scatter_halves_4, columns: load_each, store_each);
+wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8, columns: load_each, store_each);
+wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16,
+    columns: load_at_16, store_at_16, rows: gather_16);
+
+/// Rows by their two halves.
+///
+/// # Safety
+/// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
+#[inline(always)]
+unsafe fn gather_halves<L: Lanes>(rows: &[BodyRow], index: &[u32]) -> [L; 8] {
+    let quads: &[Quad] = bytemuck::cast_slice(rows);
+    // SAFETY: the caller keeps `index` in bounds; a row is two quads.
+    let (v, d) = unsafe { (L::gather_quads::<2, 0>(quads, index), L::gather_quads::<2, 1>(quads, index)) };
+    [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,5 @@
-//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere.
+//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere. With [`super::rows`],
+//! this is all the unsafe code that lanes need.
 //!
 //! A record is `STRIDE` quads; quad `OFFSET` of `W` records is loaded and transposed in
 //! registers. The transposes stay inside 128-bit lanes: 128-bit lane `q` of vector `k` is loaded
@@ -143,13 +144,13 @@ pub use halves::{gather_16, scatter_16, scatter_halves_16};
 macro_rules! registers {
     ($module:ident, $register:ident, $float:ident, $class:ident, $lanes:literal, $unpacklo:ident, $unpackhi:ident,
      $shuffle:ident, $gather:ident, $scatter:ident, $halves:ident, |$quads:ident| $join:expr, |$row:ident| $split:expr) => {
-        mod $module {
+        pub(super) mod $module {
             use super::*;
             use std::arch::x86_64::*;
 
             /// Transposes the 4 × 4 block in each 128-bit lane.
             #[inline(always)]
-            fn transpose(r: [$register; 4]) -> [$register; 4] {
+            pub fn transpose(r: [$register; 4]) -> [$register; 4] {
                 // SAFETY: the instructions are target features of this build.
                 unsafe {
                     let ab_lo = $unpacklo(r[0], r[1]);
@@ -259,13 +260,13 @@ macro_rules! registers {
             }
 
             #[inline(always)]
-            fn from(v: $register) -> $float {
+            pub fn from(v: $register) -> $float {
                 // SAFETY: both are the same number of plain floats.
                 unsafe { std::mem::transmute(v) }
             }
 
             #[inline(always)]
-            fn into(v: $float) -> $register {
+            pub fn into(v: $float) -> $register {
                 // SAFETY: both are the same number of plain floats.
                 unsafe { std::mem::transmute(v) }
             }
