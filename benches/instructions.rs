@@ -15,8 +15,8 @@
 
 mod common;
 
-use simpulse::clock::Phase;
-use simpulse::lanes::LaneWidth;
+use simpulse::engine::clock::Phase;
+use simpulse::engine::lanes::LaneWidth;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
@@ -65,7 +65,7 @@ fn one(id: &str) -> ExitCode {
     // One substep has one soft and one relaxing sweep.
     world.settings.budget.substeps = 1;
     if let Some(&(_, phase)) = PHASES.iter().find(|p| p.0 == name) {
-        let mut frozen = world.freeze();
+        let mut frozen = world.hold();
         frozen.repeat(phase, 1);
         frozen.reset(phase);
         measured(&mut || frozen.repeat(phase, 1));
@@ -102,7 +102,7 @@ fn all(filter: &str) -> ExitCode {
         counts.insert(id, count);
     }
     let text: String = counts.iter().map(|(id, count)| format!("{id} {count}\n")).collect();
-    match simpulse::files::write(&kept, text.as_bytes()) {
+    match simpulse::lab::files::write(&kept, text.as_bytes()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");

@@ -9,10 +9,10 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use simpulse::constraints::sweep::{NormalRule, sweep, sweep_store};
-use simpulse::constraints::{Batches, Kernel, Workspace};
-use simpulse::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
-use simpulse::solvers::soft_step::{RigidRule, SoftRule};
+use simpulse::engine::constraints::sweep::{NormalRule, sweep, sweep_store};
+use simpulse::engine::constraints::{Batches, Kernel, Workspace};
+use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
+use simpulse::engine::solvers::soft_step::{RigidRule, SoftRule};
 use std::hint::black_box;
 use wide::{f32x4, f32x8, f32x16};
 

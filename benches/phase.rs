@@ -7,8 +7,8 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use simpulse::clock::Phase;
-use simpulse::lanes::LaneWidth;
+use simpulse::engine::clock::Phase;
+use simpulse::engine::lanes::LaneWidth;
 use std::time::{Duration, Instant};
 
 const PHASES: [Phase; 9] = [
@@ -34,7 +34,7 @@ fn bench(c: &mut Criterion) {
             assert_eq!(world.state_hash(), truth, "{scene} {width:?}");
             let id = format!("{}/{}", width.lanes(), world.settings.budget.substeps);
             let contacts = world.counts.contacts as u64;
-            let mut frozen = world.freeze();
+            let mut frozen = world.hold();
             for phase in PHASES {
                 let name = phase.name().replace(' ', "_");
                 let mut group = c.benchmark_group(format!("phase/{name}"));

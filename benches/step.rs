@@ -5,8 +5,8 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use simpulse::lanes::LaneWidth;
-use simpulse::solvers::VARIANTS;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::VARIANTS;
 
 fn bench(c: &mut Criterion) {
     for variant in &VARIANTS {

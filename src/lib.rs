@@ -1,75 +1,57 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory: which contact solver, how many
 //! iterations, how fast, and how wrong?
 //!
+//! # Three storeys
+//!
+//! ```text
+//! cli       commands: arguments in, files and text out         (feature `cli`)
+//!  │
+//! lab       scenes, metrics, references, studies, reports      (feature `lab`)
+//!  │
+//! engine    shapes, contacts, batches, solvers, world          (always)
+//! ```
+//!
+//! Imports point downwards only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
+//! `default-features = false` leaves just that.
+//!
 //! # The pipeline
 //!
 //! ```text
-//! scenes ──► bodies, shapes                          scenes, bodies, shapes
+//! scenes ──► bodies, shapes                          lab::scenes, engine::{bodies, shapes}
 //!               │
 //!               ▼  every step
-//!            bounds ──► candidate pairs              broadphase
+//!            bounds ──► candidate pairs              engine::broadphase
 //!               │
 //!               ▼
-//!            manifolds with kept impulses            narrowphase, contacts
+//!            manifolds with kept impulses            engine::{narrowphase, contacts}
 //!               │
 //!               ▼
-//!            colours: no body twice in one           coloring
+//!            colors: no body twice in one            engine::coloring
 //!               │
 //!               ▼
-//!            records: W contacts per vector          constraints, lanes
+//!            records: W contacts per vector          engine::{constraints, lanes}
 //!               │
 //!               ▼
-//!            a solver's schedule of passes           solvers
+//!            a solver's schedule of passes           engine::solvers
 //!               │
 //!               ▼
-//!            impulses and poses written back         world
+//!            impulses and poses written back         engine::world
 //!               │
 //!               ▼
-//!            errors, times, tables                   metrics, study, report
+//!            errors, times, tables                   lab::{metrics, study, report}
 //! ```
 //!
 //! # Reading order
 //!
-//! [`world`] is the step. [`solvers::pgs`] explains the method, [`constraints::sweep`] is
-//! the kernel that all solvers share, [`lanes`] what it is made of. [`scenes`] says what is
-//! simulated and what is known about it, [`metrics`] how wrong a run is.
-//!
-//! # Example
-//!
-//! ```
-//! use simpulse::{scenes, solvers, world::Settings};
-//!
-//! let scene = scenes::load("stack:5")?.scene;
-//! let mut world = scene.build(Settings::new(solvers::find("soft_step")?))?;
-//! for _ in 0..60 {
-//!     world.step().expect("a stack of five does not diverge");
-//! }
-//! assert_eq!(world.counts.contacts, 5);
-//! # Ok::<(), simpulse::error::Error>(())
-//! ```
+//! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method,
+//! [`engine::constraints::sweep`] is the kernel that solvers share, [`engine::lanes`] what it is
+//! made of. `lab::scenes` says what is simulated and what is known about it, `lab::metrics` how
+//! errors are measured.
 
-pub mod advise;
-pub mod bodies;
-pub mod broadphase;
-pub mod capture;
-pub mod clock;
-pub mod coloring;
-pub mod commands;
-pub mod constraints;
-pub mod contacts;
-pub mod converge;
-pub mod error;
-pub mod files;
-pub mod lanes;
-pub mod metrics;
-pub mod narrowphase;
-pub mod params;
-pub mod profile;
-pub mod report;
-pub mod scenes;
-pub mod shapes;
-pub mod solvers;
-pub mod study;
-pub mod truth;
-pub mod verify;
-pub mod world;
+pub mod engine;
+
+#[cfg(feature = "lab")]
+pub mod lab;
+
+#[cfg(feature = "cli")]
+pub mod cli;

@@ -1,8 +1,9 @@
 //! Law: a steady step allocates nothing.
 
+#[path = "lab/common.rs"]
 mod common;
 
-use simpulse::solvers::VARIANTS;
+use simpulse::engine::solvers::VARIANTS;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -249,9 +249,9 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
     let solvers = simpulse(folder.path(), &["solvers"]);
-    assert_eq!(text(&solvers.stdout).lines().count(), simpulse::solvers::VARIANTS.len());
+    assert_eq!(text(&solvers.stdout).lines().count(), simpulse::engine::solvers::VARIANTS.len());
     let scenes = simpulse(folder.path(), &["scenes"]);
-    assert_eq!(text(&scenes.stdout).lines().count(), simpulse::scenes::CATALOG.len());
+    assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 
     // A scene that is printed can be read, and is the same when it is printed again.
     let printed = simpulse(folder.path(), &["scene", "card_house", "--json"]).stdout;
@@ -265,6 +265,6 @@ fn lists_and_scenes_are_printed() {
 
 #[test]
 fn the_default_study_names_scenes_that_exist() {
-    simpulse::study::StudyPlan::default().check().unwrap();
-    simpulse::study::StudyPlan::quick().check().unwrap();
+    simpulse::lab::study::StudyPlan::default().check().unwrap();
+    simpulse::lab::study::StudyPlan::quick().check().unwrap();
 }

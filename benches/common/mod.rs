@@ -1,10 +1,10 @@
 //! Scenes that the benches share.
 #![allow(dead_code)]
 
-use simpulse::lanes::LaneWidth;
-use simpulse::scenes;
-use simpulse::solvers;
-use simpulse::world::{Settings, World};
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers;
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::scenes;
 
 /// Contacts in second-level cache, and in third-level cache.
 pub const KERNEL_SCENES: [&str; 2] = ["pyramid:30", "large_pyramid"];

@@ -2,8 +2,8 @@
 
 use crate::engine::{Contender, Engine, Stage, State};
 use boxdd_sys::ffi::*;
-use simpulse::bodies::BodyKind;
-use simpulse::scenes::{Geometry, Scene, SceneShape};
+use simpulse::engine::bodies::BodyKind;
+use simpulse::lab::scenes::{Geometry, Scene, SceneShape};
 
 /// Most contacts of one body that are counted.
 const MOST_CONTACTS: usize = 100_000;

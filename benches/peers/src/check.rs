@@ -4,14 +4,14 @@
 //! come from GJK and EPA in `f64`, which no engine here uses for its contacts.
 
 use crate::engine::Engine;
-use simpulse::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
-use simpulse::metrics::state::BodyState;
-use simpulse::narrowphase::{epa::penetration, gjk::distance};
-use simpulse::params::SPECULATIVE_DISTANCE;
-use simpulse::scenes::{Loaded, Truth};
-use simpulse::shapes::Shape;
-use simpulse::solvers;
-use simpulse::world::{Settings, World};
+use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
+use simpulse::engine::narrowphase::{epa::penetration, gjk::distance};
+use simpulse::engine::params::SPECULATIVE_DISTANCE;
+use simpulse::engine::shapes::Shape;
+use simpulse::engine::solvers;
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::metrics::state::BodyState;
+use simpulse::lab::scenes::{Loaded, Truth};
 
 /// The last steps of a run that are looked at, one second.
 pub const WINDOW: u32 = 60;

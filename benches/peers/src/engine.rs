@@ -1,8 +1,8 @@
 //! What the race and the check ask of an engine, and the settings it runs with.
 
-use simpulse::broadphase::BroadPhaseKind;
-use simpulse::lanes::LaneWidth;
-use simpulse::scenes::Scene;
+use simpulse::engine::broadphase::BroadPhaseKind;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::lab::scenes::Scene;
 
 /// A scene inside an engine: one thread, no sleeping, no continuous collision.
 pub trait Engine {
@@ -132,9 +132,9 @@ impl Contender {
 
     /// Settings in tables.
     pub fn setting(&self) -> String {
-        let stiff = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
+        let against_static = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
         let anew = if self.recycling { "" } else { ", no recycling" };
-        format!("n = {}{stiff}{anew}", self.substeps)
+        format!("n = {}{against_static}{anew}", self.substeps)
     }
 
     /// The scene in this engine. Errors: what the engine cannot hold.

@@ -1,12 +1,12 @@
 //! This crate's `soft_step`, the schedule that the other two have as well.
 
 use crate::engine::{Contender, Engine, Stage, State};
-use simpulse::broadphase::BroadPhaseKind;
-use simpulse::clock::Phase;
-use simpulse::lanes::LaneWidth;
-use simpulse::scenes::Scene;
-use simpulse::solvers;
-use simpulse::world::{Settings, World};
+use simpulse::engine::broadphase::BroadPhaseKind;
+use simpulse::engine::clock::Phase;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers;
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::scenes::Scene;
 
 /// A scene in a [`World`].
 pub struct Simpulse(World);

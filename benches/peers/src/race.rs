@@ -7,8 +7,8 @@
 
 use crate::check::{Checker, Errors, WINDOW};
 use crate::engine::{Contender, Engine, Maker, Stage};
-use simpulse::lanes::LaneWidth;
-use simpulse::scenes;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::lab::scenes;
 use std::time::Instant;
 
 /// Steps of a block.

@@ -2,8 +2,8 @@
 
 use crate::engine::{Contender, Engine, Stage, State};
 use rapier2d::prelude::*;
-use simpulse::bodies::BodyKind;
-use simpulse::scenes::{Geometry, Scene, SceneShape};
+use simpulse::engine::bodies::BodyKind;
+use simpulse::lab::scenes::{Geometry, Scene, SceneShape};
 
 /// A scene in rapier. Its default mixing is by averages; here friction mixes by the geometric
 /// mean and restitution by the maximum, as in the scene's terms.

@@ -1,0 +1,329 @@
+//! `simpulse advise`: the cheapest setting that is good enough, with the evidence.
+
+use crate::engine::lanes::LaneWidth;
+use crate::engine::solvers::{VARIANTS, find};
+use crate::engine::world::Order;
+use crate::lab::advise::limits::{Limits, quantity};
+use crate::lab::advise::{Advice, Plan, Setting, Trial, advise};
+use crate::lab::error::Error;
+use crate::lab::files::Pending;
+use crate::lab::report::environment::Environment;
+use crate::lab::report::table::error_list;
+use crate::lab::report::units::{digits, ratio, si, si_short};
+use crate::lab::study::open_scene;
+use clap::Args;
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Find the cheapest setting within given tolerances on a scene
+///
+/// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
+/// of doublings first, then values in between. What should only cost more than something known is
+/// left out. The best few are raced again side by side, and the fastest of those that keep every
+/// limit is printed with all its errors, and with those that come next.
+///
+/// Exit code 0: there is one; 1: there is none, and the nearest is printed; 2: a request that
+/// cannot be met.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+Lengths are in nm, um, mm, cm or m, times in ns, us, ms or s; a distance to the truth is in the
+unit of that truth (`simpulse scene SCENE` tells it).
+
+Examples:
+  simpulse advise stack:20 --max-penetration 10mm
+  simpulse advise arch --max-penetration 5mm --max-time 50us --max-residual 1e-3
+  simpulse advise incline_slip --max-truth 1mm --solvers soft_step,pgs --lanes 8 --json advice.json")]
+pub struct AdviseArgs {
+    /// A scene of `simpulse scenes`, or a .json file
+    pub scene: String,
+    /// Deepest penetration allowed, such as 1mm
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub max_penetration: Option<String>,
+    /// Median time of a step allowed, such as 500us
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    pub max_time: Option<String>,
+    /// Distance to the scene's known truth allowed
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    pub max_truth: Option<String>,
+    /// Contact-law residual allowed, root mean square in the scene's weight × step
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    pub max_residual: Option<String>,
+    /// Solvers [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "SOLVER,…")]
+    pub solvers: Vec<String>,
+    /// Lane widths: 1, 4, 8, 16; with 1 also natural order [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    pub lanes: Vec<usize>,
+    /// Steps of the runs that measure errors [default: those of the scene]
+    #[arg(long, value_name = "N")]
+    pub steps: Option<u32>,
+    /// Timing runs of the final race
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub repeats: u32,
+    /// Begin no trial after this many seconds
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    pub seconds: f64,
+    /// Shuffles the races and lays out random scenes
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Write everything that was tried to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl AdviseArgs {
+    fn plan(&self) -> Result<Plan, Error> {
+        let loaded = open_scene(&self.scene, Some(self.seed), self.steps, None)?;
+        let truth = loaded.truth.as_ref().map_or("", |t| t.unit);
+        let read = |option: &str, text: &Option<String>, unit: &str| {
+            text.as_deref().map(|text| quantity(option, text, unit)).transpose()
+        };
+        let limits = Limits {
+            penetration: read("max-penetration", &self.max_penetration, "m")?,
+            time_ns: read("max-time", &self.max_time, "s")?.map(|s| 1e9 * s),
+            residual: read("max-residual", &self.max_residual, "")?,
+            truth: match (&self.max_truth, &loaded.truth) {
+                (Some(text), None) => {
+                    let message = format!("{text}, but no truth is known about '{}'", self.scene);
+                    return Err(Error::invalid("max-truth", message));
+                }
+                (text, _) => read("max-truth", text, truth)?,
+            },
+        };
+        if (limits.penetration, limits.residual, limits.truth) == (None, None, None) {
+            let message = "no error is limited: give --max-penetration, --max-residual or --max-truth";
+            return Err(Error::invalid("advise", message));
+        }
+        if !(self.seconds > 0.0 && self.seconds.is_finite()) {
+            return Err(Error::invalid("seconds", format!("{} is not a positive number", self.seconds)));
+        }
+        let width = |&n: &usize| {
+            let refused = || Error::invalid("lanes", format!("{n} is none of 1, 4, 8, 16"));
+            LaneWidth::from_lanes(n).ok_or_else(refused)
+        };
+        let mut widths = self.lanes.iter().map(width).collect::<Result<Vec<_>, _>>()?;
+        widths.sort();
+        widths.dedup();
+        Ok(Plan {
+            scene: self.scene.clone(),
+            limits,
+            solvers: match self.solvers.is_empty() {
+                true => VARIANTS.iter().collect(),
+                false => self.solvers.iter().map(|name| find(name)).collect::<Result<_, _>>()?,
+            },
+            widths: if widths.is_empty() { LaneWidth::ALL.to_vec() } else { widths },
+            steps: self.steps,
+            repeats: self.repeats,
+            seed: self.seed,
+            seconds: self.seconds,
+        })
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
+    let plan = args.plan()?;
+    // Before the long wait, not after it.
+    let file = args.json.as_deref().map(Pending::new).transpose()?;
+    let bar = ProgressBar::new(1);
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let advice = advise(&plan, &|progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+        bar.set_message(progress.what);
+    });
+    bar.finish_and_clear();
+    let advice = advice?;
+    if let (Some(mut file), Some(path)) = (file, &args.json) {
+        let text = format!("{:#}\n", json(&plan, &advice));
+        file.write_all(text.as_bytes()).map_err(Error::io(path))?;
+        file.commit()?;
+    }
+    match std::io::stdout().lock().write_all(text(&plan, &advice).as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
+        _ => Ok(if advice.best().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE }),
+    }
+}
+
+/// The limits in words.
+fn limits(plan: &Plan, unit: &str) -> String {
+    let l = &plan.limits;
+    let parts = [
+        l.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
+        l.residual.map(|r| format!("residual ≤ {}", ratio(r))),
+        l.truth.map(|t| format!("distance to truth ≤ {}", si_short(t, unit))),
+        l.time_ns.map(|t| format!("time ≤ {}", si_short(1e-9 * t, "s"))),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+fn text(plan: &Plan, advice: &Advice) -> String {
+    let unit = advice.trials.iter().find_map(|t| t.truth).map_or("", |t| t.unit);
+    let mut text = format!("{}: {}\n\n", plan.scene, limits(plan, unit));
+    match (advice.best(), advice.nearest()) {
+        (Some(best), _) => {
+            text += &format!("cheapest: {}\n{}", name(best), evidence(best, advice));
+            text += &match advice.runner_up() {
+                Some(next) => format!("\nrunner-up: {}, {}\n", name(next), loses(next, best)),
+                None => "\nnothing else that was raced keeps the limits\n".to_string(),
+            };
+        }
+        (None, Some(nearest)) => {
+            text += "no setting that was tried keeps the limits\n\nnearest: ";
+            text += &format!("{}\n{}\n", name(nearest), evidence(nearest, advice));
+            let over = match nearest.excess.is_finite() {
+                true => format!("it is over its worst limit by a factor of {}", digits(nearest.excess)),
+                false => "it failed, or never came to its truth".to_string(),
+            };
+            text += &format!("{over}\n");
+        }
+        (None, None) => text += "nothing was tried: the time was up\n",
+    }
+    text += &format!("\n{}", finalists(advice));
+    text += &format!(
+        "\ntried {} settings; left out {} that should not be cheaper{}\n",
+        advice.trials.len(),
+        advice.left_out,
+        if advice.is_cut_short { "; the time was up before the rest" } else { "" }
+    );
+    text
+}
+
+/// The setting with its lanes.
+fn name(trial: &Trial) -> String {
+    format!("{}, {}", trial.setting.text(), lanes(trial))
+}
+
+fn lanes(trial: &Trial) -> String {
+    match (trial.setting.order, trial.time.map_or(1, |t| t.lanes)) {
+        (Order::Natural, _) => "natural order".to_string(),
+        (Order::Colored, 1) => "1 lane".to_string(),
+        (Order::Colored, lanes) => format!("{lanes} lanes"),
+    }
+}
+
+/// How far a setting is behind the best one.
+fn loses(next: &Trial, best: &Trial) -> String {
+    let Some((next_time, best_time)) = next.time.zip(best.time) else { return String::new() };
+    let percent = 100.0 * (next_time.median_ns / best_time.median_ns - 1.0);
+    if next.ties(best) {
+        format!("tied: {percent:.1} % slower, within the noise")
+    } else {
+        format!("{percent:.1} % slower")
+    }
+}
+
+/// Its time, and all its errors.
+fn evidence(trial: &Trial, advice: &Advice) -> String {
+    let mut text = String::new();
+    if let Some(time) = trial.time {
+        let value = format!("{} ± {} µs", digits(1e-3 * time.median_ns), digits(1e-3 * time.spread_ns));
+        let [repeats, steps] = advice.race;
+        text += &format!("  {:<36}{value:>12} ({repeats} × {steps} steps)\n", "time of a step, median");
+    }
+    if let Some(failure) = trial.failure {
+        text += &format!("  {failure}\n");
+    }
+    if let Some(errors) = &trial.errors {
+        text += &error_list(errors);
+    }
+    if let Some(truth) = &trial.truth {
+        let error = truth.error.map_or("not reached".to_string(), |e| si(e, truth.unit));
+        let known = format!("{} = {}", truth.quantity, si(truth.expected, truth.unit));
+        text += &format!("  {:<36}{error:>12} ({known})\n", "distance to truth");
+    }
+    text
+}
+
+/// Everything that was raced, a line each.
+fn finalists(advice: &Advice) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header([
+        "raced",
+        "lanes",
+        "µs/step",
+        "±",
+        "slower",
+        "penetration",
+        "residual",
+        "truth",
+        "limits",
+    ]);
+    let first = advice.finalists.first();
+    for trial in &advice.finalists {
+        let time = |of: fn(crate::lab::advise::Time) -> f64| {
+            trial.time.map_or("failed".to_string(), |t| digits(1e-3 * of(t)))
+        };
+        let slower = |f: &Trial| Some((f.ties(trial), trial.time?.median_ns / f.time?.median_ns - 1.0));
+        let slower = first.filter(|f| !std::ptr::eq(*f, trial)).and_then(slower);
+        let error = |of: &dyn Fn(&crate::lab::metrics::Errors) -> String| {
+            trial.errors.as_ref().map_or(String::new(), of)
+        };
+        table.add_row([
+            trial.setting.text(),
+            lanes(trial),
+            time(|t| t.median_ns),
+            time(|t| t.spread_ns),
+            slower.map_or(String::new(), |(tied, by)| {
+                format!("{}{:.1} %", if tied { "= " } else { "" }, 100.0 * by)
+            }),
+            error(&|e| si(e.penetration_max, "m")),
+            error(&|e| ratio(e.law_rms)),
+            trial
+                .truth
+                .map_or("—".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
+            if trial.is_good() { "kept" } else { "broken" }.to_string(),
+        ]);
+    }
+    for (i, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        if i >= 2 {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.to_string().lines().map(|line| line.trim_end().to_string() + "\n").collect()
+}
+
+fn json(plan: &Plan, advice: &Advice) -> Value {
+    let setting = |s: &Setting| {
+        json!({
+            "solver": s.solver.name,
+            "order": s.order,
+            "budget": s.budget,
+            "contact_hertz": s.contact_hertz,
+        })
+    };
+    let trial = |t: &Trial| {
+        json!({
+            "setting": setting(&t.setting),
+            "time": t.time,
+            "errors": t.errors,
+            "truth": t.truth,
+            "failure": t.failure,
+            "in_limits": Some(t.excess).filter(|e| e.is_finite()),
+            "keeps_limits": t.is_good(),
+        })
+    };
+    json!({
+        "environment": Environment::current(),
+        "scene": plan.scene,
+        "limits": plan.limits,
+        "repeats": advice.race[0],
+        "race_steps": advice.race[1],
+        "steps": plan.steps,
+        "seed": plan.seed,
+        "best": advice.best().map(trial),
+        "runner_up": advice.runner_up().map(trial),
+        "nearest": advice.nearest().map(trial),
+        "finalists": advice.finalists.iter().map(trial).collect::<Vec<_>>(),
+        "trials": advice.trials.iter().map(trial).collect::<Vec<_>>(),
+        "left_out": advice.left_out,
+        "cut_short": advice.is_cut_short,
+    })
+}

@@ -1,0 +1,214 @@
+//! `simpulse growth`: the cost of a contact from a thousand contacts to a million.
+
+use super::settled;
+use crate::engine::solvers::{DEFAULT, find};
+use crate::engine::world::{Settings, World};
+use crate::lab::error::Error;
+use crate::lab::files;
+use crate::lab::profile::growth::{Entry, Measurement, measure, size_for, verdicts};
+use crate::lab::profile::growth_report;
+use crate::lab::profile::islands::islands;
+use crate::lab::profile::waiting;
+use crate::lab::scenes::{CATALOG, MAX_BODIES, Scene, Size};
+use crate::lab::study::{is_path, open_scene};
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Measure the cost of a contact from a thousand contacts to a million
+///
+/// Builds the scene in several sizes, settles each for some steps, holds them still and times whole
+/// steps of all of them in turn. A scene that has a size is grown by it; a scene with a given size, or
+/// without one, is copied side by side, so that there are many small islands. Prints time per
+/// contact by phase with the errors beside, memory per contact and per body, and whether each phase
+/// stays flat, steps where its data leave a cache, or grows faster than n log n. Writes growth.csv
+/// and growth.svg.
+///
+/// From one size to the next, the cost per contact may grow by as much as memory of the phase's
+/// working set is read more slowly (measured), and by ln n₂/ln n₁; 15 % and twice the spread are
+/// allowed on top. What grows more is said to.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  simpulse growth
+  simpulse growth --scene pyramid:10 --contacts 1e3,1e4,1e5
+      Copies of a pyramid of 55 boxes: the same contacts in small islands.
+  simpulse growth --scene circle_pile --solver pgs --lanes 16 --out results/growth")]
+pub struct GrowthArgs {
+    /// A scene of `simpulse scenes`: without a size it is grown, with one it is copied
+    #[arg(long, default_value = "pyramid", value_name = "SCENE")]
+    pub scene: String,
+    /// Contacts to aim at
+    #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "1e3,3e3,1e4,3e4,1e5,3e5,1e6")]
+    pub contacts: Vec<String>,
+    /// A solver of `simpulse solvers`
+    #[arg(long, default_value = DEFAULT)]
+    pub solver: String,
+    /// Lanes: 1, 4, 8 or 16
+    #[arg(long, default_value_t = 8, value_name = "N")]
+    pub lanes: usize,
+    /// Steps before a scene is held still
+    #[arg(long, default_value_t = 8, value_name = "STEPS")]
+    pub settle: u32,
+    /// Rounds in which every size is timed once
+    #[arg(long, default_value_t = 7, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: u32,
+    /// Folder for growth.csv and growth.svg
+    #[arg(long, default_value = "results", value_name = "FOLDER")]
+    pub out: PathBuf,
+}
+
+/// Steps at the end of settling whose errors are printed.
+const OBSERVED_STEPS: u32 = 2;
+
+/// Share of the free memory that worlds may take.
+const MEMORY_SHARE: f64 = 0.6;
+
+/// A scene that can be had with about so many contacts.
+enum Family {
+    /// By its size: sizes it can have, and contacts at two of them.
+    Sized { name: String, size: Size, known: [(f64, f64); 2] },
+    /// By copies: the scene and its contacts.
+    Copied { scene: Scene, contacts: usize },
+}
+
+impl Family {
+    fn new(name: &str, settings: &Settings, settle: u32) -> Result<Self, Error> {
+        let count = |scene: &Scene| -> Result<usize, Error> {
+            let mut world = scene.build(settings.clone())?;
+            settled(&mut world, settle, 0)?;
+            world.find_contacts();
+            match world.contacts.len() {
+                0 => Err(Error::invalid(
+                    "scene",
+                    format!("{} has no contacts after {settle} steps", scene.name),
+                )),
+                contacts => Ok(contacts),
+            }
+        };
+        let entry = CATALOG.iter().find(|e| e.name == name);
+        let Some(size) = entry.and_then(|e| e.size) else {
+            let scene = named(name)?;
+            let contacts = count(&scene)?;
+            return Ok(Family::Copied { scene, contacts });
+        };
+        let at = |size: u32| -> Result<(f64, f64), Error> {
+            Ok((f64::from(size), count(&named(&format!("{name}:{size}"))?)? as f64))
+        };
+        let first = 20.clamp(size.min, size.max);
+        let known = [at(first)?, at((2 * first).clamp(size.min, size.max))?];
+        if size_for(1e4, known).is_none() {
+            let message = format!("the contacts of {name} do not grow with its size; give one to copy it");
+            return Err(Error::invalid("scene", message));
+        }
+        Ok(Family::Sized { name: name.into(), size, known })
+    }
+
+    /// The scene nearest to `target` contacts; none if it cannot be that large.
+    fn scene(&self, target: f64) -> Result<Option<Scene>, Error> {
+        let made = match self {
+            Family::Sized { name, size, known } => {
+                let wanted = size_for(target, *known).unwrap_or(0.0).round();
+                if !(f64::from(size.min)..=f64::from(size.max)).contains(&wanted) {
+                    return Ok(None);
+                }
+                named(&format!("{name}:{wanted}"))?
+            }
+            Family::Copied { scene, contacts } => {
+                let copies = (target / *contacts as f64).round().max(1.0) as usize;
+                if copies.saturating_mul(scene.bodies.len()) > MAX_BODIES {
+                    return Ok(None);
+                }
+                islands(scene, copies)?
+            }
+        };
+        Ok((made.bodies.len() <= MAX_BODIES).then_some(made))
+    }
+}
+
+/// Most contacts that can be asked for.
+const MAX_CONTACTS: f64 = 1e8;
+
+/// Ascending, each once.
+fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
+    let mut targets = Vec::new();
+    for text in texts {
+        match text.trim().parse::<f64>() {
+            Ok(value) if (1.0..=MAX_CONTACTS).contains(&value) => targets.push(value),
+            _ => {
+                let message = format!("'{text}' is not a number from 1 to {MAX_CONTACTS:e}");
+                return Err(Error::invalid("contacts", message));
+            }
+        }
+    }
+    targets.sort_by(f64::total_cmp);
+    targets.dedup();
+    Ok(targets)
+}
+
+/// Bytes that the system can still give; none where it does not say.
+fn free_memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    Some(1024.0 * line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()?)
+}
+
+/// Runs the command.
+pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
+    let solver = find(&args.solver)?;
+    let settings = Settings { width: super::args::width(args.lanes)?, ..Settings::new(solver) };
+    let targets = targets(&args.contacts)?;
+    // Unknown names first; a path is read when it is opened.
+    if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
+        named(&args.scene)?;
+    }
+    let family = Family::new(&args.scene, &settings, args.settle)?;
+    files::prepare_folder(&args.out)?;
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut notes = String::new();
+    for target in targets {
+        let Some(scene) = family.scene(target)? else {
+            notes += &format!("left out: {target} contacts, more or less than {} can have\n", args.scene);
+            continue;
+        };
+        // What a contact took so far, what settling takes, and the scene itself.
+        let bytes = |e: &Entry| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
+        let expected = entries.last().map_or(0.0, bytes) * target;
+        if free_memory().is_some_and(|free| expected > MEMORY_SHARE * free) {
+            notes += &format!(
+                "left out: {target} contacts, which would take about {:.0} MB of memory\n",
+                1e-6 * expected
+            );
+            continue;
+        }
+        eprintln!("settling {}: {} bodies, {} steps", scene.name, scene.bodies.len(), args.settle);
+        let mut world: World = scene.build(settings.clone())?;
+        match settled(&mut world, args.settle, OBSERVED_STEPS) {
+            Ok(errors) => entries.push(Entry { scene: scene.name, world, errors }),
+            Err(failure) => notes += &format!("left out: {}: {failure}\n", scene.name),
+        }
+    }
+    let Measurement { rows, memory, waiting } = measure(&mut entries, args.repeats, &|round| {
+        eprintln!("round {} of {}: whole steps on held states", round + 1, args.repeats);
+    });
+    drop(entries);
+    let title = format!("{} · {}, {} lanes: cost of a contact", args.scene, solver.name, args.lanes);
+    let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows, &memory)));
+    out += &notes;
+    out += &waiting::note(waiting);
+    let contents = [
+        ("growth.csv", growth_report::csv(&rows)?),
+        ("growth.svg", growth_report::svg(&rows, &title)?.into_bytes()),
+    ];
+    for (name, bytes) in contents {
+        let path = args.out.join(name);
+        files::write(&path, &bytes)?;
+        out += &format!("wrote {}\n", path.display());
+    }
+    super::print(&out)
+}
+
+/// A scene by name or file, as it is.
+fn named(name: &str) -> Result<Scene, Error> {
+    Ok(open_scene(name, None, None, None)?.scene)
+}

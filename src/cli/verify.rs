@@ -1,0 +1,349 @@
+//! `simpulse verify`: hard cases with known truths, against every solver.
+
+use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
+use crate::lab::error::Error;
+use crate::lab::files::Pending;
+use crate::lab::verify::{
+    self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+};
+use clap::Args;
+use comfy_table::{ContentArrangement, Table, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Judge every solver, at its standard budget, by cases whose truth is known on paper.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,
+so that up to 1 passes. '*' marks the cases that the default solver is required to pass; --list says why.
+Exit code 0: it passed all of those that ran; 1: it did not; 2: a request that cannot be met.
+
+Examples:
+  simpulse verify
+  simpulse verify --case A1,B4.heavy --solver pgs,soft_step
+  simpulse verify --solver soft_step --json verify.json
+  simpulse verify --list")]
+pub struct VerifyArgs {
+    /// Cases (B4.heavy) or families of cases (B4) [default: all]
+    #[arg(long = "case", value_delimiter = ',', value_name = "ID,…")]
+    pub cases: Vec<String>,
+    /// Solvers [default: all]
+    #[arg(long = "solver", value_delimiter = ',', value_name = "SOLVER,…")]
+    pub solvers: Vec<String>,
+    /// Write everything measured to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Only list the cases: tolerances, and what is required of the default solver
+    #[arg(long)]
+    pub list: bool,
+    /// Threads; the results do not depend on them
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub threads: u8,
+}
+
+/// Runs the cases and prints the matrix.
+pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
+    let cases = verify::select(&args.cases)?;
+    if args.list {
+        return print(&list(&cases), ExitCode::SUCCESS);
+    }
+    let solvers: Vec<&Variant> = match args.solvers.is_empty() {
+        true => VARIANTS.iter().collect(),
+        false => args.solvers.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?,
+    };
+    // Before the long wait, not after it.
+    let file = args.json.as_deref().map(Pending::new).transpose()?;
+    let bar = ProgressBar::new(0);
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &|progress: Progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+        bar.set_message(progress.what);
+    });
+    bar.finish_and_clear();
+    if let (Some(file), Some(path)) = (file, &args.json) {
+        write(file, path, &json(&matrix))?;
+    }
+    print(&(text(&matrix) + &verdict(&matrix)), exit_code(&matrix))
+}
+
+/// 1 if the default solver ran and broke a promise.
+fn exit_code(matrix: &Matrix) -> ExitCode {
+    match matrix.broken_promises(DEFAULT) {
+        Some(broken) if !broken.is_empty() => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn verdict(matrix: &Matrix) -> String {
+    let required = matrix.cases.iter().filter(|case| case.required.is_required()).count();
+    match matrix.broken_promises(DEFAULT) {
+        None => format!("{DEFAULT}, the default solver, did not run: nothing was required\n"),
+        Some(broken) if broken.is_empty() => {
+            format!("{DEFAULT}, the default solver, passed all {required} cases required of it (*)\n")
+        }
+        Some(broken) => {
+            let (count, ids) = (broken.len(), broken.join(", "));
+            format!(
+                "{DEFAULT}, the default solver, failed {count} of {required} cases required of it (*): {ids}\n"
+            )
+        }
+    }
+}
+
+fn list(cases: &[&Case]) -> String {
+    let mut text = String::new();
+    for case in cases {
+        let law = match case.law_of {
+            [] => String::new(),
+            solvers => format!(" (law of {})", solvers.join(", ")),
+        };
+        let (word, why) = match case.required {
+            Required::Yes(why) => ("required", why),
+            Required::No(why) => ("not required", why),
+        };
+        text += &format!("{}  {} [{}]{law}\n", case.id, case.summary, case.unit);
+        text += &format!("    tolerance: {}\n    {word} of {DEFAULT}: {why}\n", case.tolerance);
+    }
+    text + &skipped()
+}
+
+fn skipped() -> String {
+    let list: Vec<_> = NEEDS_JOINTS.iter().map(|(id, what)| format!("{id} ({what})")).collect();
+    format!("skipped, needs joints: {}\n", list.join(", "))
+}
+
+fn text(matrix: &Matrix) -> String {
+    let mut table = plain();
+    let names = matrix.solvers.iter().map(|s| s.name.to_string());
+    table.set_header(["case", "what", "truth", "tolerance"].map(String::from).into_iter().chain(names));
+    for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
+        let star = if case.required.is_required() { "*" } else { "" };
+        let (truth, tolerance) = (common(cells, |f| f.truth), common(cells, |f| f.tolerance));
+        let own = truth.is_none() || tolerance.is_none();
+        let shown = |value: Option<f64>| value.map_or("per solver".into(), number);
+        let mut row = vec![format!("{}{star}", case.id), format!("{} ({})", case.summary, case.unit)];
+        row.extend([shown(truth), shown(tolerance)]);
+        row.extend(cells.iter().map(|cell| cell_text(cell, own)));
+        table.add_row(row);
+    }
+    let mut text = format!("{table}\n");
+    for (c, case) in matrix.cases.iter().enumerate() {
+        text += &sweeps(matrix, c, case);
+        for (solver, cell) in matrix.solvers.iter().zip(&matrix.cells[c]) {
+            let note = match cell {
+                Cell::Found(finding) => finding.note.clone(),
+                Cell::Failed(failure) => failure.to_string(),
+                Cell::Foreign => String::new(),
+            };
+            if !note.is_empty() {
+                text += &format!("{} {}: {note}\n", case.id, solver.name);
+            }
+        }
+    }
+    let others = CASES.len() - matrix.cases.len();
+    let left = if others > 0 {
+        format!("not asked for: {others} of {} cases\n", CASES.len())
+    } else {
+        String::new()
+    };
+    text + &skipped() + &left
+}
+
+/// What all solvers have in common; none where they differ.
+fn common(cells: &[Cell], value: impl Fn(&Finding) -> f64) -> Option<f64> {
+    let mut values = cells.iter().filter_map(|cell| match cell {
+        Cell::Found(finding) => Some(value(finding)),
+        _ => None,
+    });
+    let first = values.next()?;
+    values.all(|v| v == first).then_some(first)
+}
+
+fn cell_text(cell: &Cell, with_truth: bool) -> String {
+    match cell {
+        Cell::Foreign => "not its law".into(),
+        Cell::Failed(_) => "FAIL, see below".into(),
+        Cell::Found(f) => {
+            let word = if f.passed() { "pass" } else { "FAIL" };
+            let truth = if with_truth {
+                format!(", truth {} ± {}", number(f.truth), number(f.tolerance))
+            } else {
+                String::new()
+            };
+            format!("{word} {}{truth} ({})", number(f.measured), number(f.margin()))
+        }
+    }
+}
+
+/// The small table of a sweep, one column per solver.
+fn sweeps(matrix: &Matrix, row: usize, case: &Case) -> String {
+    let columns = matrix.solvers.iter().zip(&matrix.cells[row]);
+    let found: Vec<(&str, &Sweep)> = columns
+        .filter_map(|(solver, cell)| match cell {
+            Cell::Found(Finding { sweep: Some(sweep), .. }) => Some((solver.name, sweep)),
+            _ => None,
+        })
+        .collect();
+    let Some((_, first)) = found.first() else { return String::new() };
+    let mut table = plain();
+    table.set_header(std::iter::once(first.parameter).chain(found.iter().map(|(name, _)| *name)));
+    for (i, row) in first.rows.iter().enumerate() {
+        let cells = found.iter().map(|(_, sweep)| match sweep.rows.get(i) {
+            Some(row) => format!("{} {}", if row.holds { "pass" } else { "FAIL" }, number(row.measured)),
+            None => String::new(),
+        });
+        table.add_row(std::iter::once(number(row.value)).chain(cells));
+    }
+    format!("\n{}: {}\n{table}\n", case.id, case.summary)
+}
+
+fn plain() -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Dynamic);
+    table
+}
+
+/// Four significant digits, in powers of ten where that is shorter.
+fn number(value: f64) -> String {
+    match value.abs() {
+        _ if value.is_infinite() => {
+            if value > 0.0 {
+                "∞".into()
+            } else {
+                "-∞".into()
+            }
+        }
+        0.0 => "0".into(),
+        size if (0.01..1e5).contains(&size) => {
+            let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+            let text = format!("{value:.digits$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+                false => text,
+            }
+        }
+        _ => format!("{value:.2e}"),
+    }
+}
+
+fn json(matrix: &Matrix) -> Value {
+    // JSON has no infinities: they are words.
+    let finite = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
+    let cell = |case: &Case, solver: &Variant, cell: &Cell| {
+        let mut value = json!({
+            "case": case.id, "solver": solver.name, "budget": solver.budget, "unit": case.unit,
+            "required": case.required.is_required() && solver.name == DEFAULT,
+            "passed": cell.passed(),
+        });
+        match cell {
+            Cell::Foreign => value["reason"] = json!("not its law"),
+            Cell::Failed(failure) => value["reason"] = json!(failure.to_string()),
+            Cell::Found(f) => {
+                for (key, x) in [
+                    ("measured", f.measured),
+                    ("truth", f.truth),
+                    ("tolerance", f.tolerance),
+                    ("margin", f.margin()),
+                ] {
+                    value[key] = finite(x);
+                }
+                value["note"] = json!(f.note);
+                if let Some(sweep) = &f.sweep {
+                    let row = |r: &SweepRow| json!([finite(r.value), finite(r.measured), r.holds]);
+                    let rows: Vec<_> = sweep.rows.iter().map(row).collect();
+                    value["sweep"] = json!({ "parameter": sweep.parameter, "rows": rows });
+                }
+            }
+        }
+        value
+    };
+    let results: Vec<_> = (matrix.cases.iter().zip(&matrix.cells))
+        .flat_map(|(case, cells)| matrix.solvers.iter().zip(cells).map(|(solver, c)| cell(case, solver, c)))
+        .collect();
+    let of = |case: &&Case| {
+        let (required, why) = match case.required {
+            Required::Yes(why) => (true, why),
+            Required::No(why) => (false, why),
+        };
+        json!({ "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance, "required": required, "why": why })
+    };
+    json!({
+        "version": 1,
+        "default_solver": DEFAULT,
+        "broken_promises": matrix.broken_promises(DEFAULT),
+        "cases": matrix.cases.iter().map(of).collect::<Vec<_>>(),
+        "results": results,
+        "needs_joints": NEEDS_JOINTS.iter().map(|(id, what)| json!({ "case": id, "what": what })).collect::<Vec<_>>(),
+    })
+}
+
+fn write(mut file: Pending, path: &Path, value: &Value) -> Result<(), Error> {
+    writeln!(file, "{value:#}").map_err(Error::io(path))?;
+    file.commit()
+}
+
+/// To standard output; a reader that has left is not an error.
+fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
+        _ => Ok(code),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (13.0, "13"),
+            (0.38333, "0.3833"),
+            (4454.9, "4455"),
+            (-4.529, "-4.529"),
+            (1e5, "1.00e5"),
+            (7.72e-5, "7.72e-5"),
+            (f64::INFINITY, "∞"),
+            (f64::NEG_INFINITY, "-∞"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_cell_shows_verdict_value_and_margin() {
+        let cell = Cell::Found(Finding::new(1.5, 1.0, 0.25));
+        assert_eq!(cell_text(&cell, false), "FAIL 1.5 (2)");
+        assert_eq!(cell_text(&cell, true), "FAIL 1.5, truth 1 ± 0.25 (2)");
+        assert_eq!(cell_text(&Cell::Foreign, false), "not its law");
+    }
+
+    #[test]
+    fn the_list_says_what_is_required_and_what_is_skipped() {
+        let cases = verify::select(&["B2.box".to_string(), "A18".to_string()]).unwrap();
+        let text = list(&cases);
+        for part in ["A18.law", "not required of soft_step", "(law of soft_step)", "B20 (bridge"] {
+            assert!(text.contains(part), "{part} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn the_file_is_replaced_as_a_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("verify.json");
+        let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
+        let matrix = verify::run(cases, VARIANTS.iter().collect(), 1, Lab::new, &|_| ());
+        write(Pending::new(&path).unwrap(), &path, &json(&matrix)).unwrap();
+        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
+        assert_eq!(read["broken_promises"], json!([]));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(Pending::new(&folder.path().join("missing/verify.json")).is_err());
+    }
+}

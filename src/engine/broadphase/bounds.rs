@@ -1,0 +1,212 @@
+//! Fat boxes: bounds with a margin, and a cheap test whether a body may have left its own.
+//!
+//! **The promise.** The fat box of a shape contains the shape's bounds grown by
+//! [`SPECULATIVE_DISTANCE`], up to the rounding of coordinates. So two shapes whose fat boxes are
+//! apart are further apart than the narrow phase looks.
+//!
+//! **The test.** Let a shape be the core points c in its body's frame, grown by a radius; x the
+//! body's centre of mass and R its rotation as a unit complex number. From a reference pose
+//! (x₀, R₀) to (x, R) a core point moves by (x − x₀) + (R − R₀)c, and multiplying by R − R₀ scales
+//! lengths by |R − R₀|. With reach r = max |c| the bounds therefore move, on every side, by no
+//! more than
+//!
+//! ```text
+//! max(|x − x₀|, |y − y₀|) + r |R − R₀|                                     (1)
+//! ```
+//!
+//! The radius moves with its core and adds nothing. If, at the reference pose, the grown bounds
+//! were everywhere at least `slack` inside of the fat box, they still are inside while (1) is no
+//! more than `slack`. That takes six numbers per body and no look at its shapes. Only where (1) is
+//! more, bounds are computed; if they are inside after all, as they may be where a body has
+//! turned, the reference moves to the present pose.
+//!
+//! **Rounding.** x − x₀ is exact where the two are within a factor of two (Sterbenz), else it is
+//! off by half a unit of the last place of the larger; R is off by a few ε; and bounds are, by a
+//! few ε of their coordinates. `slack` is short of the distance by 16 ε of the largest coordinate
+//! and a thousandth of itself for all of them.
+//!
+//! **The margin.** A margin saves searches while a body stays in it, and costs a candidate for
+//! every neighbour that is near and does not touch. So it is a fraction of the shape and at most
+//! [`AABB_MARGIN`]; and nothing for a shape that would cross it within [`LASTS`] steps, which
+//! would be searched for all the same, and nothing for static bodies.
+//!
+//! **Source:** boxes with a margin, Catto 2019 (`catto2019`). **Departure:** the test of (1).
+
+use super::Proxy;
+use crate::engine::bodies::{Bodies, BodyKind};
+use crate::engine::lanes::{LaneVec, held};
+use crate::engine::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
+use crate::engine::shapes::{Aabb, Pose, Shape};
+use glam::Vec2;
+use wide::{f32x8, f32x16};
+
+/// Margin as a fraction of the larger side of a shape's bounds (1).
+const MARGIN_FRACTION: f32 = 0.1;
+
+/// Steps that a margin has to last to be given (1).
+const LASTS: f32 = 2.0;
+
+/// Where bodies were when their bounds were last looked at; arrays of `[bodies]`.
+#[derive(Clone, Debug, Default)]
+pub struct FatBoxes {
+    x: LaneVec,
+    y: LaneVec,
+    cos: LaneVec,
+    sin: LaneVec,
+    /// r of (1), the largest of the body's shapes (m).
+    reach: LaneVec,
+    /// The least of the body's shapes (m), infinite for a static body.
+    slack: LaneVec,
+    /// Each shape in lanes, `[shapes]`.
+    outlines: Vec<Outline>,
+    /// First shape of each body; its shapes follow one another.
+    first_shape: Vec<u32>,
+    /// Bodies that fail the test.
+    failed: Vec<u32>,
+    /// Shapes that have a new fat box, ascending.
+    moved: Vec<u32>,
+}
+
+impl FatBoxes {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
+        let lists = held(&self.first_shape) + held(&self.failed) + held(&self.moved);
+        columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
+    }
+
+    /// Takes in the bodies after those it knows. Their shapes are in order of bodies.
+    pub fn add(&mut self, bodies: &Bodies, shape_body: &[u32], shapes: &[Shape]) {
+        for body in self.first_shape.len()..bodies.len() {
+            let first = shape_body.partition_point(|&b| (b as usize) < body);
+            let own = shape_body[first..].iter().take_while(|&&b| b as usize == body).count();
+            self.outlines.extend(shapes[first..first + own].iter().map(Outline::new));
+            let reach = self.outlines[first..].iter().map(Outline::reach).fold(0.0, f32::max);
+            self.first_shape.push(first as u32);
+            for column in [&mut self.x, &mut self.y, &mut self.cos, &mut self.sin] {
+                column.push(0.0);
+            }
+            self.reach.push(reach);
+            // Below any distance: the first update looks at the body.
+            self.slack.push(-1.0);
+        }
+    }
+
+    /// Renews the boxes of shapes that left theirs; returns those shapes, ascending.
+    ///
+    /// `dt` (s) is the step over which velocities are thought to last.
+    pub fn update(&mut self, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) -> &[u32] {
+        self.moved.clear();
+        self.find_failed(bodies);
+        for i in 0..self.failed.len() {
+            self.look_at(self.failed[i] as usize, bodies, dt, proxies);
+        }
+        &self.moved
+    }
+
+    /// Lists the bodies for which (1) exceeds the slack, or is no number.
+    fn find_failed(&mut self, bodies: &Bodies) {
+        self.failed.clear();
+        let count = self.first_shape.len();
+        let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
+        let [x0, y0, cos0, sin0, reach, slack] = columns.map(|c| c.lanes::<f32x16>());
+        let columns = [&bodies.position_x, &bodies.position_y, &bodies.rotation_cos, &bodies.rotation_sin];
+        let [x, y, cos, sin] = columns.map(|c| &c.lanes::<f32x16>()[..x0.len()]);
+        for i in 0..x0.len() {
+            let (turn_x, turn_y) = (cos[i] - cos0[i], sin[i] - sin0[i]);
+            let turn = (turn_x * turn_x + turn_y * turn_y).sqrt();
+            let shift = (x[i] - x0[i]).abs().fast_max((y[i] - y0[i]).abs());
+            let mut failed = !(shift + reach[i] * turn).simd_le(slack[i]).to_bitmask() & 0xFFFF;
+            while failed != 0 {
+                let body = 16 * i as u32 + failed.trailing_zeros();
+                failed &= failed - 1;
+                if (body as usize) < count {
+                    self.failed.push(body);
+                }
+            }
+        }
+    }
+
+    /// Renews the boxes of one body where needed, and makes its pose the reference.
+    fn look_at(&mut self, body: usize, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) {
+        let pose = bodies.pose(body);
+        let first = self.first_shape[body] as usize;
+        let last = self.first_shape.get(body + 1).map_or(self.outlines.len(), |&next| next as usize);
+        let speed = bodies.velocity(body).length();
+        let spin = bodies.angular_velocity[body].abs();
+        let mut slack = f32::INFINITY;
+        for (i, proxy) in (first..last).zip(&mut proxies[first..last]) {
+            let tight = self.outlines[i].bounds(&pose).grown(SPECULATIVE_DISTANCE);
+            if self.slack[body] < 0.0 || !proxy.aabb.contains(&tight) {
+                let extent = tight.max - tight.min;
+                let margin = AABB_MARGIN.min(MARGIN_FRACTION * extent.max_element());
+                let path = (speed + spin * self.reach[body]) * dt;
+                let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
+                proxy.aabb = if lasts { tight.grown(margin) } else { tight };
+                self.moved.push(i as u32);
+            }
+            slack = slack.min(inset(&proxy.aabb, &tight));
+        }
+        if bodies.kind[body] == BodyKind::Static {
+            slack = f32::INFINITY;
+        }
+        self.slack[body] = slack;
+        (self.x[body], self.y[body]) = (pose.position.x, pose.position.y);
+        (self.cos[body], self.sin[body]) = (pose.rotation.x, pose.rotation.y);
+    }
+}
+
+/// How far `tight` is inside of `fat` on the side where it is least, less what rounding may take.
+fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
+    let low = (tight.min - fat.min).min_element();
+    let high = (fat.max - tight.max).min_element();
+    let largest = fat.min.abs().max(fat.max.abs()).max_element();
+    (low.min(high) * 0.999 - 16.0 * f32::EPSILON * largest).max(0.0)
+}
+
+/// The core points of a shape, some of them repeated, and its radius (m).
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    x: [f32; MAX_POLYGON_VERTICES],
+    y: [f32; MAX_POLYGON_VERTICES],
+    radius: f32,
+}
+
+impl Outline {
+    fn new(shape: &Shape) -> Self {
+        let ends = |a, b| std::array::from_fn(|i| if i % 2 == 0 { a } else { b });
+        let (core, radius) = match *shape {
+            Shape::Circle { center, radius } => ([center; MAX_POLYGON_VERTICES], radius),
+            Shape::Capsule { a, b, radius } => (ends(a, b), radius),
+            Shape::Segment { a, b } => (ends(a, b), 0.0),
+            Shape::Polygon(polygon) => (polygon.vertices, polygon.radius),
+        };
+        Outline { x: core.map(|c| c.x), y: core.map(|c| c.y), radius }
+    }
+
+    /// r of (1).
+    fn reach(&self) -> f32 {
+        self.x.iter().zip(&self.y).map(|(&x, &y)| Vec2::new(x, y).length()).fold(0.0, f32::max)
+    }
+
+    /// [`Shape::aabb`], by the same operations on all points at once.
+    #[inline]
+    fn bounds(&self, pose: &Pose) -> Aabb {
+        let (cos, sin) = (f32x8::splat(pose.rotation.x), f32x8::splat(pose.rotation.y));
+        let (x, y) = (f32x8::new(self.x), f32x8::new(self.y));
+        let (x, y) = ((cos * x - sin * y).to_array(), (sin * x + cos * y).to_array());
+        let fold = |mut v: [f32; MAX_POLYGON_VERTICES], pick: fn(f32, f32) -> f32| {
+            for half in [4, 2, 1] {
+                for i in 0..half {
+                    v[i] = pick(v[i], v[i + half]);
+                }
+            }
+            v[0]
+        };
+        let low = |a: f32, b: f32| if a < b { a } else { b };
+        let high = |a: f32, b: f32| if a > b { a } else { b };
+        let min = pose.position + Vec2::new(fold(x, low), fold(y, low));
+        let max = pose.position + Vec2::new(fold(x, high), fold(y, high));
+        Aabb { min, max }.grown(self.radius)
+    }
+}

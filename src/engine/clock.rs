@@ -1,0 +1,209 @@
+//! Phases of a step and the time each takes.
+
+use std::time::{Duration, Instant};
+
+/// Phases of a step; [`Timings`] has one time for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub enum Phase {
+    /// Bounds and broad phase.
+    Pairs,
+    /// Narrow phase and impulse matching.
+    Collide,
+    /// Colouring and lane assignment.
+    Color,
+    /// Constraint preparation.
+    Prepare,
+    /// Warm starting.
+    WarmStart,
+    /// Velocity sweeps with position feedback.
+    Solve,
+    /// Velocity sweeps without.
+    Relax,
+    /// Position sweeps.
+    Position,
+    /// Restitution.
+    Restitution,
+    /// Body integration.
+    Integrate,
+    /// Impulses and poses written back.
+    Store,
+}
+
+impl Phase {
+    /// Every phase, in the order of a step.
+    pub const ALL: [Phase; 11] = [
+        Phase::Pairs,
+        Phase::Collide,
+        Phase::Color,
+        Phase::Prepare,
+        Phase::WarmStart,
+        Phase::Solve,
+        Phase::Relax,
+        Phase::Position,
+        Phase::Restitution,
+        Phase::Integrate,
+        Phase::Store,
+    ];
+
+    /// Name for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Phase::Pairs => "pairs",
+            Phase::Collide => "collide",
+            Phase::Color => "color",
+            Phase::Prepare => "prepare",
+            Phase::WarmStart => "warm start",
+            Phase::Solve => "solve",
+            Phase::Relax => "relax",
+            Phase::Position => "position",
+            Phase::Restitution => "restitution",
+            Phase::Integrate => "integrate",
+            Phase::Store => "store",
+        }
+    }
+
+    /// Whether the phase is a sweep that solves constraint rows.
+    pub fn is_sweep(self) -> bool {
+        matches!(self, Phase::Solve | Phase::Relax | Phase::Position | Phase::Restitution)
+    }
+}
+
+/// Time of each phase of the last step, and of the whole step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Timings {
+    /// Nanoseconds per phase, indexed by `Phase as usize`.
+    pub phase_ns: [u64; Phase::ALL.len()],
+    /// Nanoseconds of the whole step.
+    pub step_ns: u64,
+}
+
+impl Timings {
+    /// Nanoseconds of all sweeps.
+    pub fn sweep_ns(&self) -> u64 {
+        Phase::ALL.iter().filter(|p| p.is_sweep()).map(|&p| self.phase_ns[p as usize]).sum()
+    }
+}
+
+/// Adds the time since the last lap to a phase; costs nothing while it is off.
+///
+/// It can also be set to a single phase: then the passes of all others are skipped, so that one
+/// phase can be run again and again on the records of a step that has been prepared.
+#[derive(Debug)]
+pub struct Clock {
+    timings: Timings,
+    start: Option<(Instant, Instant)>,
+    /// The only phase that runs, and how often each lapped: others must not.
+    only: Option<(Phase, [u32; Phase::ALL.len()])>,
+    counts: bool,
+    /// Time that the thread had waited at the last lap, where that is taken out.
+    waited: Option<Duration>,
+}
+
+impl Clock {
+    /// Starts a step.
+    pub fn start(on: bool) -> Self {
+        let start = on.then(|| {
+            let now = Instant::now();
+            (now, now)
+        });
+        Clock { timings: Timings::default(), start, only: None, counts: false, waited: None }
+    }
+
+    /// Starts a step from whose times the pauses are taken out in which the thread waited for a
+    /// processor, where the system tells them. A lap then takes some microseconds, which are not
+    /// booked; the time of the step is that of its phases.
+    pub(crate) fn without_pauses() -> Self {
+        Clock { waited: waited(), ..Clock::start(true) }
+    }
+
+    /// A clock that runs one phase and takes no times. With `counts`, one lane is
+    /// [`crate::engine::lanes::Counted`]. What the phase works on must have been prepared by a whole step.
+    pub(crate) fn only(phase: Phase, counts: bool) -> Self {
+        let only = Some((phase, [0; Phase::ALL.len()]));
+        Clock { timings: Timings::default(), start: None, only, counts, waited: None }
+    }
+
+    /// Whether passes of `phase` are to be left out.
+    #[inline]
+    pub fn skips(&self, phase: Phase) -> bool {
+        self.only.as_ref().is_some_and(|only| only.0 != phase)
+    }
+
+    /// Whether floating-point operations are counted.
+    #[inline]
+    pub fn counts(&self) -> bool {
+        self.counts
+    }
+
+    /// Laps of each phase, where one phase runs alone; indexed by `Phase as usize`.
+    pub(crate) fn laps(&self) -> [u32; Phase::ALL.len()] {
+        self.only.as_ref().map_or([0; Phase::ALL.len()], |only| only.1)
+    }
+
+    /// Books the time since the last lap on `phase`.
+    #[inline]
+    pub fn lap(&mut self, phase: Phase) {
+        if let Some((_, last)) = &mut self.start {
+            let now = Instant::now();
+            let mut elapsed = now - *last;
+            *last = now;
+            if let Some(before) = &mut self.waited {
+                let after = waited().unwrap_or(*before);
+                elapsed = elapsed.saturating_sub(after.saturating_sub(*before));
+                *before = after;
+                *last = Instant::now();
+            }
+            self.timings.phase_ns[phase as usize] += elapsed.as_nanos() as u64;
+        }
+        if let Some((_, laps)) = &mut self.only {
+            laps[phase as usize] += 1;
+        }
+    }
+
+    /// Ends the step.
+    pub fn stop(mut self) -> Timings {
+        if let Some((begin, _)) = self.start {
+            self.timings.step_ns = match self.waited {
+                None => begin.elapsed().as_nanos() as u64,
+                Some(_) => self.timings.phase_ns.iter().sum(),
+            };
+        }
+        self.timings
+    }
+}
+
+/// Time that this thread was ready to run and did not, since it began. None where the system does
+/// not say; what a hypervisor takes is not in it.
+pub fn waited() -> Option<Duration> {
+    parse_wait(&std::fs::read_to_string("/proc/thread-self/schedstat").ok()?)
+}
+
+/// Time on a processor, time waiting, times scheduled: nanoseconds, nanoseconds, a count.
+fn parse_wait(text: &str) -> Option<Duration> {
+    text.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_number_is_the_wait() {
+        assert_eq!(parse_wait("1830 4200 17\n"), Some(Duration::from_nanos(4200)));
+        assert_eq!(["", "12", "1 x 3"].map(parse_wait), [None; 3]);
+    }
+
+    #[test]
+    fn a_clock_for_one_phase_skips_the_others_and_counts_laps() {
+        let mut clock = Clock::only(Phase::Solve, false);
+        assert!(clock.skips(Phase::Relax) && !clock.skips(Phase::Solve) && !clock.counts());
+        clock.lap(Phase::Solve);
+        clock.lap(Phase::Solve);
+        assert_eq!(clock.laps()[Phase::Solve as usize], 2);
+        assert_eq!(clock.stop().step_ns, 0);
+        let mut all = Clock::start(false);
+        all.lap(Phase::Solve);
+        assert!(!all.skips(Phase::Relax) && all.laps() == [0; Phase::ALL.len()]);
+    }
+}

@@ -1,0 +1,245 @@
+//! What a scene needs of its constraints; what it does not need is not compiled in.
+
+/// What the contacts of a scene can need, found once when the scene is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Features {
+    /// Some contact can turn a body. Not so when every dynamic body is a disc about
+    /// its own centre, nothing spins at the start and nothing rubs.
+    pub rotation: bool,
+    /// Some pair of surfaces has a friction coefficient above zero.
+    pub friction: bool,
+    /// Some surface bounces.
+    pub restitution: bool,
+    /// Some pair of shapes can touch at two points.
+    pub two_points: bool,
+    /// Some body is damped.
+    pub damping: bool,
+}
+
+impl Features {
+    /// Everything: the kernel for scenes that use all there is.
+    pub const FULL: Features =
+        Features { rotation: true, friction: true, restitution: true, two_points: true, damping: true };
+
+    /// Nothing.
+    pub const NONE: Features =
+        Features { rotation: false, friction: false, restitution: false, two_points: false, damping: false };
+
+    /// The union of two scenes' needs.
+    pub fn union(self, other: Features) -> Features {
+        Features {
+            rotation: self.rotation || other.rotation,
+            friction: self.friction || other.friction,
+            restitution: self.restitution || other.restitution,
+            two_points: self.two_points || other.two_points,
+            damping: self.damping || other.damping,
+        }
+    }
+}
+
+/// The needs that change the text of a sweep, as compile-time constants.
+///
+/// Restitution and damping are passes of their own and need no other sweep.
+pub trait KernelFeatures: Copy + 'static {
+    /// [`Features::rotation`]
+    const ROTATION: bool;
+    /// [`Features::friction`]
+    const FRICTION: bool;
+    /// 1 or 2: the points of a contact.
+    const POINTS: usize;
+}
+
+/// One kernel's needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel<const ROTATION: bool, const FRICTION: bool, const POINTS: usize>;
+
+impl<const R: bool, const F: bool, const P: usize> KernelFeatures for Kernel<R, F, P> {
+    const ROTATION: bool = R;
+    const FRICTION: bool = F;
+    const POINTS: usize = P;
+}
+
+/// What stands opposite the dynamic body b of a contact.
+pub trait Opposite: Copy + 'static {
+    /// Body a has a velocity and a motion: its row is gathered.
+    const HAS_ROW: bool;
+    /// Body a answers to impulses: its row is written back.
+    const MOVES: bool;
+}
+
+/// A dynamic body.
+#[derive(Clone, Copy, Debug)]
+pub struct OnDynamic;
+/// A kinematic body: it moves, but no impulse changes that.
+#[derive(Clone, Copy, Debug)]
+pub struct OnKinematic;
+/// A static body: no row is read or written for it.
+#[derive(Clone, Copy, Debug)]
+pub struct OnStatic;
+
+impl Opposite for OnDynamic {
+    const HAS_ROW: bool = true;
+    const MOVES: bool = true;
+}
+impl Opposite for OnKinematic {
+    const HAS_ROW: bool = true;
+    const MOVES: bool = false;
+}
+impl Opposite for OnStatic {
+    const HAS_ROW: bool = false;
+    const MOVES: bool = false;
+}
+
+/// [`Opposite`] as a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OppositeKind {
+    /// [`OnDynamic`]
+    Dynamic,
+    /// [`OnKinematic`]
+    Kinematic,
+    /// [`OnStatic`]
+    Static,
+}
+
+impl OppositeKind {
+    /// Every kind.
+    pub const ALL: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];
+}
+
+/// Where each quantity of a constraint record stands, in lane vectors.
+///
+/// A record is what one batch of `W` contacts keeps: `stride` vectors of `W` floats,
+/// back to back. Quantities that the kernel does not need have no place, so they cost
+/// no bytes. Per contact: normal, friction. Per point: the angular arms `r × n` and
+/// `r × t` of both bodies, separation, effective masses, accumulated impulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Points per contact.
+    pub points: usize,
+    /// Friction coefficient.
+    pub friction: usize,
+    /// First point; the normal stands at 0 and 1.
+    pub first_point: usize,
+    /// From one point to the next.
+    pub point_stride: usize,
+    /// Within a point: `r_b × n`, then `r_b × t`.
+    pub arm_b: usize,
+    /// Within a point: `r_a × n`, then `r_a × t`.
+    pub arm_a: usize,
+    /// Within a point: separation at the start of the step.
+    pub separation: usize,
+    /// Within a point: normal effective mass.
+    pub normal_mass: usize,
+    /// Within a point: accumulated normal impulse.
+    pub normal_impulse: usize,
+    /// Within a point: tangential effective mass.
+    pub tangent_mass: usize,
+    /// Within a point: accumulated tangential impulse.
+    pub tangent_impulse: usize,
+    /// Vectors in a record.
+    pub stride: usize,
+    /// Whether the tangential quantities have a place.
+    pub has_friction: bool,
+    /// Whether the arms have a place, of body b and of body a.
+    pub has_arms: [bool; 2],
+}
+
+impl Layout {
+    /// The layout for these needs against this kind of body a.
+    pub const fn new(rotation: bool, friction: bool, points: usize, a_has_row: bool) -> Layout {
+        let arm_b = 0;
+        let arm_a = if rotation { 2 } else { 0 };
+        let separation = arm_a + if rotation && a_has_row { 2 } else { 0 };
+        let normal_mass = separation + 1;
+        let normal_impulse = separation + 2;
+        let tangent_mass = separation + 3;
+        let tangent_impulse = separation + 4;
+        let point_stride = separation + if friction { 5 } else { 3 };
+        let first_point = if friction { 3 } else { 2 };
+        Layout {
+            points,
+            friction: 2,
+            first_point,
+            point_stride,
+            arm_b,
+            arm_a,
+            separation,
+            normal_mass,
+            normal_impulse,
+            tangent_mass,
+            tangent_impulse,
+            stride: first_point + points * point_stride,
+            has_friction: friction,
+            has_arms: [rotation, rotation && a_has_row],
+        }
+    }
+
+    /// The layout of a kernel.
+    pub const fn of<N: KernelFeatures, O: Opposite>() -> Layout {
+        Layout::new(N::ROTATION, N::FRICTION, N::POINTS, O::HAS_ROW)
+    }
+
+    /// The layout for values instead of types.
+    pub fn for_features(features: &Features, opposite: OppositeKind) -> Layout {
+        let points = if features.two_points { 2 } else { 1 };
+        Layout::new(features.rotation, features.friction, points, opposite != OppositeKind::Static)
+    }
+
+    /// Where a quantity of point `p` stands.
+    #[inline(always)]
+    pub const fn at(&self, p: usize, quantity: usize) -> usize {
+        self.first_point + p * self.point_stride + quantity
+    }
+
+    /// Bytes per contact: the record's share and the body indices.
+    pub const fn bytes(&self, opposite: OppositeKind) -> usize {
+        4 * self.stride + if matches!(opposite, OppositeKind::Static) { 4 } else { 8 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_do_not_overlap_and_fill_the_record() {
+        for rotation in [false, true] {
+            for friction in [false, true] {
+                for points in [1, 2] {
+                    for has_row in [false, true] {
+                        let l = Layout::new(rotation, friction, points, has_row);
+                        let mut used = vec![0, 1];
+                        if friction {
+                            used.push(l.friction);
+                        }
+                        for p in 0..points {
+                            if rotation {
+                                used.extend([l.at(p, l.arm_b), l.at(p, l.arm_b) + 1]);
+                            }
+                            if rotation && has_row {
+                                used.extend([l.at(p, l.arm_a), l.at(p, l.arm_a) + 1]);
+                            }
+                            used.extend([l.separation, l.normal_mass, l.normal_impulse].map(|q| l.at(p, q)));
+                            if friction {
+                                used.extend([l.tangent_mass, l.tangent_impulse].map(|q| l.at(p, q)));
+                            }
+                        }
+                        used.sort_unstable();
+                        assert_eq!(used, (0..l.stride).collect::<Vec<_>>());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_two_point_manifold_costs_92_bytes_and_a_bare_disc_28() {
+        let full = Layout::for_features(&Features::FULL, OppositeKind::Dynamic);
+        assert_eq!(full.bytes(OppositeKind::Dynamic), 92);
+        let on_ground = Layout::for_features(&Features::FULL, OppositeKind::Static);
+        assert_eq!(on_ground.bytes(OppositeKind::Static), 72);
+        let bare = Layout::for_features(&Features::NONE, OppositeKind::Dynamic);
+        assert_eq!(bare.bytes(OppositeKind::Dynamic), 28);
+    }
+}

@@ -1,0 +1,178 @@
+//! Contacts into constraint records at the start of a step, impulses back at its end.
+
+use super::batches::{Batches, PADDING, Segment};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::sweep::over_segments;
+use crate::engine::contacts::{Contact, quad};
+use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
+
+const INV_MASS: usize = 3;
+const INV_INERTIA: usize = 7;
+
+/// Batches between asking for contacts and reading them.
+const AHEAD: usize = 2;
+
+/// Fills the records of a segment, in lanes throughout: contacts are gathered by quads.
+///
+/// The arms are r × n and r × t = −(r·n); the effective masses 1/k with
+/// k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)², u = n and t.
+///
+/// Lanes without a contact, and points that a contact does not have, get effective mass
+/// zero and impulse zero: whatever velocity they see, their impulse stays zero.
+#[inline(always)]
+fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    contacts: &[Contact],
+) {
+    use quad::*;
+    let layout = const { Layout::of::<N, O>() };
+    let stride = layout.stride;
+    let quads: &[Quad] = bytemuck::cast_slice(contacts);
+    let last_lane = segment.first_lane + segment.batches * L::WIDTH;
+    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
+    let records = &mut buffer[segment.first_vector..][..segment.batches * stride];
+    for (batch, record) in records.chunks_exact_mut(stride).enumerate() {
+        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
+        // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
+        let ahead = lanes.start + AHEAD * L::WIDTH..(lanes.end + AHEAD * L::WIDTH).min(last_lane);
+        let coming = batches.contact.get(ahead).unwrap_or(&[]);
+        prefetch_records::<STRIDE>(quads, coming.iter().map(|&i| if i == PADDING { 0 } else { i }));
+        let mut index = &batches.contact[lanes.clone()];
+        // Only a segment's last batch has empty lanes. They read some contact and ignore it.
+        let (mut replaced, mut present) = ([0; 16], L::splat(1.0));
+        if index[L::WIDTH - 1] == PADDING {
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut present));
+            for (lane, &contact) in index.iter().enumerate() {
+                let padding = contact == PADDING;
+                replaced[lane] = if padding { index[0] } else { contact };
+                floats[lane] = if padding { 0.0 } else { 1.0 };
+            }
+            index = &replaced;
+        }
+        // SAFETY: `Problem::new` checked every row and contact index.
+        let ([nx, ny, count, friction], a, b) = unsafe {
+            (
+                L::gather_quads::<STRIDE, HEADER>(quads, index),
+                if O::MOVES { L::gather(rows, &batches.row_a[lanes.clone()]) } else { [L::zero(); 8] },
+                L::gather(rows, &batches.row_b[lanes]),
+            )
+        };
+        let filled = |value: L| present.select_positive(value, L::zero());
+        (record[0], record[1]) = (filled(nx), filled(ny));
+        if N::FRICTION {
+            record[layout.friction] = filled(friction);
+        }
+        let two = L::splat(2.0).integer_bits();
+        for p in 0..N::POINTS {
+            // SAFETY: as above.
+            let ([ax, ay, bx, by], [separation, _, normal, tangent]) = unsafe {
+                if p == 0 {
+                    (
+                        L::gather_quads::<STRIDE, ANCHORS_0>(quads, index),
+                        L::gather_quads::<STRIDE, STATE_0>(quads, index),
+                    )
+                } else {
+                    (
+                        L::gather_quads::<STRIDE, ANCHORS_1>(quads, index),
+                        L::gather_quads::<STRIDE, STATE_1>(quads, index),
+                    )
+                }
+            };
+            // Counts are integers, compared as the bits of floats.
+            let active = if p == 0 {
+                count.select_equal(L::zero(), L::zero(), present)
+            } else {
+                count.select_equal(two, present, L::zero())
+            };
+            let only = |value: L| active.select_positive(value, L::zero());
+            let arms = |x: L, y: L| [only(x.mul_add(ny, -(y * nx))), only(-(x.mul_add(nx, y * ny)))];
+            let (arms_a, arms_b) = (arms(ax, ay), arms(bx, by));
+            let k = |axis: usize| {
+                let mut k = a[INV_MASS] + b[INV_MASS];
+                if N::ROTATION {
+                    k = (b[INV_INERTIA] * arms_b[axis]).mul_add(arms_b[axis], k);
+                    if O::MOVES {
+                        k = (a[INV_INERTIA] * arms_a[axis]).mul_add(arms_a[axis], k);
+                    }
+                }
+                k
+            };
+            if N::ROTATION {
+                let at = layout.at(p, layout.arm_b);
+                [record[at], record[at + 1]] = arms_b;
+                if O::HAS_ROW {
+                    let at = layout.at(p, layout.arm_a);
+                    [record[at], record[at + 1]] = arms_a;
+                }
+            }
+            record[layout.at(p, layout.separation)] = only(separation);
+            record[layout.at(p, layout.normal_mass)] = only(L::splat(1.0) / k(0));
+            record[layout.at(p, layout.normal_impulse)] = only(normal);
+            if N::FRICTION {
+                record[layout.at(p, layout.tangent_mass)] = only(L::splat(1.0) / k(1));
+                record[layout.at(p, layout.tangent_impulse)] = only(tangent);
+            }
+        }
+    }
+}
+
+/// Fills the records of all segments.
+#[inline(never)]
+pub fn prepare<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    contacts: &[Contact],
+) {
+    over_segments!(prepare_segment, L, N; rows, batches, contacts);
+}
+
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes.
+#[inline(always)]
+fn store_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    _rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    contacts: &mut [Contact],
+) {
+    use quad::*;
+    let layout = const { Layout::of::<N, O>() };
+    let stride = layout.stride;
+    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
+    let records = &buffer[segment.first_vector..][..segment.batches * stride];
+    for (batch, record) in records.chunks_exact(stride).enumerate() {
+        let index = &batches.contact[segment.first_lane + batch * L::WIDTH..][..L::WIDTH];
+        let impulses = |p: usize| {
+            let tangent = if N::FRICTION { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
+            [record[layout.at(p, layout.normal_impulse)], tangent]
+        };
+        let ([n0, t0], [n1, t1]) = (impulses(0), if N::POINTS == 2 { impulses(1) } else { [L::zero(); 2] });
+        if index[L::WIDTH - 1] != PADDING {
+            // SAFETY: `Problem::new` checked every contact index.
+            unsafe {
+                let quads = bytemuck::cast_slice_mut(contacts);
+                L::scatter_halves::<STRIDE, STATE_0, STATE_1>(quads, index, [n0, t0, n1, t1]);
+            }
+            continue;
+        }
+        let floats = [n0, t0, n1, t1];
+        let floats: &[f32] = bytemuck::cast_slice(&floats);
+        for (lane, &contact) in index.iter().enumerate().take_while(|&(_, &contact)| contact != PADDING) {
+            let at = |k: usize| floats[k * L::WIDTH + lane];
+            let [first, second] = &mut contacts[contact as usize].manifold.points;
+            (first.normal_impulse, first.tangent_impulse) = (at(0), at(1));
+            (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
+        }
+    }
+}
+
+/// Writes the accumulated impulses of all segments back to their contacts.
+#[inline(never)]
+pub fn store<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    contacts: &mut [Contact],
+) {
+    over_segments!(store_segment, L, N; rows, batches, contacts);
+}

@@ -1,0 +1,282 @@
+//! Bouncing: one pass at the end of a step, and its own side records.
+//!
+//! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the
+//! speed is known at its start, some way s₀ above (or below) the surface, and the bounce is
+//! applied at its end, at a separation s. In between, the relative normal acceleration a of
+//! free flight changes the speed. Semi-implicit Euler of substep h keeps, in flight, not
+//! v²/2 + a s but the shadow energy
+//!
+//! ```text
+//! E = v²/2 + a (s − v h/2)          (v' = v − a h, s' = s + h v'  ⇒  E' = E)
+//! ```
+//!
+//! so with E₀ from the start of the step, the rebound v > 0 that has e² E₀ at separation s is
+//!
+//! ```text
+//! v = a h/2 + √((a h/2)² + 2 (e² E₀ − a s))
+//! ```
+//!
+//! which is e |v₀| without acceleration. A ball that falls on the ground then returns to e² of
+//! its height whatever the step. Between two bodies that fall together a is zero, also where one
+//! of them is held up from below: what others do to them is not seen.
+//!
+//! Every point that came in faster than the threshold and pushed at all is given the impulse
+//! λ = −m_eff (v_n − v), clamped on the accumulated impulse. Scenes in which nothing bounces have
+//! neither the pass nor the side records.
+//!
+//! Source: `catto2024solver2d` for the placement after the sweeps and for the threshold; the
+//! rebound speed is *derived* here.
+
+use super::batches::{Batches, PADDING, Segment};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::sweep::{arms, over_segments, turn, with_arms};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{Block, BodyRow, Lanes, held};
+use crate::engine::params::RESTITUTION_THRESHOLD;
+use glam::Vec2;
+
+/// Side records: per batch, the acceleration a of approach (m/s²), then per point the energy e² E₀
+/// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
+#[derive(Debug, Default)]
+pub struct Bounces {
+    buffer: Vec<Block>,
+}
+
+const fn stride<N: KernelFeatures>() -> usize {
+    1 + 2 * N::POINTS
+}
+
+impl Bounces {
+    fn records<L: Lanes>(&mut self) -> &mut [L] {
+        bytemuck::cast_slice_mut(&mut self.buffer)
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        held(&self.buffer)
+    }
+
+    /// Bytes in use for `lanes` lanes of `points`-point contacts.
+    pub fn bytes(lanes: usize, points: usize) -> usize {
+        4 * lanes * (1 + 2 * points)
+    }
+}
+
+/// Reads energies before anything moves. `velocity_increments` are the changes of velocity in free flight per
+/// substep `h` (s), a row per body.
+#[inline(never)]
+pub fn prepare<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    bounces: &mut Bounces,
+    contacts: &[Contact],
+    velocity_increments: &[[f32; 4]],
+    h: f32,
+) {
+    let floats = batches.contact.len() * stride::<N>();
+    bounces.buffer.resize(floats.div_ceil(16), Block::default());
+    over_segments!(prepare_segment, L, N; rows, batches, bounces, contacts, velocity_increments, h);
+}
+
+fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    bounces: &mut Bounces,
+    contacts: &[Contact],
+    velocity_increments: &[[f32; 4]],
+    h: f32,
+) {
+    let first = segment.first_lane / L::WIDTH;
+    for batch in 0..segment.batches {
+        let record = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+        for lane in 0..L::WIDTH {
+            let at = segment.first_lane + batch * L::WIDTH + lane;
+            let contact = batches.contact[at];
+            // Lanes without a contact have e = 0 and so no energy.
+            let (e, n) = match contact {
+                PADDING => (0.0, Vec2::ZERO),
+                _ => (contacts[contact as usize].restitution, contacts[contact as usize].manifold.normal),
+            };
+            let velocity_increment = |row: u32| {
+                Vec2::new(velocity_increments[row as usize][0], velocity_increments[row as usize][1])
+            };
+            floats[lane] =
+                -n.dot(velocity_increment(batches.row_b[at]) - velocity_increment(batches.row_a[at])) / h;
+            floats[L::WIDTH + lane] = e;
+        }
+        let points = points::<L, N, O>(rows, batches, segment, batch);
+        let (a, e) = (record[0], record[1]);
+        for (p, [v, s]) in points.into_iter().enumerate().take(N::POINTS) {
+            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+            let fast = (L::splat(-RESTITUTION_THRESHOLD) - v).select_positive(energy, L::zero());
+            record[1 + 2 * p] = e * e * fast;
+            record[2 + 2 * p] = L::zero();
+        }
+    }
+}
+
+/// Normal velocity (m/s) and separation (m) of each point of a batch, as bodies now are.
+#[inline(always)]
+fn points<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &[BodyRow],
+    batches: &Batches,
+    segment: &Segment,
+    batch: usize,
+) -> [[L; 2]; 2] {
+    let layout = const { Layout::of::<N, O>() };
+    let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
+    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
+    let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+    // SAFETY: `Problem::new` checked every row index against the rows.
+    let b = unsafe { L::gather(rows, &batches.row_b[lanes.clone()]) };
+    let a = if O::HAS_ROW {
+        // SAFETY: as above.
+        unsafe { L::gather(rows, &batches.row_a[lanes]) }
+    } else {
+        [L::zero(); 8]
+    };
+    let along_n = |at: usize| record[0].mul_add(b[at] - a[at], record[1] * (b[at + 1] - a[at + 1]));
+    let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[6]), turn(b[6]));
+    std::array::from_fn(|p| {
+        if p >= N::POINTS {
+            return [L::zero(); 2];
+        }
+        let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+        let separation = record[layout.at(p, layout.separation)] + along_n(4);
+        let separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+        [
+            with_arms::<L, N, O>(along_n(0), [a[2], b[2]], arm_n),
+            with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t),
+        ]
+    })
+}
+
+/// Notes the largest impulse of each point so far.
+#[inline(never)]
+pub fn track<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    bounces: &mut Bounces,
+) {
+    over_segments!(track_segment, L, N; rows, batches, bounces);
+}
+
+fn track_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    _rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    bounces: &mut Bounces,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let first = segment.first_lane / L::WIDTH;
+    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
+    for batch in 0..segment.batches {
+        let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+        let bounce = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+        for p in 0..N::POINTS {
+            bounce[2 + 2 * p] = bounce[2 + 2 * p].max(record[layout.at(p, layout.normal_impulse)]);
+        }
+    }
+}
+
+/// The bounce itself, contact after contact in sweep order.
+#[inline(never)]
+pub fn apply<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    bounces: &mut Bounces,
+    h: f32,
+) {
+    over_segments!(apply_segment, L, N; rows, batches, bounces, h);
+}
+
+fn apply_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    bounces: &mut Bounces,
+    h: f32,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let first = segment.first_lane / L::WIDTH;
+    for batch in 0..segment.batches {
+        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
+        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+        for p in 0..N::POINTS {
+            let [vn, separation] = points::<L, N, O>(rows, batches, segment, batch)[p];
+            let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
+            let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+            let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
+            let half = a * L::splat(0.5 * h);
+            let left = half * half + L::splat(2.0) * (energy - a * separation);
+            let rebound = half + left.max(L::zero()).sqrt();
+            let old = record[layout.at(p, layout.normal_impulse)];
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let target = mass.neg_mul_add(vn - rebound, old).max(L::zero());
+            let new = bounced(energy, peak, target, old);
+            record[layout.at(p, layout.normal_impulse)] = new;
+            let delta = new - old;
+            let n = [record[0], record[1]];
+            let arms = |at: usize| record[layout.at(p, at)];
+            let (x, y) = (n[0] * delta, n[1] * delta);
+            // SAFETY: `Problem::new` checked every row index against the rows.
+            unsafe {
+                let index = &batches.row_b[lanes.clone()];
+                let b = L::gather(rows, index);
+                let w = if N::ROTATION { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
+                L::scatter_velocity(rows, index, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
+                if O::MOVES {
+                    let index = &batches.row_a[lanes.clone()];
+                    let a = L::gather(rows, index);
+                    let w =
+                        if N::ROTATION { (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]) } else { a[2] };
+                    let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
+                    L::scatter_velocity(rows, index, v);
+                }
+            }
+        }
+    }
+}
+
+/// `yes` where a point with this energy and this largest impulse bounces, else `no`.
+#[inline(always)]
+fn bounced<L: Lanes>(energy: L, peak: L, yes: L, no: L) -> L {
+    energy.select_positive(peak.select_positive(yes, no), no)
+}
+
+/// Forgets the impulses of points that bounced: they say nothing about the next step.
+#[inline(never)]
+pub fn forget<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    bounces: &mut Bounces,
+) {
+    over_segments!(forget_segment, L, N; rows, batches, bounces);
+}
+
+fn forget_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    _rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    bounces: &mut Bounces,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let first = segment.first_lane / L::WIDTH;
+    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
+    for batch in 0..segment.batches {
+        let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+        for p in 0..N::POINTS {
+            let mut forget = |at: usize| {
+                let at = layout.at(p, at);
+                record[at] = bounced(bounce[1 + 2 * p], bounce[2 + 2 * p], L::zero(), record[at]);
+            };
+            forget(layout.normal_impulse);
+            if N::FRICTION {
+                forget(layout.tangent_impulse);
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What a caller of the engine can get wrong.
+//!
+//! Hot loops are infallible. A simulation that diverges is an *outcome*
+//! ([`crate::engine::world::Divergence`]), not an error.
+
+use std::fmt;
+
+/// A value or a name that the engine refuses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// A value is out of its range.
+    Invalid {
+        /// Where the value stands, for example `vertices`.
+        place: String,
+        /// What is wrong with it, with the value itself.
+        message: String,
+    },
+    /// A name that is not in its table.
+    Unknown {
+        /// `solver`, `parameter`, …
+        kind: &'static str,
+        /// The name as given.
+        name: String,
+        /// The names there are.
+        known: Vec<&'static str>,
+    },
+}
+
+impl Error {
+    /// An out-of-range value at `place`.
+    pub fn invalid(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Error::Invalid { place: place.into(), message: message.into() }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Invalid { place, message } => write!(f, "{place}: {message}"),
+            Error::Unknown { kind, name, known } => {
+                write!(f, "unknown {kind} '{name}': one of {}", known.join(", "))
+            }
+        }
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,351 @@
+//! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
+
+use super::hull::HullRow;
+use super::hull_circle::HullCircle;
+use super::hulls::Hulls;
+use super::lanes::{PoseRow, Poses, ShapePair, ShapeRow, Touch};
+use super::{circles, rectangles};
+use crate::engine::contacts::{Contact, quad};
+use crate::engine::lanes::{LaneWidth, Lanes, Quad, held, prefetch_records};
+use crate::engine::shapes::Shape;
+use bytemuck::bytes_of;
+use wide::{f32x4, f32x8, f32x16};
+
+/// What kernels tell apart in a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// A polygon with four right angles.
+    Rectangle,
+    /// A circle.
+    Circle,
+    /// Any other polygon, or a capsule.
+    Hull,
+    /// A segment.
+    Segment,
+}
+
+/// Which kernel a pair of shapes has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`rectangles`]
+    Rectangles,
+    /// [`circles`]
+    Circles,
+    /// [`super::hulls`]
+    Hulls,
+    /// [`super::hull_circle`]
+    HullCircle,
+    /// The same with a and b exchanged.
+    CircleHull,
+}
+
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 5] =
+        [Kind::Rectangles, Kind::Circles, Kind::Hulls, Kind::HullCircle, Kind::CircleHull];
+
+    /// The kernel of such a pair. Two segments have none, because they never touch.
+    pub fn of(a: Class, b: Class) -> Option<Self> {
+        match (a, b) {
+            (Class::Rectangle, Class::Rectangle) => Some(Kind::Rectangles),
+            (Class::Circle, Class::Circle) => Some(Kind::Circles),
+            (Class::Segment, Class::Segment) => None,
+            (_, Class::Circle) => Some(Kind::HullCircle),
+            (Class::Circle, _) => Some(Kind::CircleHull),
+            _ => Some(Kind::Hulls),
+        }
+    }
+}
+
+/// Shapes as the kernels read them, by number.
+#[derive(Debug, Default)]
+pub struct Shapes {
+    rows: Vec<ShapeRow>,
+    hulls: Vec<HullRow>,
+}
+
+/// A shape's row is looked for among so many of the last ones.
+const RECENT: usize = 64;
+
+impl Shapes {
+    /// Adds a shape; returns its class and its number. Shapes that are alike to the bit share one, as
+    /// far as they come one soon after the other: most scenes then have few rows, which stay in the
+    /// cache, and many batches of a single one.
+    pub fn push(&mut self, shape: &Shape) -> (Class, u32) {
+        let (class, row) = ShapeRow::new(shape);
+        let hull = HullRow::new(shape);
+        let is_same = |&i: &usize| {
+            bytes_of(&self.rows[i]) == bytes_of(&row) && bytes_of(&self.hulls[i]) == bytes_of(&hull)
+        };
+        let count = self.rows.len();
+        let number = (count.saturating_sub(RECENT)..count).rev().find(is_same).unwrap_or_else(|| {
+            self.rows.push(row);
+            self.hulls.push(hull);
+            count
+        });
+        (class, number as u32)
+    }
+}
+
+/// Pairs of one kind, one entry each in every list.
+#[derive(Debug, Default)]
+pub struct Jobs {
+    /// What the caller calls the pair.
+    pub name: Vec<u32>,
+    /// Bodies of a and b.
+    pub bodies: [Vec<u32>; 2],
+    /// Numbers of shapes a and b ([`Shapes::push`]).
+    pub shapes: [Vec<u32>; 2],
+    /// The contact that holds the manifold, or [`NO_CONTACT`].
+    pub contact: Vec<u32>,
+}
+
+/// A pair that has not touched so far.
+pub const NO_CONTACT: u32 = u32::MAX;
+
+impl Jobs {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        [name, a, b, c, d, contact].map(held).iter().sum()
+    }
+
+    /// Lists those of `pairs` that `job` keeps, instead of what was listed. `job` returns whether it
+    /// does, and the pair's bodies, shapes and contact.
+    ///
+    /// Every pair is written, behind those kept before it: no branch waits for the decision.
+    #[inline(always)]
+    pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        let mut lists = [name, a, b, c, d, contact];
+        let mut kept = 0;
+        {
+            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
+                list.resize(pairs.len(), 0);
+                &mut list[..pairs.len()]
+            });
+            for &pair in pairs {
+                let (keep, bodies, shapes, of_pair) = job(pair);
+                name[kept] = pair;
+                [a[kept], b[kept]] = bodies;
+                [c[kept], d[kept]] = shapes;
+                contact[kept] = of_pair;
+                kept += usize::from(keep);
+            }
+        }
+        for list in lists {
+            list.truncate(kept);
+        }
+    }
+}
+
+/// What the kernels read besides the jobs.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    /// Poses by body.
+    pub poses: &'a [PoseRow],
+    /// Shapes by number.
+    pub shapes: &'a Shapes,
+    /// Points farther apart are left out (m).
+    pub speculative: f32,
+}
+
+/// Collides every job and updates its contact: geometry anew, impulses kept where the feature
+/// stays the same. Returns the number of points.
+///
+/// A contact that has no point any more gets count 0, and `change(name, contact)` is called for
+/// it; a pair without a contact that touches is reported by the same call. Behind `contacts`
+/// stands room for one more batch, in which such manifolds are made.
+///
+/// # Panics
+/// If a job names a body, shape or contact that does not exist: the check on which the gathers
+/// and scatters below rest.
+pub fn update(
+    kind: Kind,
+    width: LaneWidth,
+    jobs: &Jobs,
+    input: Input,
+    contacts: &mut Vec<Contact>,
+    change: impl FnMut(u32, &Contact),
+) -> usize {
+    let count = jobs.name.len();
+    // The largest of each list is found in lanes, where a search for the first bad one would not be.
+    let below = |list: &[u32], limit: usize| {
+        let largest = list.iter().fold(0, |most, &i| i.max(most));
+        assert!(list.len() == count && (count == 0 || (largest as usize) < limit));
+    };
+    jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
+    jobs.shapes.iter().for_each(|list| below(list, input.shapes.rows.len()));
+    let made = contacts.len();
+    let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
+    assert!(jobs.contact.len() == count && beyond as usize <= made);
+    contacts.resize(made + width.lanes(), Contact::default());
+    let run = match width {
+        LaneWidth::W1 => run::<f32>,
+        LaneWidth::W4 => run::<f32x4>,
+        LaneWidth::W8 => run::<f32x8>,
+        LaneWidth::W16 => run::<f32x16>,
+    };
+    let points = run(kind, jobs, input, contacts, made, change);
+    contacts.truncate(made);
+    points
+}
+
+fn run<L: Lanes>(
+    kind: Kind,
+    jobs: &Jobs,
+    input: Input,
+    contacts: &mut [Contact],
+    made: usize,
+    change: impl FnMut(u32, &Contact),
+) -> usize {
+    let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
+    // SAFETY, of all closures: `update` checked all indices; there are as many rows as hulls, and
+    // padding repeats a pair.
+    match kind {
+        Kind::Rectangles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            rectangles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Circles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            let poses = Poses::<L>::gather(poses, bodies);
+            circles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+        }),
+        Kind::Hulls => {
+            let mut pair = Hulls::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(&poses, hulls, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::HullCircle => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+                let poses = Poses::gather(poses, bodies);
+                pair.gather(hulls, rows, shapes);
+                pair.collide(&poses, speculative)
+            })
+        }
+        Kind::CircleHull => {
+            let mut pair = HullCircle::<L>::empty();
+            run_kernel(jobs, contacts, made, change, |bodies, [a, b]| unsafe {
+                let poses = Poses::gather(poses, bodies).swapped();
+                pair.gather(hulls, rows, [b, a]);
+                pair.collide(&poses, speculative).swapped()
+            })
+        }
+    }
+}
+
+/// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
+/// given their bodies and shapes.
+#[inline(always)]
+fn run_kernel<L: Lanes>(
+    jobs: &Jobs,
+    contacts: &mut [Contact],
+    made: usize,
+    mut change: impl FnMut(u32, &Contact),
+    mut kernel: impl FnMut([&[u32]; 2], [&[u32]; 2]) -> Touch<L>,
+) -> usize {
+    let mut points = 0_u32;
+    let count = jobs.name.len();
+    for first in (0..count).step_by(L::WIDTH) {
+        // The last batch is filled up with its first pair, whose result goes to the spare room, as
+        // do those of pairs without a contact. No impulse is ever left there.
+        let mut padded = [[0; 16]; 4];
+        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1]];
+        let filled = (count - first).min(L::WIDTH);
+        let ends = lists.map(|list| &list[first..]);
+        let [body_a, body_b, shape_a, shape_b] = if filled == L::WIDTH {
+            ends
+        } else {
+            for (padded, list) in padded.iter_mut().zip(ends) {
+                padded.fill(list[0]);
+                padded[..filled].copy_from_slice(list);
+            }
+            [&padded[0][..], &padded[1][..], &padded[2][..], &padded[3][..]]
+        };
+        let mut known = [NO_CONTACT; 16];
+        known[..filled].copy_from_slice(&jobs.contact[first..first + filled]);
+        let mut target = [0; 16];
+        for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
+            *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
+        }
+        // Contacts lie farther away than poses and shapes: those of the next batch are asked for now.
+        let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
+        let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
+        prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
+        let touch = kernel([body_a, body_b], [shape_a, shape_b]);
+        // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
+        // no two lanes have the same.
+        unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };
+        // Counts in memory once more, so that a batch without changes is one comparison.
+        let mut count = [0.0_f32; 16];
+        count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);
+        let mut is_changed = false;
+        for (&count, &known) in count.iter().zip(&known) {
+            points += count as u32;
+            is_changed |= (count > 0.0) != (known != NO_CONTACT);
+        }
+        if !is_changed {
+            continue;
+        }
+        for lane in 0..filled {
+            if (count[lane] > 0.0) != (known[lane] != NO_CONTACT) {
+                change(jobs.name[first + lane], &contacts[target[lane] as usize]);
+            }
+        }
+    }
+    points as usize
+}
+
+/// Writes manifolds into contacts; a point keeps the impulses of the old one of its name.
+///
+/// Integers are moved and compared as the bits of floats: equal bits of numbers below 2²³ are
+/// equal (tiny) floats. The name of an old point that is not in use is NaN, which equals nothing.
+///
+/// # Safety
+/// `target` holds at least `L::WIDTH` entries, all different, each a contact of which `contacts`
+/// has all quads.
+#[inline(always)]
+unsafe fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: &[u32]) {
+    use quad::*;
+    // SAFETY: the caller's promise.
+    let (header, old) = unsafe {
+        (
+            L::gather_quads::<STRIDE, HEADER>(contacts, target),
+            [
+                L::gather_quads::<STRIDE, STATE_0>(contacts, target),
+                L::gather_quads::<STRIDE, STATE_1>(contacts, target),
+            ],
+        )
+    };
+    let (zero, nothing) = (L::zero(), L::splat(f32::NAN));
+    let count = touch.count.integer_bits();
+    let two = L::splat(2.0).integer_bits();
+    let old_name =
+        [header[2].select_equal(zero, nothing, old[0][1]), header[2].select_equal(two, old[1][1], nothing)];
+    let state = |p: usize| {
+        let name = touch.feature[p].integer_bits();
+        let used = touch.count - L::splat(p as f32);
+        let keep = |k: usize| {
+            let matched =
+                name.select_equal(old_name[0], old[0][k], name.select_equal(old_name[1], old[1][k], zero));
+            used.select_positive(matched, zero)
+        };
+        [touch.separation[p], name, keep(2), keep(3)]
+    };
+    let anchors =
+        |p: usize| [touch.anchor_a[p][0], touch.anchor_a[p][1], touch.anchor_b[p][0], touch.anchor_b[p][1]];
+    let header = [touch.normal[0], touch.normal[1], count, header[3]];
+    let (state_0, state_1) = (state(0), state(1));
+    // SAFETY: the caller's promise.
+    unsafe {
+        L::scatter_quads::<STRIDE, ANCHORS_0>(contacts, target, anchors(0));
+        L::scatter_quads::<STRIDE, STATE_0>(contacts, target, state_0);
+        L::scatter_quads::<STRIDE, ANCHORS_1>(contacts, target, anchors(1));
+        L::scatter_quads::<STRIDE, STATE_1>(contacts, target, state_1);
+        L::scatter_quads::<STRIDE, HEADER>(contacts, target, header);
+    }
+}

@@ -1,0 +1,166 @@
+//! Distance of two convex cores by their support functions alone.
+//!
+//! The distance is that of the origin from M = B ⊖ A. Keep a simplex of one or two
+//! vertices of M and v, its point nearest to the origin; the support of M against v
+//! bounds the distance from below by v·w/|v|. Stop when v meets the bound; else add w
+//! and drop what the new nearest point does not need.
+//!
+//! Everything is `f64`, so against the `f32` shapes it serves as the truth.
+//!
+//! Source: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4(2), 1988.
+
+use crate::engine::shapes::{Pose, Shape};
+use glam::DVec2;
+
+/// Nearest points of two cores (the shapes without their radii). Where the cores
+/// overlap, the points are any two vertices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// m; 0 where the cores share a point.
+    pub distance: f64,
+    /// Nearest point of a, from a's centre of mass, world axes (m).
+    pub point_a: DVec2,
+    /// Nearest point of b, from a's centre of mass, world axes (m).
+    pub point_b: DVec2,
+    /// Unit vector from a to b; zero where the distance is.
+    pub normal: DVec2,
+    /// Supports evaluated after the first.
+    pub iterations: u32,
+}
+
+/// Relative progress below which the distance is final: rounding in `f64`, with room.
+const TOLERANCE: f64 = 1.0e-14;
+
+/// Every step of a convergent run brings a new vertex of M, which has at most 16.
+const MAX_ITERATIONS: u32 = 64;
+
+/// Distance of the cores of `a` and `b`.
+pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Distance {
+    let cores = Cores::new(a, pose_a, b, pose_b);
+    let mut simplex = Simplex { support: [cores.support(DVec2::X); 2], weight: [1.0, 0.0] };
+    let mut iterations = 0;
+    loop {
+        let v = simplex.nearest();
+        let w = cores.support(-v);
+        iterations += 1;
+        let gap = v.length_squared() - v.dot(w.position);
+        if gap <= TOLERANCE * v.length_squared() || iterations >= MAX_ITERATIONS {
+            return simplex.distance(iterations);
+        }
+        match simplex.extended(w) {
+            Some(next) if next.nearest().length_squared() < v.length_squared() => simplex = next,
+            Some(_) => return simplex.distance(iterations),
+            None => {
+                let zero = Simplex { support: [simplex.support[0]; 2], weight: [1.0, 0.0] };
+                return Distance { distance: 0.0, normal: DVec2::ZERO, ..zero.distance(iterations) };
+            }
+        }
+    }
+}
+
+/// A vertex of M with the points of a and b it is the difference of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Support {
+    pub position: DVec2,
+    point_a: DVec2,
+    point_b: DVec2,
+}
+
+/// The vertices of both cores, world axes, from a's centre of mass.
+pub(super) struct Cores {
+    a: Vec<DVec2>,
+    b: Vec<DVec2>,
+}
+
+impl Cores {
+    pub fn new(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Self {
+        let place = |shape: &Shape, rotation: DVec2, offset: DVec2| {
+            let mut vertices = Vec::new();
+            shape.for_each_vertex(|v| vertices.push(offset + rotation.rotate(v.as_dvec2())));
+            vertices
+        };
+        let centers = pose_b.position.as_dvec2() - pose_a.position.as_dvec2();
+        Self {
+            a: place(a, pose_a.rotation.as_dvec2(), DVec2::ZERO),
+            b: place(b, pose_b.rotation.as_dvec2(), centers),
+        }
+    }
+
+    /// The vertex of M = B ⊖ A farthest along `direction`.
+    pub fn support(&self, direction: DVec2) -> Support {
+        let farthest = |vertices: &[DVec2], direction: DVec2| {
+            let mut best = vertices[0];
+            for &v in vertices {
+                if v.dot(direction) > best.dot(direction) {
+                    best = v;
+                }
+            }
+            best
+        };
+        let (point_a, point_b) = (farthest(&self.a, -direction), farthest(&self.b, direction));
+        Support { position: point_b - point_a, point_a, point_b }
+    }
+}
+
+/// One or two vertices of M (the second unused if its weight is 0) and the
+/// barycentric weights of the nearest point.
+#[derive(Clone, Copy, Debug)]
+struct Simplex {
+    support: [Support; 2],
+    weight: [f64; 2],
+}
+
+impl Simplex {
+    fn nearest(&self) -> DVec2 {
+        self.weight[0] * self.support[0].position + self.weight[1] * self.support[1].position
+    }
+
+    /// The point of the segment p–q nearest to the origin.
+    fn segment(p: Support, q: Support) -> Simplex {
+        let edge = q.position - p.position;
+        let t = -p.position.dot(edge) / edge.length_squared();
+        // Not a number where p = q.
+        if t.is_nan() || t <= 0.0 {
+            Simplex { support: [p, q], weight: [1.0, 0.0] }
+        } else if t >= 1.0 {
+            Simplex { support: [q, p], weight: [1.0, 0.0] }
+        } else {
+            Simplex { support: [p, q], weight: [1.0 - t, t] }
+        }
+    }
+
+    /// The nearest simplex of this one and `w`; `None` if the three surround the origin.
+    fn extended(&self, w: Support) -> Option<Simplex> {
+        let [p, q] = self.support;
+        if self.weight[1] == 0.0 {
+            return Some(Simplex::segment(p, w));
+        }
+        // The origin is inside if all three edges see it on the side of the third vertex.
+        let side = |u: Support, v: Support| u.position.perp_dot(v.position);
+        let (s0, s1, s2) = (side(p, q), side(q, w), side(w, p));
+        if (s0 >= 0.0 && s1 >= 0.0 && s2 >= 0.0) || (s0 <= 0.0 && s1 <= 0.0 && s2 <= 0.0) {
+            return None;
+        }
+        // Outside, the nearest point is on an edge at w: v was nearest on p–q.
+        let (first, second) = (Simplex::segment(p, w), Simplex::segment(q, w));
+        Some(if first.nearest().length_squared() <= second.nearest().length_squared() {
+            first
+        } else {
+            second
+        })
+    }
+
+    fn distance(&self, iterations: u32) -> Distance {
+        let mix = |of: fn(&Support) -> DVec2| {
+            self.weight[0] * of(&self.support[0]) + self.weight[1] * of(&self.support[1])
+        };
+        let v = self.nearest();
+        Distance {
+            distance: v.length(),
+            point_a: mix(|s| s.point_a),
+            point_b: mix(|s| s.point_b),
+            normal: v.normalize_or_zero(),
+            iterations,
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Polygons, capsules and segments as the lane kernels read them.
+
+use super::lanes::only;
+use crate::engine::lanes::{Lanes, Quad};
+use crate::engine::params::MAX_POLYGON_VERTICES;
+use crate::engine::shapes::Shape;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+
+/// A rounded convex hull in its body's frame, counter-clockwise: nine quads.
+///
+/// Slots past the last vertex repeat it and its face. A repeated vertex changes no minimum over
+/// vertices and a repeated face no maximum over faces, so kernels may run over more slots than a
+/// hull has. Where values tie they prefer the later slot: the last slot that they run over,
+/// after which comes vertex 0, then stands for the last vertex however many there are.
+///
+/// A capsule or segment is the rectangle a, a, b, b of no width. Its two end faces have no length
+/// but a normal along the axis; without them no axis would tell collinear capsules apart. The side
+/// to the left of a → b is the last, and so the one that a point on the axis is nearest to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct HullRow {
+    /// Rounding radius (m), slot of the last vertex, 1 for a capsule or segment, and 0.
+    pub head: [f32; 4],
+    /// Each vertex and the outward normal of the face from it to the next: `[x, y, nx, ny]` (m, 1).
+    pub corners: [[f32; 4]; MAX_POLYGON_VERTICES],
+}
+
+/// Quads of a [`HullRow`].
+const STRIDE: usize = size_of::<HullRow>() / 16;
+
+impl HullRow {
+    /// The row of a shape; a circle has none.
+    pub fn new(shape: &Shape) -> Self {
+        let corner = |v: Vec2, n: Vec2| [v.x, v.y, n.x, n.y];
+        let flat = |a: Vec2, b: Vec2, radius: f32| {
+            let along = (b - a).normalize_or(Vec2::X);
+            let [end_a, right, end_b, left] = [-along, -along.perp(), along, along.perp()];
+            let corners = [corner(a, end_a), corner(a, right), corner(b, end_b), corner(b, left)];
+            HullRow { head: [radius, 3.0, 1.0, 0.0], corners: std::array::from_fn(|i| corners[i.min(3)]) }
+        };
+        match *shape {
+            Shape::Polygon(p) => HullRow {
+                head: [p.radius, p.count as f32 - 1.0, 0.0, 0.0],
+                corners: std::array::from_fn(|i| corner(p.vertices[i], p.normals[i])),
+            },
+            Shape::Capsule { a, b, radius } => flat(a, b, radius),
+            Shape::Segment { a, b } => flat(a, b, 0.0),
+            Shape::Circle { .. } => HullRow::default(),
+        }
+    }
+}
+
+/// Hulls in lanes.
+pub struct Hull<L> {
+    /// As [`HullRow::corners`]. Only so many slots are filled as the batch has.
+    pub corners: [[L; 4]; MAX_POLYGON_VERTICES],
+    /// As [`HullRow::head`].
+    pub head: [L; 4],
+}
+
+impl<L: Lanes> Hull<L> {
+    /// Room for hulls.
+    pub fn empty() -> Self {
+        Hull { corners: [[L::zero(); 4]; MAX_POLYGON_VERTICES], head: [L::zero(); 4] }
+    }
+
+    /// Reads the heads of `L::WIDTH` hulls and returns the largest number of slots that one has.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather_heads(&mut self, rows: &[HullRow], index: &[u32]) -> usize {
+        if let Some(row) = only(index, L::WIDTH) {
+            self.head = rows[row].head.map(L::splat);
+            return (rows[row].head[1] as usize + 1).min(MAX_POLYGON_VERTICES);
+        }
+        // SAFETY: the caller keeps the indices in bounds.
+        self.head = unsafe { L::gather_quads::<STRIDE, 0>(bytemuck::cast_slice(rows), index) };
+        let last = bytemuck::cast_slice(std::slice::from_ref(&self.head[1]));
+        let most = last.iter().fold(0.0_f32, |most, &last| if last > most { last } else { most });
+        (most as usize + 1).min(MAX_POLYGON_VERTICES)
+    }
+
+    /// Reads the first `count` corners of `L::WIDTH` hulls and moves each by `place`.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather_corners(
+        &mut self,
+        rows: &[HullRow],
+        index: &[u32],
+        count: usize,
+        place: impl Fn([L; 4]) -> [L; 4],
+    ) {
+        if let Some(row) = only(index, L::WIDTH) {
+            for (corner, from) in self.corners[..count].iter_mut().zip(&rows[row].corners) {
+                *corner = place(from.map(L::splat));
+            }
+            return;
+        }
+        let quads: &[Quad] = bytemuck::cast_slice(rows);
+        let mut first = [0; 16];
+        for (first, &row) in first.iter_mut().zip(&index[..L::WIDTH]) {
+            *first = row * STRIDE as u32 + 1;
+        }
+        for (slot, corner) in self.corners[..count].iter_mut().enumerate() {
+            // SAFETY: the caller keeps the indices in bounds, and a row has more slots than `count`.
+            *corner = place(unsafe { L::gather_quads::<1, 0>(&quads[slot..], &first) });
+        }
+    }
+}

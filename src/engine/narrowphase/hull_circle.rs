@@ -1,0 +1,100 @@
+//! A rounded hull and a circle, in lanes: the nearest point of the core to the circle's centre.
+//!
+//! The face farthest below the centre carries that point (see [`super::hulls`], with a single
+//! point for the other hull). With h the height of the centre over that face, and o by how far it
+//! is past one of its ends, the centre is h n + o n⊥ from it: along n itself over the face, so
+//! that long segments round nothing, and inside the core.
+
+use super::hull::{Hull, HullRow};
+use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate};
+use crate::engine::lanes::Lanes;
+
+/// Hulls as a, circles as b.
+pub struct HullCircle<L> {
+    hull: Hull<L>,
+    /// The circle's centre in its body's frame, and its radius (m).
+    circle: ([L; 2], L),
+    /// Slots in use.
+    count: usize,
+}
+
+impl<L: Lanes> HullCircle<L> {
+    /// Room for `L::WIDTH` pairs.
+    pub fn empty() -> Self {
+        HullCircle { hull: Hull::empty(), circle: ([L::zero(); 2], L::zero()), count: 0 }
+    }
+
+    /// Reads `L::WIDTH` pairs.
+    ///
+    /// # Safety
+    /// Both lists hold at least `L::WIDTH` entries, those of `a` less than `hulls.len()`, those of
+    /// `b` less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather(&mut self, hulls: &[HullRow], rows: &[ShapeRow], [a, b]: [&[u32]; 2]) {
+        // SAFETY: the caller keeps the indices in bounds.
+        unsafe {
+            self.count = self.hull.gather_heads(hulls, a);
+            self.hull.gather_corners(hulls, a, self.count, |corner| corner);
+            let [place, size] = ShapeRow::gather::<L>(rows, b);
+            self.circle = ([place[0], place[1]], size[2]);
+        }
+    }
+
+    /// Their contacts; those farther apart than `speculative` (m) are left out.
+    #[inline(always)]
+    pub fn collide(&self, poses: &Poses<L>, speculative: f32) -> Touch<L> {
+        let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
+        let [rotation_a, rotation_b] = poses.rotation;
+        let (center, radius) = (rotate(rotation_b, self.circle.0), self.circle.1);
+        let c = unrotate(rotation_a, [poses.centers[0] + center[0], poses.centers[1] + center[1]]);
+        let corners = &self.hull.corners[..self.count];
+        let mut height = L::splat(f32::NEG_INFINITY);
+        let mut face = [zero; 6];
+        for (i, &[x, y, nx, ny]) in corners.iter().enumerate() {
+            let [next_x, next_y, ..] = corners[if i + 1 == corners.len() { 0 } else { i + 1 }];
+            let over = dot([nx, ny], [c[0] - x, c[1] - y]);
+            let lower = height - over;
+            height = lower.select_positive(height, over);
+            let new = [x, y, nx, ny, next_x, next_y];
+            face = std::array::from_fn(|k| lower.select_positive(face[k], new[k]));
+        }
+        let [x, y, nx, ny, next_x, next_y] = face;
+        let (n, t) = ([nx, ny], perp([nx, ny]));
+        let (along, length) = (dot(t, [c[0] - x, c[1] - y]), dot(t, [next_x - x, next_y - y]));
+        let past = along - along.min(length).max(zero);
+        let slant = height.mul_add(height, past * past).sqrt();
+        // Past an end, and farther than a length without a direction.
+        let corner = height.min(abs(past)).min(slant - L::splat(f32::MIN_POSITIVE));
+        let distance = corner.select_positive(slant, height);
+        let inverse = one / corner.select_positive(slant, one);
+        let normal = [
+            corner.select_positive(height.mul_add(n[0], past * t[0]) * inverse, n[0]),
+            corner.select_positive(height.mul_add(n[1], past * t[1]) * inverse, n[1]),
+        ];
+        let normal = rotate(rotation_a, normal);
+        let separation = distance - (self.hull.head[0] + radius);
+        // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
+        // normal, and friction is all that turns it. a's follows from the centres of mass.
+        let arm = half.mul_add(separation, radius);
+        let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
+        let anchor_a = [anchor_b[0] + poses.centers[0], anchor_b[1] + poses.centers[1]];
+        Touch {
+            normal,
+            count: (separation - L::splat(speculative)).select_positive(zero, one),
+            anchor_a: [anchor_a; 2],
+            anchor_b: [anchor_b; 2],
+            separation: [separation; 2],
+            feature: [zero; 2],
+        }
+    }
+}
+
+impl HullCircle<f32> {
+    /// A single pair.
+    pub fn new(hull: HullRow, row: ShapeRow) -> Self {
+        let mut pair = Self::empty();
+        // SAFETY: one index each, less than 1.
+        unsafe { pair.gather(&[hull], &[row], [&[0], &[0]]) };
+        pair
+    }
+}

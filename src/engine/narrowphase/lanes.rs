@@ -1,0 +1,242 @@
+//! What the narrow phase reads and writes in lanes.
+
+use super::batch::Class;
+use crate::engine::contacts::{Manifold, ManifoldPoint};
+use crate::engine::lanes::{Lanes, Quad};
+use crate::engine::shapes::{Polygon, Pose, Shape};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
+
+/// A body's pose as two quads.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct PoseRow {
+    /// Centre of mass and what it is short of: `[x, y, x rest, y rest]` (m).
+    pub position: [f32; 4],
+    /// `[cos θ, sin θ, 0, 0]`
+    pub rotation: [f32; 4],
+}
+
+impl PoseRow {
+    /// A pose without rests.
+    pub fn new(pose: &Pose) -> Self {
+        let (p, q) = (pose.position, pose.rotation);
+        PoseRow { position: [p.x, p.y, 0.0, 0.0], rotation: [q.x, q.y, 0.0, 0.0] }
+    }
+}
+
+/// A rectangle or circle, as two quads in its body's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct ShapeRow {
+    /// `[center x, center y, axis x, axis y]` (m, 1): the axis is the outward normal of face 1.
+    pub place: [f32; 4],
+    /// Half extents along the axis and across it, rounding radius (m), and 0. A circle has the
+    /// radius alone.
+    pub size: [f32; 4],
+}
+
+/// Corners may be this far from those of the rectangle through them, relative to its size (1):
+/// a few roundings.
+const RECTANGLE_TOLERANCE: f32 = 1e-6;
+
+impl ShapeRow {
+    /// The row of a shape and its class. A shape that is neither rectangle nor circle has none.
+    pub fn new(shape: &Shape) -> (Class, Self) {
+        match *shape {
+            Shape::Circle { center, radius } => {
+                let place = [center.x, center.y, 1.0, 0.0];
+                (Class::Circle, ShapeRow { place, size: [0.0, 0.0, radius, 0.0] })
+            }
+            Shape::Segment { .. } => (Class::Segment, ShapeRow::default()),
+            Shape::Capsule { .. } => (Class::Hull, ShapeRow::default()),
+            Shape::Polygon(ref polygon) => match Self::rectangle(polygon) {
+                Some(row) => (Class::Rectangle, row),
+                None => (Class::Hull, ShapeRow::default()),
+            },
+        }
+    }
+
+    /// The row of a rectangle, rounded or not.
+    fn rectangle(polygon: &Polygon) -> Option<Self> {
+        let v @ [_, _, _, _] = polygon.vertices() else { return None };
+        let axis = polygon.normals[1];
+        let center = 0.25 * ((v[0] + v[2]) + (v[1] + v[3]));
+        let half = Vec2::new(0.5 * axis.dot(v[1] - v[0]), 0.5 * axis.perp_dot(v[2] - v[1]));
+        let (x, y) = (half.x * axis, half.y * axis.perp());
+        let corners = [center - x - y, center + x - y, center + x + y, center - x + y];
+        // Rounding is relative to the coordinates, which may be larger than the shape.
+        let size = half.max_element() + center.abs().max_element();
+        let fits = |(corner, v): (&Vec2, &Vec2)| corner.distance(*v) <= RECTANGLE_TOLERANCE * size;
+        let row = ShapeRow {
+            place: [center.x, center.y, axis.x, axis.y],
+            size: [half.x, half.y, polygon.radius, 0.0],
+        };
+        corners.iter().zip(v).all(fits).then_some(row)
+    }
+}
+
+impl ShapeRow {
+    /// `place` and `size` of `L::WIDTH` rows.
+    ///
+    /// # Safety
+    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather<L: Lanes>(rows: &[ShapeRow], index: &[u32]) -> [[L; 4]; 2] {
+        // Spreading a single row, as hulls do, was tried: 0 % on the washer's equal boxes.
+        let rows: &[Quad] = bytemuck::cast_slice(rows);
+        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
+        unsafe { [L::gather_quads::<2, 0>(rows, index), L::gather_quads::<2, 1>(rows, index)] }
+    }
+}
+
+/// The poses of two bodies, in lanes.
+#[derive(Clone, Copy)]
+pub struct Poses<L> {
+    /// From the centre of mass of a to that of b (m).
+    pub centers: [L; 2],
+    /// Rotations of a and b, (cos, sin).
+    pub rotation: [[L; 2]; 2],
+}
+
+impl<L: Lanes> Poses<L> {
+    /// Reads the poses of `L::WIDTH` pairs of bodies.
+    ///
+    /// # Safety
+    /// Both lists hold at least `L::WIDTH` entries, each less than `poses.len()`.
+    #[inline(always)]
+    pub unsafe fn gather(poses: &[PoseRow], [a, b]: [&[u32]; 2]) -> Self {
+        let poses: &[Quad] = bytemuck::cast_slice(poses);
+        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
+        unsafe {
+            let (p, q) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
+            let (r, s) = (L::gather_quads::<2, 1>(poses, a), L::gather_quads::<2, 1>(poses, b));
+            Poses {
+                // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
+                centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
+                rotation: [[r[0], r[1]], [s[0], s[1]]],
+            }
+        }
+    }
+
+    /// The same poses with a and b exchanged.
+    #[inline(always)]
+    pub fn swapped(self) -> Self {
+        let [a, b] = self.rotation;
+        Poses { centers: self.centers.map(|x| -x), rotation: [b, a] }
+    }
+}
+
+impl Poses<f32> {
+    /// Two poses.
+    pub fn new(a: &Pose, b: &Pose) -> Self {
+        Poses { centers: (b.position - a.position).into(), rotation: [a.rotation.into(), b.rotation.into()] }
+    }
+}
+
+/// Two shapes that are all said in a [`ShapeRow`] each, and the poses of their bodies, in lanes.
+pub struct ShapePair<L> {
+    /// Poses.
+    pub poses: Poses<L>,
+    /// [`ShapeRow::place`] of a and b.
+    pub place: [[L; 4]; 2],
+    /// [`ShapeRow::size`] of a and b.
+    pub size: [[L; 4]; 2],
+}
+
+impl<L: Lanes> ShapePair<L> {
+    /// Reads `L::WIDTH` pairs of shapes.
+    ///
+    /// # Safety
+    /// Both lists hold at least `L::WIDTH` entries, each less than `rows.len()`.
+    #[inline(always)]
+    pub unsafe fn gather(poses: Poses<L>, rows: &[ShapeRow], [a, b]: [&[u32]; 2]) -> Self {
+        // SAFETY: the caller keeps the indices in bounds.
+        let ([place_a, size_a], [place_b, size_b]) =
+            unsafe { (ShapeRow::gather(rows, a), ShapeRow::gather(rows, b)) };
+        ShapePair { poses, place: [place_a, place_b], size: [size_a, size_b] }
+    }
+}
+
+/// Manifolds without impulses, in lanes. Points from `count` on mean nothing.
+pub struct Touch<L> {
+    /// Unit normal from a to b.
+    pub normal: [L; 2],
+    /// Points in use: 0, 1 or 2.
+    pub count: L,
+    /// Per point, from the centre of mass of a (m).
+    pub anchor_a: [[L; 2]; 2],
+    /// Per point, from the centre of mass of b (m).
+    pub anchor_b: [[L; 2]; 2],
+    /// Per point, signed gap (m).
+    pub separation: [L; 2],
+    /// Per point, the feature id as a number.
+    pub feature: [L; 2],
+}
+
+impl<L: Lanes> Touch<L> {
+    /// The same contacts with a and b exchanged, for points that are all named 0.
+    #[inline(always)]
+    pub fn swapped(self) -> Self {
+        let normal = self.normal.map(|x| -x);
+        Touch { normal, anchor_a: self.anchor_b, anchor_b: self.anchor_a, ..self }
+    }
+}
+
+impl Touch<f32> {
+    /// The manifold of a single lane.
+    pub fn manifold(&self) -> Manifold {
+        let count = self.count as u32;
+        if count == 0 {
+            return Manifold::default();
+        }
+        let mut points = [ManifoldPoint::default(); 2];
+        for (p, point) in points.iter_mut().enumerate().take(count as usize) {
+            *point = ManifoldPoint {
+                anchor_a: self.anchor_a[p].into(),
+                anchor_b: self.anchor_b[p].into(),
+                separation: self.separation[p],
+                feature_id: self.feature[p] as u32,
+                ..ManifoldPoint::default()
+            };
+        }
+        Manifold { normal: self.normal.into(), count, points }
+    }
+}
+
+/// v turned by (cos, sin).
+#[inline(always)]
+pub fn rotate<L: Lanes>(q: [L; 2], v: [L; 2]) -> [L; 2] {
+    [q[0] * v[0] - q[1] * v[1], q[1] * v[0] + q[0] * v[1]]
+}
+
+/// v turned by the inverse of (cos, sin).
+#[inline(always)]
+pub fn unrotate<L: Lanes>(q: [L; 2], v: [L; 2]) -> [L; 2] {
+    [q[0] * v[0] + q[1] * v[1], q[0] * v[1] - q[1] * v[0]]
+}
+
+/// a·b
+#[inline(always)]
+pub fn dot<L: Lanes>(a: [L; 2], b: [L; 2]) -> L {
+    a[0].mul_add(b[0], a[1] * b[1])
+}
+
+/// v turned left by a right angle.
+#[inline(always)]
+pub fn perp<L: Lanes>(v: [L; 2]) -> [L; 2] {
+    [-v[1], v[0]]
+}
+
+/// |x|
+#[inline(always)]
+pub fn abs<L: Lanes>(x: L) -> L {
+    x.max(-x)
+}
+
+/// The one number in the first `width` entries of `index`, if there is only one.
+#[inline(always)]
+pub fn only(index: &[u32], width: usize) -> Option<usize> {
+    let different = index[..width].iter().fold(0, |bits, &i| bits | (i ^ index[0]));
+    (different == 0).then_some(index[0] as usize)
+}

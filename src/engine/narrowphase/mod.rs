@@ -1,0 +1,88 @@
+//! Contact geometry: two shapes at two poses in, one [`Manifold`] out.
+//!
+//! Every shape is a convex core grown by a radius, so a signed distance is that
+//! of the cores less both radii. Two circles ([`circles`]) need one square root; a
+//! circle against anything ([`hull_circle`]) needs the closest point of a core; all
+//! other pairs are two hulls (polygon, capsule, segment) under the separating axis
+//! test ([`hulls`]), which for two [`rectangles`] has a closed form. Each kernel is
+//! written in lanes; [`batch`] runs it over the pairs of a step.
+//!
+//! Only the difference of the positions enters, so a scene loses nothing far
+//! from the origin beyond the rounding of that difference. Coordinates are then
+//! relative to b's centre of mass: where one body is large it is the ground,
+//! which is a, and what is small about the contact keeps its digits.
+//!
+//! [`gjk`] and [`epa`] answer the same questions by another road, in `f64`,
+//! to check this one.
+
+pub mod batch;
+pub mod circles;
+pub mod clip;
+pub mod epa;
+pub mod gjk;
+pub mod hull;
+pub mod hull_circle;
+pub mod hulls;
+pub mod lanes;
+pub mod rectangles;
+
+use crate::engine::contacts::Manifold;
+use crate::engine::shapes::{Pose, Shape};
+use batch::Kind;
+use hull::HullRow;
+use hull_circle::HullCircle;
+use hulls::Hulls;
+use lanes::{Poses, ShapePair, ShapeRow};
+
+/// Contact of shape `a` with shape `b`, each in the frame of its body's centre of mass.
+///
+/// The normal points from a to b, in world axes. Points farther apart than
+/// `speculative_distance` (m, ≥ 0) are left out; without points the manifold is the
+/// default one. Each point lies midway between the two surfaces; `anchor_a − anchor_b`
+/// is the difference of the centres of mass, to rounding.
+///
+/// `feature_id` is `vertex of a | vertex of b << 8` for two hulls: each end of the
+/// contact is named by the vertex of a and the vertex of b that bound it there, so the
+/// name survives when the reference face passes from one shape to the other. With a
+/// circle there is only one point, and its id is always 0.
+///
+/// Where the geometry does not define a normal, it is still a unit vector: (0, 1) for
+/// coincident circle centres, the left side of a → b for a circle centred on a segment
+/// or capsule axis, the nearest face for a circle centred in a polygon.
+///
+/// Two segments never touch: neither has mass.
+pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
+    // What lanes do in a step is done here with one lane: the same bits.
+    let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
+    let Some(kind) = Kind::of(class_a, class_b) else { return Manifold::default() };
+    let poses = Poses::<f32>::new(pose_a, pose_b);
+    let touch = match kind {
+        Kind::Rectangles | Kind::Circles => {
+            let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
+            let collide = if kind == Kind::Circles { circles::collide } else { rectangles::collide };
+            collide(&pair, speculative_distance)
+        }
+        Kind::Hulls => {
+            Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]).collide(&poses, speculative_distance)
+        }
+        Kind::HullCircle => HullCircle::new(HullRow::new(a), row_b).collide(&poses, speculative_distance),
+        Kind::CircleHull => {
+            HullCircle::new(HullRow::new(b), row_a).collide(&poses.swapped(), speculative_distance).swapped()
+        }
+    };
+    touch.manifold()
+}
+
+impl Manifold {
+    /// The manifold of the same contact with a and b exchanged.
+    pub fn swapped(mut self) -> Manifold {
+        if self.count > 0 {
+            self.normal = -self.normal;
+        }
+        for point in &mut self.points[..self.count as usize] {
+            std::mem::swap(&mut point.anchor_a, &mut point.anchor_b);
+            point.feature_id = point.feature_id >> 8 | (point.feature_id & 0xff) << 8;
+        }
+        self
+    }
+}

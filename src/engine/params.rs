@@ -1,0 +1,71 @@
+//! Tuning constants with their units, and the budget of a step.
+
+/// Overlap that position correction leaves alone (m), so that resting contacts stay contacts.
+/// Larger: visible overlap. Smaller: contacts flicker.
+pub const LINEAR_SLOP: f32 = 0.005;
+
+/// Points closer than this (m) become contacts before they touch, so that a
+/// step ends at the surface instead of behind it. Four slops.
+pub const SPECULATIVE_DISTANCE: f32 = 4.0 * LINEAR_SLOP;
+
+/// A shape's bounds are grown by this (m), so that pairs are looked for only when a body
+/// has moved that far. Larger: more candidates. Smaller: more searches.
+pub const AABB_MARGIN: f32 = 0.1;
+
+/// Fraction of the overlap that Baumgarte stabilisation removes per step (1).
+pub const BAUMGARTE: f32 = 0.3;
+
+/// Stiffness of a soft contact between two dynamic bodies (Hz); contacts with
+/// static bodies use twice this.
+pub const CONTACT_HERTZ: f32 = 30.0;
+
+/// A soft contact's frequency is capped at this fraction of the substep rate (1).
+pub const CONTACT_HERTZ_FRACTION: f32 = 0.125;
+
+/// Damping ratio of a soft contact (1): far above critical, so that it does not bounce.
+pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
+
+/// Fastest speed at which overlap is pushed apart (m/s).
+pub const MAX_PUSH_SPEED: f32 = 3.0;
+
+/// Most overlap that one position sweep removes at a point (m): more would turn bodies
+/// further than a linearised contact can follow.
+pub const MAX_POSITION_CORRECTION: f32 = 0.2;
+
+/// Approach speeds below this do not bounce (m/s).
+pub const RESTITUTION_THRESHOLD: f32 = 1.0;
+
+/// Most vertices of a convex polygon.
+pub const MAX_POLYGON_VERTICES: usize = 8;
+
+/// Friction coefficient where a scene gives none (1).
+pub const DEFAULT_FRICTION: f64 = 0.6;
+
+/// Density where a scene gives none (kg/m²).
+pub const DEFAULT_DENSITY: f64 = 1.0;
+
+/// Gravity where a scene gives none (m/s²).
+pub const DEFAULT_GRAVITY: [f64; 2] = [0.0, -10.0];
+
+/// Step where a scene gives none (s).
+pub const DEFAULT_DT: f64 = 1.0 / 60.0;
+
+/// Bodies faster than this (m/s) or, in rad/s, spinning faster than this, have diverged.
+pub const DIVERGED_SPEED: f32 = 1.0e5;
+
+/// How much work one step may do.
+///
+/// Each solver reads the fields that its schedule has and ignores the rest;
+/// its row in [`crate::engine::solvers::VARIANTS`] says which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Budget {
+    /// Equal parts that a step is cut into (≥ 1).
+    pub substeps: u32,
+    /// Velocity sweeps over all constraints per substep, with position feedback.
+    pub velocity_iterations: u32,
+    /// Velocity sweeps per substep without position feedback.
+    pub relax_iterations: u32,
+    /// Position sweeps per substep.
+    pub position_iterations: u32,
+}

@@ -1,0 +1,464 @@
+//! Convex shapes in their body's frame: mass properties, bounds, validation.
+//!
+//! Every shape is a convex *core* (point, segment or polygon) grown by a
+//! *radius*. The constructors of [`Shape`] are the only checked way in; what
+//! they accept never makes the code behind them produce a NaN.
+
+use crate::engine::error::Error;
+use crate::engine::params::MAX_POLYGON_VERTICES;
+use glam::{DVec2, Vec2};
+use std::f64::consts::{PI, TAU};
+
+/// Largest coordinate, radius or half extent (m), so that fourth powers stay finite in `f32`.
+pub const MAX_COORDINATE: f32 = 1.0e9;
+
+/// Smallest length, radius or half extent (m), so that fourth powers do not vanish in `f32`.
+pub const MIN_LENGTH: f32 = 1.0e-9;
+
+/// Least area of a polygon, relative to the square of its diameter (1). Below,
+/// its thickness is no more than a hundred roundings of its coordinates.
+pub const MIN_RELATIVE_AREA: f64 = 1.0e-5;
+
+/// Least sine of the turn from one polygon edge to the next (1), and least
+/// distance of two vertices relative to the diameter.
+pub const MIN_RELATIVE_TURN: f64 = 1.0e-4;
+
+/// Position of a body's centre of mass (m) and its rotation as (cos, sin).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Centre of mass in the world (m).
+    pub position: Vec2,
+    /// Unit complex number (cos θ, sin θ).
+    pub rotation: Vec2,
+}
+
+impl Pose {
+    /// A pose from a position (m) and an angle (rad).
+    pub fn new(position: Vec2, angle: f32) -> Self {
+        Self { position, rotation: Vec2::from_angle(angle) }
+    }
+
+    /// A point of the body's frame in the world (m).
+    #[inline]
+    pub fn apply(&self, point: Vec2) -> Vec2 {
+        self.position + self.rotation.rotate(point)
+    }
+}
+
+/// Axis-aligned bounds (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lower corner.
+    pub min: Vec2,
+    /// Upper corner.
+    pub max: Vec2,
+}
+
+impl Aabb {
+    /// Whether the two share a point; touching counts.
+    #[inline]
+    pub fn overlaps(&self, other: &Aabb) -> bool {
+        // Not short-circuited: four predictable comparisons beat four branches.
+        (self.min.x <= other.max.x)
+            & (other.min.x <= self.max.x)
+            & (self.min.y <= other.max.y)
+            & (other.min.y <= self.max.y)
+    }
+
+    /// The smallest bounds around both.
+    #[inline]
+    pub fn union(&self, other: &Aabb) -> Aabb {
+        Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// These bounds moved outwards by `margin` (m) on every side.
+    #[inline]
+    pub fn grown(&self, margin: f32) -> Aabb {
+        Aabb { min: self.min - Vec2::splat(margin), max: self.max + Vec2::splat(margin) }
+    }
+
+    /// Whether `other` lies inside; shared borders count.
+    #[inline]
+    pub fn contains(&self, other: &Aabb) -> bool {
+        (self.min.x <= other.min.x)
+            & (self.min.y <= other.min.y)
+            & (other.max.x <= self.max.x)
+            & (other.max.y <= self.max.y)
+    }
+}
+
+/// Mass (kg), centre of mass (m) and inertia about that centre (kg·m²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// kg
+    pub mass: f64,
+    /// m, in the frame the shape is given in
+    pub center: [f64; 2],
+    /// kg·m², about `center`
+    pub inertia: f64,
+}
+
+impl MassProperties {
+    /// No mass, at the origin.
+    pub const ZERO: MassProperties = MassProperties { mass: 0.0, center: [0.0; 2], inertia: 0.0 };
+
+    fn new(mass: f64, center: DVec2, inertia: f64) -> Self {
+        Self { mass, center: center.to_array(), inertia }
+    }
+}
+
+/// Several parts as one body. With the centre c = Σ mᵢcᵢ / Σ mᵢ, the parallel axis
+/// theorem moves each inertia: I = Σ Iᵢ + mᵢ|cᵢ − c|². Without mass: [`MassProperties::ZERO`].
+pub fn combine(parts: &[MassProperties]) -> MassProperties {
+    let mass: f64 = parts.iter().map(|p| p.mass).sum();
+    if mass <= 0.0 {
+        return MassProperties::ZERO;
+    }
+    let center = parts.iter().map(|p| p.mass * DVec2::from(p.center)).sum::<DVec2>() / mass;
+    let moved = |p: &MassProperties| p.inertia + p.mass * (DVec2::from(p.center) - center).length_squared();
+    MassProperties::new(mass, center, parts.iter().map(moved).sum())
+}
+
+/// A convex polygon of 3 to 8 vertices, counter-clockwise, grown by `radius`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polygon {
+    /// The first `count` are used (m); the others repeat the last of them, so
+    /// that code of fixed width may read all eight.
+    pub vertices: [Vec2; MAX_POLYGON_VERTICES],
+    /// Outward unit normal of the edge from vertex i to vertex i + 1; padded like `vertices`.
+    pub normals: [Vec2; MAX_POLYGON_VERTICES],
+    /// Number of vertices.
+    pub count: u32,
+    /// Rounding radius (m), ≥ 0.
+    pub radius: f32,
+}
+
+impl Polygon {
+    /// The vertices in use.
+    pub fn vertices(&self) -> &[Vec2] {
+        &self.vertices[..self.count as usize]
+    }
+
+    fn padded(vertices: &[Vec2], normals: &[Vec2], radius: f32) -> Self {
+        let last = vertices.len() - 1;
+        let pad = |from: &[Vec2]| std::array::from_fn(|i| from[i.min(last)]);
+        Self { vertices: pad(vertices), normals: pad(normals), count: vertices.len() as u32, radius }
+    }
+}
+
+/// A convex shape, in its body's frame (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// All points within `radius` of `center`.
+    Circle {
+        /// m
+        center: Vec2,
+        /// m, > 0
+        radius: f32,
+    },
+    /// All points within `radius` of the segment a–b.
+    Capsule {
+        /// m
+        a: Vec2,
+        /// m
+        b: Vec2,
+        /// m, > 0
+        radius: f32,
+    },
+    /// A rounded convex polygon.
+    Polygon(Polygon),
+    /// A two-sided line without mass.
+    Segment {
+        /// m
+        a: Vec2,
+        /// m
+        b: Vec2,
+    },
+}
+
+impl Shape {
+    /// A circle. `place` names the shape in errors, here and below.
+    ///
+    /// Errors: a value that is not finite or out of range, `radius` ≤ 0.
+    pub fn circle(place: &str, center: Vec2, radius: f32) -> Result<Shape, Error> {
+        check_point(place, "center", center)?;
+        check_length(place, "radius", radius)?;
+        Ok(Shape::Circle { center, radius })
+    }
+
+    /// A capsule around the segment a–b.
+    ///
+    /// Errors: as [`Shape::circle`], and a segment shorter than [`MIN_LENGTH`]
+    /// or than the rounding of its own coordinates (use a circle instead).
+    pub fn capsule(place: &str, a: Vec2, b: Vec2, radius: f32) -> Result<Shape, Error> {
+        check_segment(place, a, b)?;
+        check_length(place, "radius", radius)?;
+        Ok(Shape::Capsule { a, b, radius })
+    }
+
+    /// A massless two-sided line from a to b. Errors: as [`Shape::capsule`].
+    pub fn segment(place: &str, a: Vec2, b: Vec2) -> Result<Shape, Error> {
+        check_segment(place, a, b)?;
+        Ok(Shape::Segment { a, b })
+    }
+
+    /// A rectangle with half extents hx × hy, turned by `angle` (rad) about its
+    /// `center`, then grown by `radius` ≥ 0.
+    ///
+    /// Errors: a value that is not finite or out of range, a half extent ≤ 0, `radius` < 0.
+    /// There is no sliver bound: the normals do not come from the vertices.
+    pub fn rectangle(place: &str, half: Vec2, center: Vec2, angle: f32, radius: f32) -> Result<Shape, Error> {
+        check_length(place, "half_width", half.x)?;
+        check_length(place, "half_height", half.y)?;
+        check_point(place, "center", center)?;
+        check_rounding(place, radius)?;
+        if !angle.is_finite() {
+            return Err(Error::invalid(place, format!("angle {angle} is not finite")));
+        }
+        let turn = DVec2::from_angle(f64::from(angle));
+        let corner = |x: f32, y: f32| center + turn.rotate(Vec2::new(x, y).as_dvec2()).as_vec2();
+        let vertices = [
+            corner(-half.x, -half.y),
+            corner(half.x, -half.y),
+            corner(half.x, half.y),
+            corner(-half.x, half.y),
+        ];
+        let right = turn.as_vec2();
+        let normals = [-right.perp(), right, right.perp(), -right];
+        Ok(Shape::Polygon(Polygon::padded(&vertices, &normals, radius)))
+    }
+
+    /// A convex polygon of 3 to 8 vertices in either winding, grown by `radius` ≥ 0.
+    ///
+    /// Errors, naming the vertex by its index in `vertices`: not finite or out of
+    /// range; coincident with another vertex; collinear with its neighbours
+    /// ([`MIN_RELATIVE_TURN`]); not convex; a sliver ([`MIN_RELATIVE_AREA`]); `radius` < 0.
+    pub fn polygon(place: &str, vertices: &[Vec2], radius: f32) -> Result<Shape, Error> {
+        let n = vertices.len();
+        if !(3..=MAX_POLYGON_VERTICES).contains(&n) {
+            let message = format!("{n} vertices, where 3 to {MAX_POLYGON_VERTICES} are possible");
+            return Err(Error::invalid(place, message));
+        }
+        for (i, &v) in vertices.iter().enumerate() {
+            check_point(place, &format!("vertices[{i}]"), v)?;
+        }
+        check_rounding(place, radius)?;
+
+        // Twice the signed area; clockwise input is negative and read backwards.
+        let given: Vec<DVec2> = vertices.iter().map(|v| v.as_dvec2()).collect();
+        let area2: f64 = (1..n - 1).map(|i| (given[i] - given[0]).perp_dot(given[i + 1] - given[0])).sum();
+        let index = |i: usize| if area2 < 0.0 { n - 1 - i % n } else { i % n };
+        let at = |i: usize| given[index(i)];
+        let fail = |i: usize, what: &str| {
+            let i = index(i);
+            Err(Error::invalid(place, format!("vertices[{i}] = {} {what}", vertices[i])))
+        };
+
+        let pairs = || (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+        let diameter = pairs().map(|(i, j)| at(i).distance(at(j))).fold(0.0, f64::max);
+        if diameter < f64::from(MIN_LENGTH) {
+            return fail(0, "coincides with all others");
+        }
+        if let Some((i, j)) = pairs().find(|&(i, j)| at(i).distance(at(j)) < MIN_RELATIVE_TURN * diameter) {
+            return fail(j, &format!("coincides with vertices[{}]", index(i)));
+        }
+        for i in 0..n {
+            let (edge, next) = (at(i + 1) - at(i), at(i + 2) - at(i + 1));
+            let turn = edge.perp_dot(next) / (edge.length() * next.length());
+            if turn.abs() < MIN_RELATIVE_TURN {
+                return fail(i + 1, "is collinear with its neighbours");
+            }
+            // Left turns alone would also accept a star that winds twice, so
+            // every vertex must lie to the left of every edge.
+            if turn < 0.0 {
+                return fail(i + 1, "makes the polygon concave");
+            }
+            if let Some(j) = (i + 2..i + n).find(|&j| edge.perp_dot(at(j) - at(i)) < 0.0) {
+                return fail(j, "makes the polygon cross itself");
+            }
+        }
+        let relative_area = 0.5 * area2.abs() / (diameter * diameter);
+        if relative_area < MIN_RELATIVE_AREA {
+            let message =
+                format!("a sliver: area is {relative_area:e} of diameter², less than {MIN_RELATIVE_AREA:e}");
+            return Err(Error::invalid(place, message));
+        }
+
+        let ordered: Vec<Vec2> = (0..n).map(|i| at(i).as_vec2()).collect();
+        let normals: Vec<Vec2> = (0..n).map(|i| outward(at(i), at(i + 1)).as_vec2()).collect();
+        Ok(Shape::Polygon(Polygon::padded(&ordered, &normals, radius)))
+    }
+
+    /// Rounding radius (m); 0 for a segment.
+    #[inline]
+    pub fn radius(&self) -> f32 {
+        match self {
+            Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => *radius,
+            Shape::Polygon(polygon) => polygon.radius,
+            Shape::Segment { .. } => 0.0,
+        }
+    }
+
+    /// Calls `visit` with each vertex of the core.
+    #[inline]
+    pub fn for_each_vertex(&self, mut visit: impl FnMut(Vec2)) {
+        match self {
+            Shape::Circle { center, .. } => visit(*center),
+            Shape::Capsule { a, b, .. } | Shape::Segment { a, b } => {
+                visit(*a);
+                visit(*b);
+            }
+            Shape::Polygon(polygon) => polygon.vertices().iter().for_each(|&v| visit(v)),
+        }
+    }
+
+    /// Mass, centre and inertia at `density` (kg/m²), exact to `f64` rounding;
+    /// zero for a segment.
+    pub fn mass(&self, density: f64) -> MassProperties {
+        let radius = f64::from(self.radius());
+        match self {
+            Shape::Circle { center, .. } => {
+                let mass = density * PI * radius * radius;
+                MassProperties::new(mass, center.as_dvec2(), 0.5 * mass * radius * radius)
+            }
+            Shape::Segment { .. } => MassProperties::ZERO,
+            _ => {
+                let mut core = Vec::with_capacity(MAX_POLYGON_VERTICES);
+                self.for_each_vertex(|v| core.push(v.as_dvec2()));
+                rounded_hull_mass(&core, radius, density)
+            }
+        }
+    }
+
+    /// The same shape moved by `offset` (m).
+    pub fn translated(&self, offset: Vec2) -> Shape {
+        match *self {
+            Shape::Circle { center, radius } => Shape::Circle { center: center + offset, radius },
+            Shape::Capsule { a, b, radius } => Shape::Capsule { a: a + offset, b: b + offset, radius },
+            Shape::Segment { a, b } => Shape::Segment { a: a + offset, b: b + offset },
+            Shape::Polygon(polygon) => {
+                Shape::Polygon(Polygon { vertices: polygon.vertices.map(|v| v + offset), ..polygon })
+            }
+        }
+    }
+
+    /// Bounds in the world (m).
+    #[inline]
+    pub fn aabb(&self, pose: &Pose) -> Aabb {
+        let (mut min, mut max) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+        self.for_each_vertex(|v| {
+            let v = pose.rotation.rotate(v);
+            min = min.min(v);
+            max = max.max(v);
+        });
+        Aabb { min: pose.position + min, max: pose.position + max }.grown(self.radius())
+    }
+
+    /// The point of the shape farthest along `direction` (m, body frame); the
+    /// first such core vertex, without the radius, if `direction` is zero.
+    pub fn support(&self, direction: Vec2) -> Vec2 {
+        let (mut best, mut height) = (Vec2::ZERO, f32::NEG_INFINITY);
+        self.for_each_vertex(|v| {
+            if v.dot(direction) > height {
+                (best, height) = (v, v.dot(direction));
+            }
+        });
+        best + self.radius() * direction.normalize_or_zero()
+    }
+
+    /// Half the least width of the shape (m): deeper overlap has passed its middle.
+    /// Infinite for a segment, which has no inside, so that the minimum over a
+    /// pair is that of the other shape.
+    pub fn min_half_extent(&self) -> f32 {
+        match self {
+            Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => *radius,
+            Shape::Segment { .. } => f32::INFINITY,
+            Shape::Polygon(polygon) => {
+                // The least width of a convex polygon is across one of its faces.
+                let width = |i: usize| {
+                    let depth = |&v: &Vec2| polygon.normals[i].dot(polygon.vertices[i] - v);
+                    polygon.vertices().iter().map(depth).fold(0.0, f32::max)
+                };
+                0.5 * (0..polygon.count as usize).map(width).fold(f32::INFINITY, f32::min) + polygon.radius
+            }
+        }
+    }
+}
+
+/// Outward unit normal of the edge p → q of a counter-clockwise polygon.
+fn outward(p: DVec2, q: DVec2) -> DVec2 {
+    -(q - p).perp().normalize()
+}
+
+/// A hull of two or more vertices, counter-clockwise, grown by r.
+///
+/// Growing adds to the core one rectangle of ℓ × r per edge and one disc sector
+/// per vertex, whose angle θ is the turn there (they sum to 2π):
+/// - triangle (0, p, q) of the fan: area ½ p×q, centroid (p + q)/3, inertia
+///   about the apex m (p·p + p·q + q·q)/6;
+/// - rectangle: inertia about its centre m (ℓ² + r²)/12;
+/// - sector: mass ρ θ r²/2, inertia about the apex m r²/2, centroid at
+///   c = (2r/3) sin(θ/2)/(θ/2) along the bisector.
+///
+/// A capsule is the case of two vertices: no core, two half discs.
+fn rounded_hull_mass(core: &[DVec2], r: f64, density: f64) -> MassProperties {
+    let n = core.len();
+    let mut parts = Vec::with_capacity(3 * n);
+    // Inertia about a centroid at distance |c| from where it is known.
+    let part = |mass: f64, apex: DVec2, c: DVec2, inertia_about_apex: f64| {
+        MassProperties::new(mass, apex + c, inertia_about_apex - mass * c.length_squared())
+    };
+    for i in 1..n - 1 {
+        let (p, q) = (core[i] - core[0], core[i + 1] - core[0]);
+        let mass = density * 0.5 * p.perp_dot(q);
+        parts.push(part(mass, core[0], (p + q) / 3.0, mass * (p.dot(p) + p.dot(q) + q.dot(q)) / 6.0));
+    }
+    for i in 0..n {
+        let (previous, v, next) = (core[(i + n - 1) % n], core[i], core[(i + 1) % n]);
+        let (before, normal) = (outward(previous, v), outward(v, next));
+        let length = v.distance(next);
+        let mass = density * length * r;
+        let center = 0.5 * (v + next) + 0.5 * r * normal;
+        parts.push(MassProperties::new(mass, center, mass * (length * length + r * r) / 12.0));
+
+        // In (0, 2π): a turn of exactly π may come out as −π.
+        let angle = before.perp_dot(normal).atan2(before.dot(normal)).rem_euclid(TAU);
+        let mass = density * 0.5 * angle * r * r;
+        let reach = 4.0 * r / (3.0 * angle) * (0.5 * angle).sin();
+        let bisector = DVec2::from_angle(0.5 * angle).rotate(before);
+        parts.push(part(mass, v, reach * bisector, 0.5 * mass * r * r));
+    }
+    combine(&parts)
+}
+
+fn check_point(place: &str, name: &str, value: Vec2) -> Result<(), Error> {
+    if !value.is_finite() {
+        return Err(Error::invalid(place, format!("{name} = {value} is not finite")));
+    }
+    if value.abs().max_element() > MAX_COORDINATE {
+        return Err(Error::invalid(place, format!("{name} = {value} lies beyond {MAX_COORDINATE:e} m")));
+    }
+    Ok(())
+}
+
+fn check_length(place: &str, name: &str, value: f32) -> Result<(), Error> {
+    if !(MIN_LENGTH..=MAX_COORDINATE).contains(&value) {
+        let message = format!("{name} = {value} is not within {MIN_LENGTH:e} to {MAX_COORDINATE:e} m");
+        return Err(Error::invalid(place, message));
+    }
+    Ok(())
+}
+
+fn check_rounding(place: &str, radius: f32) -> Result<(), Error> {
+    if radius == 0.0 { Ok(()) } else { check_length(place, "radius", radius) }
+}
+
+fn check_segment(place: &str, a: Vec2, b: Vec2) -> Result<(), Error> {
+    check_point(place, "a", a)?;
+    check_point(place, "b", b)?;
+    let resolution = 4.0 * f32::EPSILON * a.abs().max(b.abs()).max_element();
+    if a.distance(b) < resolution.max(MIN_LENGTH) {
+        return Err(Error::invalid(place, format!("a = {a} and b = {b} coincide")));
+    }
+    Ok(())
+}

@@ -1,0 +1,162 @@
+//! From candidates to contacts that remember their impulses.
+
+use super::World;
+use super::candidates::Candidate;
+use crate::engine::contacts::{Contact, pair_key};
+use crate::engine::lanes::held;
+use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
+use crate::engine::narrowphase::lanes::PoseRow;
+use crate::engine::params::SPECULATIVE_DISTANCE;
+
+/// What the narrow phase keeps from step to step.
+#[derive(Default)]
+pub(super) struct Narrow {
+    /// Sorted by shape pair.
+    pub candidates: Vec<Candidate>,
+    pub last_candidates: Vec<Candidate>,
+    /// Candidates by [`Kind`].
+    pub of_kind: [Vec<u32>; Kind::ALL.len()],
+    /// Shapes as the lane kernels read them.
+    pub shapes: Shapes,
+    /// The set of contacts is not that of the lanes.
+    pub is_changed: bool,
+    /// The jobs are all candidates, with their present contacts.
+    pub jobs_are_current: bool,
+    poses: Vec<PoseRow>,
+    jobs: [Jobs; Kind::ALL.len()],
+    /// New contacts, in the order in which they were met.
+    fresh: Vec<Contact>,
+    last_contacts: Vec<Contact>,
+    /// Contacts there were after the last update.
+    count: usize,
+}
+
+/// `Candidate::contact` of a pair that has just begun to touch: this bit and its place in `fresh`.
+const FRESH: u32 = 1 << 31;
+
+impl World {
+    /// Collides every candidate and hands the last step's impulses on by feature id.
+    ///
+    /// Contacts are updated where they lie, and sorted anew only if one came or went.
+    pub(super) fn update_contacts(&mut self) {
+        let narrow = &mut self.narrow;
+        if narrow.count != self.contacts.len() {
+            // Somebody else changed the list: what candidates remember of it means nothing.
+            self.contacts.clear();
+            narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
+            (narrow.is_changed, narrow.jobs_are_current) = (true, false);
+        }
+        if self.settings.record_impulses {
+            self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
+        }
+        let bodies = &self.bodies;
+        narrow.poses.clear();
+        narrow.poses.extend((0..bodies.len()).map(|i| PoseRow {
+            position: [
+                bodies.position_x[i],
+                bodies.position_y[i],
+                bodies.position_x_lo[i],
+                bodies.position_y_lo[i],
+            ],
+            rotation: [bodies.rotation_cos[i], bodies.rotation_sin[i], 0.0, 0.0],
+        }));
+        narrow.list_jobs(self.contacts.len());
+
+        let Narrow { candidates, jobs, fresh, is_changed, poses, shapes, .. } = narrow;
+        fresh.clear();
+        let mut change = |name: u32, contact: &Contact| {
+            let candidate = &mut candidates[name as usize];
+            candidate.contact = if contact.manifold.count == 0 {
+                NO_CONTACT
+            } else {
+                fresh.push(Contact { manifold: contact.manifold, ..candidate.without_manifold() });
+                FRESH | (fresh.len() - 1) as u32
+            };
+            *is_changed = true;
+        };
+        let input = Input { poses, shapes, speculative: SPECULATIVE_DISTANCE };
+        let mut points = 0;
+        for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
+            points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
+        }
+        if narrow.is_changed {
+            narrow.sort_contacts(&mut self.contacts);
+        }
+        narrow.count = self.contacts.len();
+        self.counts.pairs = narrow.candidates.len();
+        self.counts.contacts = self.contacts.len();
+        self.counts.points = points;
+        self.counts.rows = if self.features.friction { 2 * points } else { points };
+    }
+}
+
+impl Narrow {
+    /// Bytes held for candidates.
+    pub fn candidate_bytes(&self) -> usize {
+        let lists: usize = self.of_kind.iter().map(held).sum();
+        let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
+        lists + jobs + held(&self.candidates) + held(&self.last_candidates) + held(&self.poses)
+    }
+
+    /// Bytes held for contacts, besides the list itself.
+    pub fn contact_bytes(&self) -> usize {
+        held(&self.fresh) + held(&self.last_contacts)
+    }
+
+    /// Lets candidates find their contacts in a list that was put in the place of the last one;
+    /// both are sorted by shape pair. Contacts without a candidate are forgotten.
+    pub fn relink(&mut self, contacts: &mut Vec<Contact>) {
+        self.last_contacts.clone_from(contacts);
+        let mut last = self.last_contacts.iter().enumerate().peekable();
+        for candidate in &mut self.candidates {
+            let key = pair_key(candidate.shapes[0], candidate.shapes[1]);
+            while last.next_if(|(_, contact)| contact.key() < key).is_some() {}
+            let found = last.next_if(|(_, contact)| contact.key() == key);
+            candidate.contact = found.map_or(NO_CONTACT, |(i, _)| i as u32);
+        }
+        std::mem::swap(contacts, &mut self.last_contacts);
+        self.sort_contacts(contacts);
+        (self.is_changed, self.count) = (true, contacts.len());
+    }
+
+    /// Lists the candidates that are worth a look.
+    ///
+    /// Where most candidates do not touch, those whose centres are too far apart are left out
+    /// before their shapes are read; where most do, the lists of the last step still hold.
+    fn list_jobs(&mut self, contacts: usize) {
+        let cull = 4 * contacts < 3 * self.candidates.len();
+        if self.jobs_are_current && !cull {
+            return;
+        }
+        self.jobs_are_current = !cull;
+        for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
+            jobs.list(names, |name| {
+                let candidate = &mut self.candidates[name as usize];
+                let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
+                let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
+                let is_near = !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
+                if !is_near & (candidate.contact != NO_CONTACT) {
+                    self.is_changed = true;
+                    candidate.contact = NO_CONTACT;
+                }
+                (is_near, candidate.bodies, candidate.numbers, candidate.contact)
+            });
+        }
+    }
+
+    /// Contacts in the order of their candidates: old ones that go on, and fresh ones.
+    fn sort_contacts(&mut self, contacts: &mut Vec<Contact>) {
+        std::mem::swap(contacts, &mut self.last_contacts);
+        contacts.clear();
+        for candidate in &mut self.candidates {
+            if candidate.contact == NO_CONTACT {
+                continue;
+            }
+            let from = if candidate.contact & FRESH == 0 { &self.last_contacts } else { &self.fresh };
+            let contact = from[(candidate.contact & !FRESH) as usize];
+            candidate.contact = contacts.len() as u32;
+            contacts.push(contact);
+        }
+        self.jobs_are_current = false;
+    }
+}

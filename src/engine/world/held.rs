@@ -1,0 +1,249 @@
+//! One phase of a step, again and again on a state that is held still.
+//!
+//! ```text
+//! hold:   a whole step without moving bodies   every phase finds what it needs
+//! repeat: one phase, nothing else              what a profiler shall see
+//! reset:  what the phase changed, copied back  cheap, and outside of the repeats
+//! drop:   bodies and contacts as they were     the next step gives the bits it would have given
+//! ```
+//!
+//! What repeats do to the state:
+//!
+//! * *pairs* looks for all pairs anew each time and *color* for all colours, as a step does in which
+//!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
+//! * *prepare* reads bodies and contacts and writes rows and records: always the same.
+//! * Sweeps go on from each other's velocities and impulses and converge; *warm start* and
+//!   *integrate* add the same velocity each time, *position* and *store* move bodies. None of them
+//!   branches on values, so the work is the same; after some hundred repeats the numbers should
+//!   be brought back by a reset, so that they remain those of a simulation.
+
+use super::World;
+use crate::engine::bodies::Bodies;
+use crate::engine::broadphase::{FatBoxes, Proxy};
+use crate::engine::clock::{Clock, Phase, Timings};
+use crate::engine::constraints::{Batches, Features, WorkCount, Workspace};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
+use crate::engine::world::{Order, StepCounts};
+
+/// A world that is held still; dropping it lets the world go on as if nothing had happened.
+pub struct HeldWorld<'w> {
+    world: &'w mut World,
+    before: Saved,
+    /// Contacts of the step that is held still, with the impulses it ended with.
+    contacts: Vec<Contact>,
+    rows: Vec<BodyRow>,
+    buffers: [Vec<Block>; 2],
+}
+
+/// What a step starts from, as far as phases write to it.
+struct Saved {
+    bodies: Bodies,
+    contacts: Vec<Contact>,
+    proxies: Vec<Proxy>,
+    fat_boxes: FatBoxes,
+    counts: StepCounts,
+}
+
+/// What a step does in one phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Probe {
+    /// The phase.
+    pub phase: Phase,
+    /// Sweeps or body passes of a step; 1 for what is run once.
+    pub passes: u32,
+    /// Rows that one pass solves; 0 for a phase that solves none.
+    pub rows: usize,
+    /// Operations of all passes; none where the phase does not work on lanes.
+    pub operations: Option<Operations>,
+    /// Contacts on which they were counted: those that have a colour.
+    pub counted_contacts: usize,
+}
+
+impl World {
+    /// Runs a whole step without moving the bodies, and holds the world there.
+    pub fn hold(&mut self) -> HeldWorld<'_> {
+        let before = Saved {
+            bodies: self.bodies.clone(),
+            contacts: self.contacts.clone(),
+            proxies: self.proxies.clone(),
+            fat_boxes: self.fat_boxes.clone(),
+            counts: self.counts,
+        };
+        let timings = self.timings;
+        self.frozen_step();
+        self.timings = timings;
+        let rows = self.work.rows.clone();
+        let buffers = [&self.work.lanes, &self.work.serial].map(|batches| used(batches).to_vec());
+        let contacts = self.contacts.clone();
+        HeldWorld { world: self, before, contacts, rows, buffers }
+    }
+
+    /// Contacts as they were, linked to the present candidates.
+    fn put_back(&mut self, contacts: &[Contact]) {
+        self.contacts.clear();
+        self.contacts.extend_from_slice(contacts);
+        self.narrow.relink(&mut self.contacts);
+    }
+
+    fn run_phase(&mut self, clock: &mut Clock, phase: Phase) -> WorkCount {
+        match phase {
+            Phase::Pairs => {
+                self.pairs_are_stale = true;
+                self.update_pairs();
+            }
+            Phase::Collide => self.update_contacts(),
+            Phase::Color => {
+                self.assignment.forget();
+                self.lanes_are_for = None;
+                self.assign_lanes(&self.kernel_features());
+            }
+            Phase::Prepare => {
+                self.load_rows();
+                return self.run_solver(clock);
+            }
+            Phase::Store => {
+                let count = self.run_solver(clock);
+                self.store();
+                return count;
+            }
+            _ => return self.run_solver(clock),
+        }
+        WorkCount::default()
+    }
+}
+
+/// The blocks of a slab that hold records.
+fn used(batches: &Batches) -> &[Block] {
+    &batches.buffer[..(batches.vectors * batches.width).div_ceil(16)]
+}
+
+impl HeldWorld<'_> {
+    /// The world, as the phases left it.
+    pub fn world(&self) -> &World {
+        self.world
+    }
+
+    /// Its records and rows.
+    pub fn workspace(&self) -> &Workspace {
+        &self.world.work
+    }
+
+    /// Runs everything that a step does in `phase`, `times` times.
+    pub fn repeat(&mut self, phase: Phase, times: u32) {
+        for _ in 0..times {
+            self.world.run_phase(&mut Clock::only(phase, false), phase);
+        }
+    }
+
+    /// Runs every phase of a step once, from what the step itself would start with, and says what each
+    /// took, pairs looked for anew. The bodies are brought back.
+    ///
+    /// With `net`, pauses in which the thread waited for a processor are taken out, which costs
+    /// some microseconds a pass beside the times.
+    pub fn step(&mut self, net: bool) -> Timings {
+        self.restore_bodies();
+        self.world.put_back(&self.before.contacts);
+        let mut clock = if net { Clock::without_pauses() } else { Clock::start(true) };
+        self.world.pairs_are_stale = true;
+        self.world.solve(&mut clock);
+        self.world.store();
+        clock.lap(Phase::Store);
+        let timings = clock.stop();
+        self.restore_bodies();
+        timings
+    }
+
+    /// Brings back what repeats of `phase` have changed.
+    pub fn reset(&mut self, phase: Phase) {
+        match phase {
+            Phase::Pairs | Phase::Collide | Phase::Color | Phase::Prepare => return,
+            Phase::Store => {
+                self.restore_bodies();
+                self.world.contacts.clone_from(&self.contacts);
+            }
+            _ => {}
+        }
+        let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
+        rows.clone_from(&self.rows);
+        for (batches, saved) in [lanes, serial].into_iter().zip(&self.buffers) {
+            batches.buffer[..saved.len()].copy_from_slice(saved);
+        }
+    }
+
+    /// What each phase does, in the order of a step; phases that the solver or the scene does not
+    /// have are not in it. Every phase is run once, at one lane that counts its operations.
+    ///
+    /// # Panics
+    /// If a phase runs a pass of another, which then did not ask [`Clock::skips`].
+    pub fn probes(&mut self) -> Vec<Probe> {
+        // The same contacts in the same colours, one to a batch.
+        let (width, order) = (self.world.settings.width, self.world.settings.order);
+        (self.world.settings.width, self.world.settings.order) = (LaneWidth::W1, Order::Colored);
+        self.world.frozen_step();
+        let probes = Phase::ALL.into_iter().filter_map(|phase| self.probe(phase)).collect();
+        (self.world.settings.width, self.world.settings.order) = (width, order);
+        self.restore_bodies();
+        self.world.put_back(&self.before.contacts);
+        self.world.frozen_step();
+        probes
+    }
+
+    fn probe(&mut self, phase: Phase) -> Option<Probe> {
+        let mut clock = Clock::only(phase, true);
+        Counted::take();
+        let count = self.world.run_phase(&mut clock, phase);
+        let operations = Counted::take();
+        let laps = clock.laps();
+        for other in Phase::ALL {
+            assert!(other == phase || laps[other as usize] == 0, "{phase:?} runs a pass of {other:?}");
+        }
+        let passes = match phase {
+            Phase::Pairs | Phase::Collide | Phase::Color => 1,
+            // Rows are loaded before records are made, bounces are tracked before they are applied,
+            // bodies are stored after impulses: several laps, but one run.
+            Phase::Prepare | Phase::Restitution | Phase::Store => laps[phase as usize].min(1),
+            _ => laps[phase as usize],
+        };
+        let counted_contacts = self.world.work.lanes.contact.len();
+        let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
+        let rows = count.row_updates / passes.max(1) as usize;
+        (passes > 0).then_some(Probe { phase, passes, rows, operations, counted_contacts })
+    }
+
+    /// What the constraints of the step need.
+    pub fn features(&self) -> Features {
+        self.world.kernel_features()
+    }
+
+    /// Brings back what a step moves, into the memory that it has: a new place would cost
+    /// the next step page faults.
+    fn restore_bodies(&mut self) {
+        let (to, from) = (&mut self.world.bodies, &self.before.bodies);
+        for (to, from) in [
+            (&mut to.position_x, &from.position_x),
+            (&mut to.position_y, &from.position_y),
+            (&mut to.position_x_lo, &from.position_x_lo),
+            (&mut to.position_y_lo, &from.position_y_lo),
+            (&mut to.rotation_cos, &from.rotation_cos),
+            (&mut to.rotation_sin, &from.rotation_sin),
+            (&mut to.velocity_x, &from.velocity_x),
+            (&mut to.velocity_y, &from.velocity_y),
+            (&mut to.angular_velocity, &from.angular_velocity),
+        ] {
+            to.copy_from_slice(from);
+        }
+    }
+}
+
+impl Drop for HeldWorld<'_> {
+    fn drop(&mut self) {
+        self.restore_bodies();
+        self.world.put_back(&self.before.contacts);
+        // Bounds may have followed bodies that repeats have moved.
+        self.world.proxies.clone_from(&self.before.proxies);
+        self.world.fat_boxes.clone_from(&self.before.fat_boxes);
+        self.world.pairs_are_stale = true;
+        self.world.counts = self.before.counts;
+    }
+}

@@ -1,0 +1,41 @@
+//! Which contact goes to which lane.
+
+use super::{Order, World};
+use crate::engine::bodies::BodyKind;
+use crate::engine::constraints::assign::Sides;
+use crate::engine::constraints::restitution::Bounces;
+use crate::engine::constraints::{Features, OppositeKind};
+use crate::engine::contacts::Contact;
+
+impl World {
+    /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
+    pub(super) fn assign_lanes(&mut self, features: &Features) {
+        let choice = Some((self.settings.width, self.settings.order, *features));
+        if !self.narrow.is_changed && self.lanes_are_for == choice {
+            return;
+        }
+        (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
+        let kinds = &self.bodies.kind;
+        let opposite = |contact: &Contact| match kinds[contact.body_a as usize] {
+            BodyKind::Dynamic => OppositeKind::Dynamic,
+            BodyKind::Kinematic => OppositeKind::Kinematic,
+            BodyKind::Static => OppositeKind::Static,
+        };
+        let sides = Sides { bodies: kinds.len(), opposite };
+        let (work, contacts) = (&mut self.work, &self.contacts);
+        match self.settings.order {
+            Order::Natural => {
+                self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);
+            }
+            Order::Colored => self.assignment.colored(work, self.settings.width, features, contacts, &sides),
+        }
+        self.counts.colors = self.assignment.colors;
+        self.counts.overflow = self.assignment.overflow;
+        self.counts.lane_slots = work.lanes.contact.len() + work.serial.contact.len();
+        self.counts.constraint_bytes = work.lanes.bytes() + work.serial.bytes();
+        if features.restitution {
+            let points = if features.two_points { 2 } else { 1 };
+            self.counts.constraint_bytes += Bounces::bytes(self.counts.lane_slots, points);
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! What a world holds in memory, and what of that a step uses.
+
+use super::World;
+use crate::engine::lanes::held;
+use std::mem::size_of_val;
+
+/// Arrays that serve one purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Component {
+    /// Name for tables.
+    pub name: &'static str,
+    /// Bytes allocated: capacities, which grow by doubling and never shrink.
+    pub held: usize,
+    /// Bytes in use: lengths.
+    pub used: usize,
+}
+
+/// Memory of a [`World`] on the heap, by purpose. The struct itself is not in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// Bodies, shapes, broad phase, candidates, contacts, colouring, records, rows.
+    pub components: Vec<Component>,
+}
+
+impl Memory {
+    /// Bytes allocated by all.
+    pub fn held(&self) -> usize {
+        self.components.iter().map(|c| c.held).sum()
+    }
+
+    /// Bytes in use by all.
+    pub fn used(&self) -> usize {
+        self.components.iter().map(|c| c.used).sum()
+    }
+
+    /// The component called `name`; zero bytes if there is none.
+    pub fn of(&self, name: &'static str) -> Component {
+        let zero = Component { name, held: 0, used: 0 };
+        self.components.iter().copied().find(|c| c.name == name).unwrap_or(zero)
+    }
+}
+
+/// Held and used bytes of some arrays.
+macro_rules! arrays {
+    ($($array:expr),* $(,)?) => { [$((held(&$array), size_of_val($array.as_slice()))),*] };
+}
+
+impl World {
+    /// What the world holds, by purpose.
+    ///
+    /// Where an array cannot be looked into, as in the broad phase, used is what is held.
+    pub fn memory(&self) -> Memory {
+        let component = |name, arrays: &[(usize, usize)]| Component {
+            name,
+            held: arrays.iter().map(|a| a.0).sum(),
+            used: arrays.iter().map(|a| a.1).sum(),
+        };
+        let opaque = |bytes: usize| (bytes, bytes);
+        let b = &self.bodies;
+        let lanes = [
+            &b.position_x,
+            &b.position_y,
+            &b.position_x_lo,
+            &b.position_y_lo,
+            &b.rotation_cos,
+            &b.rotation_sin,
+            &b.velocity_x,
+            &b.velocity_y,
+            &b.angular_velocity,
+            &b.inv_mass,
+            &b.inv_inertia,
+            &b.force_x,
+            &b.force_y,
+            &b.torque,
+            &b.gravity_scale,
+            &b.linear_damping,
+            &b.angular_damping,
+        ];
+        let mut bodies: Vec<_> = lanes.iter().map(|a| (a.bytes(), 4 * a.len())).collect();
+        bodies.extend(arrays![b.local_center, b.kind, b.group, b.round]);
+        let w = &self.work;
+        let mut records = Vec::new();
+        for batches in [&w.lanes, &w.serial] {
+            records.extend(arrays![batches.segments, batches.contact, batches.row_a, batches.row_b]);
+            records.push((held(&batches.buffer), 4 * batches.vectors * batches.width));
+        }
+        records.push(opaque(w.lane_bounces.held_bytes() + w.serial_bounces.held_bytes()));
+        Memory {
+            components: vec![
+                component("bodies", &bodies),
+                component("shapes", &arrays![self.shapes, self.shape_body, self.surfaces]),
+                component("bounds", &[arrays![self.proxies][0], opaque(self.fat_boxes.held_bytes())]),
+                component("broad phase", &[opaque(self.broadphase.held_bytes())]),
+                component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
+                component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
+                component("colouring", &[opaque(self.assignment.held_bytes())]),
+                component("records", &records),
+                component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
+            ],
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! One time step of the whole pipeline, every phase timed.
+//!
+//! ```text
+//! bounds → pairs → manifolds → colours → records → solver stages → impulses, poses
+//! ```
+
+use crate::engine::bodies::{Bodies, BodyDef, BodyKind};
+use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
+use crate::engine::clock::{Clock, Phase, Timings};
+use crate::engine::constraints::assign::Assignment;
+use crate::engine::constraints::motion::{self, MotionInput};
+use crate::engine::constraints::observe::ObservedRule;
+use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::batch::Class;
+use crate::engine::params::DIVERGED_SPEED;
+use crate::engine::shapes::{Shape, combine};
+use collide::Narrow;
+use glam::Vec2;
+use traits::Traits;
+
+mod candidates;
+mod collide;
+mod counts;
+mod held;
+mod lanes;
+mod memory;
+mod pairs;
+mod settings;
+mod traits;
+
+pub use counts::{Divergence, StepCounts};
+pub use held::{HeldWorld, Probe};
+pub use memory::{Component, Memory};
+pub use settings::{Order, Settings};
+
+/// What is known of a shape for its contacts.
+#[derive(Clone, Copy, Debug)]
+struct Surface {
+    friction: f32,
+    restitution: f32,
+    /// Farthest point from the body's centre of mass (m).
+    reach: f32,
+    /// What the narrow phase knows it as.
+    class: Class,
+    /// What the narrow phase calls it.
+    number: u32,
+}
+
+/// Bodies, shapes, contacts and the settings that move them.
+pub struct World {
+    /// Body state.
+    pub bodies: Bodies,
+    /// Shapes, in the frame of their body's centre of mass.
+    pub shapes: Vec<Shape>,
+    /// Body of each shape.
+    pub shape_body: Vec<u32>,
+    /// Contacts of the last step with at least one point, sorted by shape pair.
+    pub contacts: Vec<Contact>,
+    /// What the run chose.
+    pub settings: Settings,
+    /// Times of the last step.
+    pub timings: Timings,
+    /// Counts of the last step.
+    pub counts: StepCounts,
+    /// Steps taken.
+    pub step_index: u64,
+    traits: Traits,
+    features: Features,
+    surfaces: Vec<Surface>,
+    broadphase: BroadPhase,
+    proxies: Vec<Proxy>,
+    fat_boxes: FatBoxes,
+    pairs: Vec<[u32; 2]>,
+    pairs_are_stale: bool,
+    narrow: Narrow,
+    assignment: Assignment,
+    /// What the present lanes were assigned for.
+    lanes_are_for: Option<(LaneWidth, Order, Features)>,
+    work: Workspace,
+}
+
+impl World {
+    /// An empty world.
+    pub fn new(settings: Settings) -> Self {
+        World {
+            bodies: Bodies::default(),
+            shapes: Vec::new(),
+            shape_body: Vec::new(),
+            contacts: Vec::new(),
+            broadphase: BroadPhase::new(settings.broadphase),
+            settings,
+            timings: Timings::default(),
+            counts: StepCounts::default(),
+            step_index: 0,
+            traits: Traits::default(),
+            features: Features::NONE,
+            surfaces: Vec::new(),
+            proxies: Vec::new(),
+            fat_boxes: FatBoxes::default(),
+            pairs: Vec::new(),
+            pairs_are_stale: true,
+            narrow: Narrow::default(),
+            assignment: Assignment::default(),
+            lanes_are_for: None,
+            work: Workspace::default(),
+        }
+    }
+
+    /// Adds a body whose shapes are valid; returns its index.
+    pub fn add_body(&mut self, body: &BodyDef) -> usize {
+        let parts: Vec<_> = body.shapes.iter().map(|s| s.shape.mass(s.density)).collect();
+        let mass = combine(&parts);
+        let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
+        let index = self.bodies.push(body, &mass);
+        self.bodies.round[index] = body.shapes.iter().all(|part| {
+            matches!(part.shape.translated(-center), Shape::Circle { center, .. } if center == Vec2::ZERO)
+        });
+        for part in &body.shapes {
+            let shape = part.shape.translated(-center);
+            // Fat boxes are made at the first step.
+            let aabb = shape.aabb(&self.bodies.pose(index));
+            let mut reach = 0.0_f32;
+            shape.for_each_vertex(|v| reach = reach.max(v.length()));
+            let (class, number) = self.narrow.shapes.push(&shape);
+            self.shapes.push(shape);
+            self.shape_body.push(index as u32);
+            self.surfaces.push(Surface {
+                friction: part.friction as f32,
+                restitution: part.restitution as f32,
+                reach: reach + shape.radius(),
+                class,
+                number,
+            });
+            let dynamic = body.kind == BodyKind::Dynamic;
+            self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
+        }
+        self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
+        self.traits.add(body, self.bodies.round[index]);
+        self.features = self.traits.features();
+        self.pairs_are_stale = true;
+        index
+    }
+
+    /// What the scene needs of its constraints.
+    pub fn features(&self) -> Features {
+        self.features
+    }
+
+    /// Advances by `settings.dt`.
+    pub fn step(&mut self) -> Result<(), Divergence> {
+        let mut clock = Clock::start(self.settings.timed);
+        self.solve(&mut clock);
+        self.store();
+        clock.lap(Phase::Store);
+        self.step_index += 1;
+        self.timings = clock.stop();
+        self.check()
+    }
+
+    /// Velocities and motions of the rows to the bodies.
+    fn store(&mut self) {
+        self.work.motion.finish(&mut self.work.rows);
+        motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
+    }
+
+    /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that
+    /// one phase can be measured again and again on the same state. Impulses are kept.
+    pub fn frozen_step(&mut self) {
+        let mut clock = Clock::start(self.settings.timed);
+        self.pairs_are_stale = true;
+        self.solve(&mut clock);
+        self.timings = clock.stop();
+    }
+
+    /// Finds the contacts of the coming step, with the impulses that it would start from, and
+    /// solves nothing. The step finds the same contacts again.
+    pub fn find_contacts(&mut self) {
+        self.update_pairs();
+        self.update_contacts();
+    }
+
+    /// The rule of the last step's last velocity sweep: none without one, or without
+    /// `Settings::observe_rule`.
+    pub fn observed_rule(&self) -> Option<&ObservedRule> {
+        self.work.last_rule.as_ref()
+    }
+
+    /// The constraint records and body rows of the last step, for benches of single kernels.
+    pub fn workspace(&mut self) -> &mut Workspace {
+        &mut self.work
+    }
+
+    /// Everything of a step up to the new velocities and motions in the rows.
+    fn solve(&mut self, clock: &mut Clock) {
+        self.update_pairs();
+        clock.lap(Phase::Pairs);
+        self.update_contacts();
+        clock.lap(Phase::Collide);
+        self.assign_lanes(&self.kernel_features());
+        clock.lap(Phase::Color);
+        self.load_rows();
+        clock.lap(Phase::Prepare);
+        let count = self.run_solver(clock);
+        (self.counts.sweeps, self.counts.row_updates) = (count.sweeps, count.row_updates);
+    }
+
+    /// Body rows and what moves them, from the bodies.
+    fn load_rows(&mut self) {
+        let (features, s) = (self.kernel_features(), &self.settings);
+        let motion = MotionInput {
+            gravity: s.gravity,
+            h: s.h(),
+            features: Features { damping: features.damping, ..self.features },
+            integrator: s.integrator,
+            rotation: s.rotation,
+        };
+        self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
+    }
+
+    /// The solver's stages, on rows and lanes that are ready.
+    fn run_solver(&mut self, clock: &mut Clock) -> WorkCount {
+        let s = &self.settings;
+        let input = StepInput {
+            features: self.kernel_features(),
+            budget: s.budget,
+            h: s.h(),
+            contact_hertz: s.contact_hertz,
+            record_impulses: s.record_impulses,
+            points: self.counts.points,
+        };
+        (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
+        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width)
+    }
+
+    /// The scene's needs and the extra ones, completed to a set that has a kernel:
+    /// friction and second points act through rotation.
+    fn kernel_features(&self) -> Features {
+        let mut features = self.features.union(self.settings.extra_features);
+        features.rotation |= features.friction || features.two_points;
+        features
+    }
+
+    /// Reports the first body that is out of all bounds.
+    fn check(&self) -> Result<(), Divergence> {
+        let b = &self.bodies;
+        // Cut to one length and without branches, so that the compiler does it in lanes.
+        let arrays = [&b.velocity_x, &b.velocity_y, &b.angular_velocity, &b.position_x, &b.position_y];
+        let [vx, vy, w, x, y] = arrays.map(|array| &array[..b.len()]);
+        let bad = |i: usize| {
+            // NaN is bad, too.
+            !((vx[i] * vx[i] + vy[i] * vy[i] <= DIVERGED_SPEED * DIVERGED_SPEED)
+                & (w[i].abs() <= DIVERGED_SPEED)
+                & ((x[i] + y[i]).abs() < f32::INFINITY))
+        };
+        if !(0..b.len()).fold(false, |any, i| any | bad(i)) {
+            return Ok(());
+        }
+        let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
+        let speed = b.velocity(body).length().max(b.angular_velocity[body].abs());
+        Err(Divergence { step: self.step_index, body, speed })
+    }
+
+    /// Hash (FNV-1a) of every bit of the body state.
+    pub fn state_hash(&self) -> u64 {
+        let b = &self.bodies;
+        let arrays = [
+            &b.position_x,
+            &b.position_y,
+            &b.position_x_lo,
+            &b.position_y_lo,
+            &b.rotation_cos,
+            &b.rotation_sin,
+            &b.velocity_x,
+            &b.velocity_y,
+            &b.angular_velocity,
+        ];
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        for value in arrays.into_iter().flat_map(|array| array.iter()) {
+            hash = (hash ^ value.to_bits() as u64).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+        hash
+    }
+}

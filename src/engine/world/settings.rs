@@ -1,0 +1,79 @@
+//! What a run can choose.
+
+use crate::engine::broadphase::BroadPhaseKind;
+use crate::engine::constraints::Features;
+use crate::engine::constraints::motion::{Integrator, RotationUpdate};
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::solvers::Variant;
+
+/// The order in which constraints are solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum Order {
+    /// One after the other, sorted by shape pair (width 1 only).
+    Natural,
+    /// Colour by colour.
+    Colored,
+}
+
+/// Everything a run can choose.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Row of [`crate::engine::solvers::VARIANTS`].
+    pub solver: &'static Variant,
+    /// Lanes per instruction.
+    pub width: LaneWidth,
+    /// Constraint order.
+    pub order: Order,
+    /// Work per step.
+    pub budget: Budget,
+    /// m/s²
+    pub gravity: [f32; 2],
+    /// Step (s).
+    pub dt: f32,
+    /// Stiffness of soft contacts (Hz), for solvers that have them.
+    pub contact_hertz: f32,
+    /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
+    pub record_impulses: bool,
+    /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
+    pub observe_rule: bool,
+    /// Read the clock around every phase.
+    pub timed: bool,
+    /// How candidate pairs are found.
+    pub broadphase: BroadPhaseKind,
+    /// How velocities move bodies.
+    pub integrator: Integrator,
+    /// How spins turn bodies.
+    pub rotation: RotationUpdate,
+    /// Needs modelled on top of those that the scene has, to measure what they cost.
+    pub extra_features: Features,
+}
+
+impl Settings {
+    /// Standard settings of `solver`: its budget, 8 lanes, coloured, gravity (0, −10), 1/60 s.
+    pub fn new(solver: &'static Variant) -> Self {
+        Settings {
+            solver,
+            width: LaneWidth::W8,
+            order: Order::Colored,
+            budget: solver.budget,
+            gravity: [0.0, -10.0],
+            dt: 1.0 / 60.0,
+            contact_hertz: CONTACT_HERTZ,
+            record_impulses: false,
+            observe_rule: false,
+            timed: false,
+            broadphase: BroadPhaseKind::default(),
+            integrator: Integrator::default(),
+            rotation: RotationUpdate::default(),
+            extra_features: Features::NONE,
+        }
+    }
+
+    /// Substep (s).
+    pub fn h(&self) -> f32 {
+        self.dt / self.budget.substeps as f32
+    }
+}

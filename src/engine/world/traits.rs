@@ -1,0 +1,60 @@
+//! What the bodies of a world have, summed up as they are added.
+
+use crate::engine::bodies::{BodyDef, BodyKind};
+use crate::engine::constraints::Features;
+use crate::engine::shapes::Shape;
+
+/// Bodies that have a property, and whether a dynamic one is among them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Having {
+    bodies: usize,
+    dynamic: bool,
+}
+
+impl Having {
+    fn add(&mut self, has: bool, dynamic: bool) {
+        self.bodies += usize::from(has);
+        self.dynamic |= has && dynamic;
+    }
+
+    /// Whether some pair that can touch has the property on both sides.
+    fn pair(self) -> bool {
+        self.bodies >= 2 && self.dynamic
+    }
+}
+
+/// What decides the needs of a scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Traits {
+    rub: Having,
+    corner: Having,
+    spins: bool,
+    has_other_than_discs: bool,
+    bounces: bool,
+    damped: bool,
+}
+
+impl Traits {
+    /// Takes note of a body; `round` if it is made of discs about its centre of mass.
+    pub fn add(&mut self, body: &BodyDef, round: bool) {
+        let dynamic = body.kind == BodyKind::Dynamic;
+        let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
+        self.rub.add(any(|s| s.friction as f32 > 0.0), dynamic);
+        self.corner.add(any(|s| !matches!(s.shape, Shape::Circle { .. })), dynamic);
+        self.spins |= body.kind != BodyKind::Static && body.angular_velocity as f32 != 0.0;
+        self.has_other_than_discs |= dynamic && !round;
+        self.bounces |= any(|s| s.restitution as f32 > 0.0);
+        self.damped |= body.linear_damping as f32 > 0.0 || body.angular_damping as f32 > 0.0;
+    }
+
+    /// What constraints between such bodies need.
+    pub fn features(&self) -> Features {
+        Features {
+            rotation: self.rub.pair() || self.spins || self.has_other_than_discs,
+            friction: self.rub.pair(),
+            restitution: self.bounces,
+            two_points: self.corner.pair(),
+            damping: self.damped,
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! Which setting is the cheapest that is good enough for a scene?
+//!
+//! A *setting* is a solver, a constraint order, a budget and, for solvers with soft contacts,
+//! their stiffness; the fastest lane width goes with it. The search
+//!
+//! 1. tries a grid in which every part of the budget is doubled, the least work first;
+//! 2. refines what is good enough: each part is lowered by bisection towards its half;
+//! 3. races the best few again, side by side and several times, and lets that decide.
+//!
+//! Left out is what should only cost more than something known: a budget that contains, in
+//! every part, one of the same solver, order and stiffness that is good enough already; or one
+//! of the same solver and order that took far longer than is allowed, or than the fastest
+//! that is good enough. Errors need not fall when a budget grows, so a setting that is left
+//! out might be more exact; it should not be cheaper.
+
+pub mod limits;
+mod search;
+
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::Budget;
+use crate::engine::solvers::Variant;
+use crate::engine::world::{Order, Settings};
+use crate::lab::error::Error;
+use crate::lab::metrics::Errors;
+use crate::lab::study::interleave::{Sample, race};
+use crate::lab::study::pareto::tie;
+use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
+use limits::Limits;
+use search::Search;
+
+/// What to search, and how long.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Name of the catalogue with its size, or a `.json` file.
+    pub scene: String,
+    /// What is good enough.
+    pub limits: Limits,
+    /// Rows of [`crate::engine::solvers::VARIANTS`].
+    pub solvers: Vec<&'static Variant>,
+    /// Lane widths of coloured settings; with one lane there is natural order too.
+    pub widths: Vec<LaneWidth>,
+    /// Steps of the runs that measure errors; where none, the scene's own.
+    pub steps: Option<u32>,
+    /// Timing runs of the final race.
+    pub repeats: u32,
+    /// Lays out scenes that have chance in them, and shuffles races.
+    pub seed: u64,
+    /// No trial begins after this long (s).
+    pub seconds: f64,
+}
+
+/// Steps of a trial's timing, and of the final race.
+const TRIAL_STEPS: u32 = 60;
+const RACE_STEPS: u32 = 200;
+
+/// Settings in the final race; the best of every other solver is in it too.
+const FINALISTS: usize = 4;
+
+/// A solver, an order, a budget and a stiffness.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Row of the table of solvers.
+    pub solver: &'static Variant,
+    /// Constraint order.
+    pub order: Order,
+    /// Work per step.
+    pub budget: Budget,
+    /// Stiffness of soft contacts (Hz); none where the solver has none.
+    pub contact_hertz: Option<f32>,
+}
+
+impl Setting {
+    /// The settings of a world, at this width.
+    pub fn settings(&self, width: LaneWidth) -> Settings {
+        let standard = Settings::new(self.solver);
+        Settings {
+            order: self.order,
+            budget: self.budget,
+            width,
+            contact_hertz: self.contact_hertz.unwrap_or(standard.contact_hertz),
+            ..standard
+        }
+    }
+
+    /// `soft_step, 4 sub 1 vel 1 rel, 30 Hz`
+    pub fn text(&self) -> String {
+        let mut text = format!("{}, {}", self.solver.name, budget::brief(&self.budget, self.solver));
+        if let Some(hertz) = self.contact_hertz {
+            text += &format!(", {hertz} Hz");
+        }
+        text
+    }
+}
+
+/// A time and where it was reached.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Time {
+    /// Lanes per instruction.
+    pub lanes: usize,
+    /// Median time of a step (ns).
+    pub median_ns: f64,
+    /// Its spread (ns), see [`Sample::spread_ns`].
+    pub spread_ns: f64,
+}
+
+/// A setting with what it costs and how wrong it is.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What was tried.
+    pub setting: Setting,
+    /// At the fastest width; none if the run failed.
+    pub time: Option<Time>,
+    /// None if the run failed.
+    pub errors: Option<Errors>,
+    /// Distance to what is known about the scene.
+    pub truth: Option<TruthError>,
+    /// Why there is no result.
+    pub failure: Option<Failure>,
+    /// The largest of errors and time in their limits: up to 1 is good enough.
+    pub excess: f64,
+}
+
+impl Trial {
+    /// Whether it keeps every limit.
+    pub fn is_good(&self) -> bool {
+        self.excess <= 1.0
+    }
+
+    fn time_ns(&self) -> f64 {
+        self.time.map_or(f64::INFINITY, |t| t.median_ns)
+    }
+
+    /// Whether the times of two trials differ by no more than noise.
+    pub fn ties(&self, other: &Trial) -> bool {
+        let of = |t: Time| [t.median_ns, t.spread_ns];
+        matches!((self.time, other.time), (Some(a), Some(b)) if tie(of(a), of(b)))
+    }
+}
+
+/// What the search found.
+#[derive(Clone, Debug)]
+pub struct Advice {
+    /// The settings of the final race: those that are good enough, fastest first, then the
+    /// others, nearest first. The first one is the advice if it is good enough.
+    pub finalists: Vec<Trial>,
+    /// Everything that was tried, in that order, with the times of the trials.
+    pub trials: Vec<Trial>,
+    /// Settings left out because they should not be cheaper.
+    pub left_out: usize,
+    /// Whether the time was up before the grid was done.
+    pub is_cut_short: bool,
+    /// Timing runs and steps of the final race.
+    pub race: [u32; 2],
+}
+
+impl Advice {
+    /// The cheapest setting that is good enough.
+    pub fn best(&self) -> Option<&Trial> {
+        self.finalists.first().filter(|t| t.is_good())
+    }
+
+    /// The next one that is good enough.
+    pub fn runner_up(&self) -> Option<&Trial> {
+        self.finalists.get(1).filter(|t| t.is_good())
+    }
+
+    /// Of what is not good enough, the nearest.
+    pub fn nearest(&self) -> Option<&Trial> {
+        self.finalists.iter().find(|t| !t.is_good())
+    }
+}
+
+/// Searches and races.
+///
+/// Errors: a scene that there is not, a truth asked for where none is known.
+pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
+    for (name, missing) in [("solvers", plan.solvers.is_empty()), ("lanes", plan.widths.is_empty())] {
+        if missing {
+            return Err(Error::invalid(name, "none given"));
+        }
+    }
+    for (name, count) in [("steps", plan.steps.unwrap_or(1)), ("repeats", plan.repeats)] {
+        if count == 0 {
+            return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
+        }
+    }
+    let loaded = open_scene(&plan.scene, Some(plan.seed), plan.steps, None)?;
+    if plan.limits.truth.is_some() && loaded.truth.is_none() {
+        return Err(Error::invalid("max-truth", format!("no truth is known about '{}'", plan.scene)));
+    }
+    let mut search = Search::new(plan, &loaded.scene, progress);
+    search.coarse()?;
+    search.refine()?;
+    progress(Progress { done: 1, total: 1, what: "final race".to_string() });
+    let Search { trials, left_out, is_cut_short, .. } = search;
+
+    let mut finalists = choose(&trials);
+    let steps = loaded.scene.steps.min(RACE_STEPS);
+    race_again(plan, &loaded.scene, &mut finalists, steps)?;
+    rank(&mut finalists);
+    Ok(Advice { finalists, trials, left_out, is_cut_short, race: [plan.repeats, steps] })
+}
+
+/// The best few, and the best of every solver that is not among them. Where none is good, all
+/// of them are the nearest of their solver.
+fn choose(trials: &[Trial]) -> Vec<Trial> {
+    let mut ranked = trials.to_vec();
+    rank(&mut ranked);
+    let few = if ranked.first().is_some_and(Trial::is_good) { FINALISTS } else { 1 };
+    let mut chosen: Vec<Trial> = Vec::new();
+    for trial in ranked {
+        let is_new = chosen.iter().all(|t| t.setting.solver.name != trial.setting.solver.name);
+        if is_new || (chosen.len() < few && trial.is_good()) {
+            chosen.push(trial);
+        }
+    }
+    chosen
+}
+
+/// Good ones by time, then the others by how far they are over the limits.
+fn rank(trials: &mut [Trial]) {
+    let key = |t: &Trial| if t.is_good() { (false, t.time_ns()) } else { (true, t.excess) };
+    trials.sort_by(|a, b| {
+        let (a, b) = (key(a), key(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+}
+
+/// Widths at which a setting may run.
+fn widths(plan: &Plan, order: Order) -> Vec<LaneWidth> {
+    match order {
+        Order::Natural => vec![LaneWidth::W1],
+        Order::Colored => plan.widths.clone(),
+    }
+}
+
+/// Times all finalists at all widths side by side, and judges them by that.
+fn race_again(
+    plan: &Plan,
+    scene: &crate::lab::scenes::Scene,
+    finalists: &mut [Trial],
+    steps: u32,
+) -> Result<(), Error> {
+    let runs: Vec<(usize, LaneWidth)> = finalists
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| t.errors.is_some())
+        .flat_map(|(i, t)| widths(plan, t.setting.order).into_iter().map(move |w| (i, w)))
+        .collect();
+    let settings: Vec<Settings> = runs.iter().map(|&(i, w)| finalists[i].setting.settings(w)).collect();
+    let laps = race(scene, &settings, steps, plan.repeats, plan.seed)?;
+    for (i, trial) in finalists.iter_mut().enumerate() {
+        let own = runs.iter().zip(&laps).filter(|((j, _), _)| *j == i);
+        let laps = own.filter_map(|((_, width), lap)| Some((*width, lap.as_ref().ok()?)));
+        if let Some(time) = fastest(laps) {
+            trial.time = Some(time);
+            trial.excess = excess(&plan.limits, trial);
+        }
+    }
+    Ok(())
+}
+
+fn fastest<'a>(laps: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<Time> {
+    let (width, lap) = laps.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
+    Some(Time { lanes: width.lanes(), median_ns: lap.median_ns, spread_ns: lap.spread_ns })
+}
+
+fn excess(limits: &Limits, trial: &Trial) -> f64 {
+    let Some(errors) = &trial.errors else { return f64::INFINITY };
+    limits.of_errors(errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::find;
+
+    pub fn trial(time: f64, excess: f64) -> Trial {
+        let solver = find("pgs").unwrap();
+        let setting = Setting { solver, order: Order::Colored, budget: solver.budget, contact_hertz: None };
+        let time = Some(Time { lanes: 8, median_ns: time, spread_ns: 0.0 });
+        Trial { setting, time, errors: Some(Errors::default()), truth: None, failure: None, excess }
+    }
+
+    #[test]
+    fn good_ones_are_ranked_by_time_and_the_others_by_excess() {
+        let mut trials = [trial(1.0, 9.0), trial(30.0, 0.9), trial(99.0, 2.0), trial(20.0, 1.0)];
+        rank(&mut trials);
+        assert_eq!(trials.each_ref().map(|t| t.time_ns()), [20.0, 30.0, 99.0, 1.0]);
+        let advice = Advice {
+            finalists: trials.to_vec(),
+            trials: Vec::new(),
+            left_out: 0,
+            is_cut_short: false,
+            race: [1, 1],
+        };
+        let time = |t: Option<&Trial>| t.map(Trial::time_ns);
+        assert_eq!(time(advice.best()), Some(20.0));
+        assert_eq!((time(advice.runner_up()), time(advice.nearest())), (Some(30.0), Some(99.0)));
+        let none = Advice { finalists: vec![trial(1.0, 2.0)], ..advice };
+        assert_eq!(
+            (time(none.best()), time(none.runner_up()), time(none.nearest())),
+            (None, None, Some(1.0))
+        );
+    }
+
+    #[test]
+    fn the_best_few_race_and_the_best_of_every_other_solver() {
+        let by = |name: &str, time: f64, excess: f64| {
+            let mut trial = trial(time, excess);
+            trial.setting.solver = find(name).unwrap();
+            trial
+        };
+        let mut trials: Vec<Trial> = (1..9).map(|i| by("pgs", f64::from(i), 0.5)).collect();
+        trials.extend([by("projection", 1.0, 7.0), by("projection", 9.0, 3.0)]);
+        trials.extend([by("soft_step", 60.0, 0.1), by("soft_step", 50.0, 0.1)]);
+        let times = |trials: &[Trial]| choose(trials).iter().map(Trial::time_ns).collect::<Vec<_>>();
+        assert_eq!(times(&trials), [1.0, 2.0, 3.0, 4.0, 50.0, 9.0]);
+        assert_eq!(times(&trials[8..10]), [9.0]);
+    }
+
+    #[test]
+    fn a_setting_says_what_it_is() {
+        let soft = find("soft_step").unwrap();
+        let setting =
+            Setting { solver: soft, order: Order::Natural, budget: soft.budget, contact_hertz: Some(60.0) };
+        assert_eq!(setting.text(), "soft_step, 4 sub 1 vel 1 rel, 60 Hz");
+        let settings = setting.settings(LaneWidth::W1);
+        assert_eq!(
+            (settings.contact_hertz, settings.order, settings.budget),
+            (60.0, Order::Natural, soft.budget)
+        );
+    }
+}

@@ -1,0 +1,339 @@
+//! The grid, the bisection, and what can be left out.
+
+use super::{Plan, Setting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
+use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::solvers::Variant;
+use crate::engine::world::Order;
+use crate::lab::error::Error;
+use crate::lab::scenes::Scene;
+use crate::lab::study::interleave::race;
+use crate::lab::study::{Failure, Progress, observe, open_scene};
+use std::time::Instant;
+
+/// Most substeps, most sweeps per substep, and most sweeps of a kind per step of the grid.
+const MOST_SUBSTEPS: u32 = 32;
+const MOST_SWEEPS: u32 = 64;
+
+/// Stiffnesses to try, in times the standard one. Where the substep caps them, the equal ones
+/// count once.
+const STIFFNESSES: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// A budget has to be too slow by this factor before larger ones are left out: a scene that is
+/// solved badly moves more and touches more, so that a larger budget can be somewhat faster. On
+/// the pyramid of 40 rows, four substeps take nine tenths of the time of two.
+const TOO_SLOW: f64 = 1.5;
+
+/// Good settings to refine.
+const REFINED: usize = 4;
+
+/// A search under way.
+pub struct Search<'a> {
+    plan: &'a Plan,
+    scene: &'a Scene,
+    progress: &'a dyn Fn(Progress),
+    start: Instant,
+    total: usize,
+    /// Everything tried so far.
+    pub trials: Vec<Trial>,
+    /// What was left out because it can only cost more.
+    pub left_out: usize,
+    /// Whether the time was up before the grid was done.
+    pub is_cut_short: bool,
+}
+
+/// The parts of a budget.
+fn parts(b: &Budget) -> [u32; 4] {
+    [b.substeps, b.velocity_iterations, b.relax_iterations, b.position_iterations]
+}
+
+fn from_parts([substeps, velocity_iterations, relax_iterations, position_iterations]: [u32; 4]) -> Budget {
+    Budget { substeps, velocity_iterations, relax_iterations, position_iterations }
+}
+
+/// Whether `large` has at least as much of everything.
+fn contains(large: &Budget, small: &Budget) -> bool {
+    parts(large).iter().zip(parts(small)).all(|(l, s)| *l >= s)
+}
+
+fn sweeps(b: &Budget) -> u32 {
+    b.substeps * (b.velocity_iterations + b.relax_iterations + b.position_iterations)
+}
+
+/// Budgets of a solver with every part doubled from 1: velocity and position sweeps together,
+/// relaxing sweeps as in its standard budget.
+pub fn budgets(solver: &Variant) -> Vec<Budget> {
+    let mut budgets = Vec::new();
+    let doubled = |most: u32| (0..).map(|i| 1 << i).take_while(move |&n: &u32| n <= most);
+    for substeps in doubled(MOST_SUBSTEPS) {
+        for n in doubled(MOST_SWEEPS / substeps) {
+            let or = |used: bool, own: u32| if used { n } else { own };
+            let standard = solver.budget;
+            let budget = Budget {
+                substeps,
+                velocity_iterations: or(solver.uses.velocity, standard.velocity_iterations),
+                position_iterations: or(solver.uses.position, standard.position_iterations),
+                ..standard
+            };
+            if !budgets.contains(&budget) {
+                budgets.push(budget);
+            }
+        }
+    }
+    budgets
+}
+
+/// Stiffnesses (Hz) that make a difference with substeps of `h` (s); none for rigid contacts.
+pub fn stiffnesses(solver: &Variant, h: f32) -> Vec<Option<f32>> {
+    let Some(softness) = solver.softness else { return vec![None] };
+    let mut kept: Vec<f32> = Vec::new();
+    for hertz in STIFFNESSES.map(|s| s * CONTACT_HERTZ) {
+        if !kept.iter().any(|&k| softness(k, h) == softness(hertz, h)) {
+            kept.push(hertz);
+        }
+    }
+    kept.into_iter().map(Some).collect()
+}
+
+impl<'a> Search<'a> {
+    /// Nothing tried yet; the clock runs.
+    pub fn new(plan: &'a Plan, scene: &'a Scene, progress: &'a dyn Fn(Progress)) -> Self {
+        Search {
+            plan,
+            scene,
+            progress,
+            start: Instant::now(),
+            total: 0,
+            trials: Vec::new(),
+            left_out: 0,
+            is_cut_short: false,
+        }
+    }
+
+    /// The grid, the least work first, so that what is left out is known early.
+    pub fn coarse(&mut self) -> Result<(), Error> {
+        let orders: &[Order] = match self.plan.widths.iter().any(|w| w.lanes() == 1) {
+            true => &[Order::Natural, Order::Colored],
+            false => &[Order::Colored],
+        };
+        let mut grid = Vec::new();
+        for &solver in &self.plan.solvers {
+            for budget in budgets(solver) {
+                let h = self.scene.dt as f32 / budget.substeps as f32;
+                for contact_hertz in stiffnesses(solver, h) {
+                    grid.extend(orders.iter().map(|&order| Setting { solver, order, budget, contact_hertz }));
+                }
+            }
+        }
+        grid.sort_by_key(|s| sweeps(&s.budget));
+        self.total = grid.len();
+        for setting in grid {
+            if !self.consider(setting)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lowers each part of the best good settings, one after the other, by bisection.
+    pub fn refine(&mut self) -> Result<(), Error> {
+        let mut good: Vec<Trial> = self.trials.iter().filter(|t| t.is_good()).cloned().collect();
+        rank(&mut good);
+        for trial in good.iter().take(REFINED) {
+            let mut setting = trial.setting;
+            for part in 0..4 {
+                // The grid knows the half; a part of 0 or 1 has nothing below it.
+                let (mut low, mut high) = (parts(&setting.budget)[part] / 2, parts(&setting.budget)[part]);
+                while high - low > 1 && low > 0 {
+                    let middle = low + (high - low) / 2;
+                    let mut lowered = parts(&setting.budget);
+                    lowered[part] = middle;
+                    let candidate = Setting { budget: from_parts(lowered), ..setting };
+                    if !self.consider(candidate)? {
+                        return Ok(());
+                    }
+                    let is_good = self.trial_of(&candidate).is_some_and(Trial::is_good);
+                    if is_good {
+                        (high, setting) = (middle, candidate);
+                    } else {
+                        low = middle;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn trial_of(&self, s: &Setting) -> Option<&Trial> {
+        self.trials.iter().find(|t| same(&t.setting, s) && t.setting.budget == s.budget)
+    }
+
+    /// Tries a setting unless it is known or can be left out; says whether there is time for more.
+    fn consider(&mut self, setting: Setting) -> Result<bool, Error> {
+        if self.start.elapsed().as_secs_f64() > self.plan.seconds {
+            self.is_cut_short = true;
+            return Ok(false);
+        }
+        if self.trial_of(&setting).is_some() {
+            return Ok(true);
+        }
+        if self.can_only_cost_more(&setting) {
+            self.left_out += 1;
+            return Ok(true);
+        }
+        let done = self.trials.len() + self.left_out;
+        self.total = self.total.max(done + 1);
+        (self.progress)(Progress { done, total: self.total, what: setting.text() });
+        let trial = self.run(setting)?;
+        self.trials.push(trial);
+        Ok(true)
+    }
+
+    /// See the [module above](super).
+    fn can_only_cost_more(&self, s: &Setting) -> bool {
+        let fastest =
+            self.trials.iter().filter(|t| t.is_good()).map(Trial::time_ns).fold(f64::INFINITY, f64::min);
+        let limit = fastest.min(self.plan.limits.time_ns.unwrap_or(f64::INFINITY)) * TOO_SLOW;
+        self.trials.iter().any(|t| {
+            let own = &t.setting;
+            let smaller = contains(&s.budget, &own.budget) && s.budget != own.budget;
+            let is_slow = t.time.is_some_and(|time| time.median_ns > limit);
+            let alike = own.solver.name == s.solver.name && own.order == s.order;
+            smaller && alike && (is_slow || (t.is_good() && same(own, s)))
+        })
+    }
+
+    /// Errors from a whole run, time from a short race of all widths.
+    fn run(&self, setting: Setting) -> Result<Trial, Error> {
+        let loaded = open_scene(&self.plan.scene, Some(self.plan.seed), self.plan.steps, None)?;
+        let widths = widths(self.plan, setting.order);
+        let widest = widths.iter().copied().max().unwrap_or(crate::engine::lanes::LaneWidth::W1);
+        let outcome = observe(loaded, setting.settings(widest), 0)?;
+        let mut trial = Trial {
+            setting,
+            time: None,
+            errors: outcome.errors.ok(),
+            truth: outcome.truth,
+            failure: outcome.errors.err().map(Failure::from),
+            excess: f64::INFINITY,
+        };
+        if trial.errors.is_some() {
+            let settings: Vec<_> = widths.iter().map(|&w| setting.settings(w)).collect();
+            let laps = race(self.scene, &settings, self.scene.steps.min(TRIAL_STEPS), 1, self.plan.seed)?;
+            let finished = widths.iter().zip(&laps).filter_map(|(&w, lap)| Some((w, lap.as_ref().ok()?)));
+            trial.time = fastest(finished);
+            trial.excess = excess(&self.plan.limits, &trial);
+        }
+        Ok(trial)
+    }
+}
+
+/// Whether two settings differ in their budget at most.
+fn same(a: &Setting, b: &Setting) -> bool {
+    a.solver.name == b.solver.name && a.order == b.order && a.contact_hertz == b.contact_hertz
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::limits::Limits;
+    use super::super::tests::trial;
+    use super::*;
+    use crate::engine::lanes::LaneWidth;
+    use crate::engine::solvers::{VARIANTS, find};
+    use crate::lab::scenes;
+
+    #[test]
+    fn the_grid_doubles_and_is_bounded() {
+        for variant in &VARIANTS {
+            let grid = budgets(variant);
+            assert!(
+                grid.iter().all(|b| b.substeps * b.velocity_iterations <= MOST_SWEEPS),
+                "{}",
+                variant.name
+            );
+            assert!(grid.iter().all(|b| crate::lab::study::budget::check(b, variant).is_ok()));
+            assert!(grid.iter().all(|b| b.substeps.is_power_of_two()));
+        }
+        // 1 to 64 sweeps in 1 substep, 1 to 32 in 2, … 1 and 2 in 32.
+        assert_eq!(budgets(find("pgs").unwrap()).len(), 7 + 6 + 5 + 4 + 3 + 2);
+    }
+
+    #[test]
+    fn capped_stiffnesses_count_once() {
+        let soft = find("soft_step").unwrap();
+        // The cap is an eighth of the substep rate: 7.5 Hz in 1/60 s, 60 in 1/480, 240 in 1/1920.
+        let count = |rate: f32| stiffnesses(soft, 1.0 / rate).len();
+        assert_eq!([count(60.0), count(480.0), count(1920.0)], [1, 3, 4]);
+        assert_eq!(stiffnesses(find("pgs").unwrap(), 0.01), [None]);
+    }
+
+    fn plan(limits: Limits) -> Plan {
+        Plan {
+            scene: "stack:1".to_string(),
+            limits,
+            solvers: vec![find("pgs").unwrap()],
+            widths: vec![LaneWidth::W8],
+            steps: None,
+            repeats: 1,
+            seed: 1,
+            seconds: 1e9,
+        }
+    }
+
+    #[test]
+    fn only_what_costs_more_is_left_out() {
+        let scene = scenes::load("stack:1").unwrap().scene;
+        let plan = plan(Limits { time_ns: Some(50.0), ..Limits::default() });
+        let mut search = Search::new(&plan, &scene, &|_| ());
+        let known = |velocity: u32, time: f64, excess: f64| {
+            let mut known = trial(time, excess);
+            known.setting.budget.velocity_iterations = velocity;
+            known
+        };
+        let asked = |search: &Search, velocity: u32| {
+            let setting = known(velocity, 0.0, 0.0).setting;
+            let natural = Setting { order: Order::Natural, ..setting };
+            [search.can_only_cost_more(&setting), search.can_only_cost_more(&natural)]
+        };
+        search.trials = vec![known(8, 10.0, 2.0)];
+        assert_eq!(asked(&search, 16), [false, false]);
+        // Good with 16 sweeps in 20 ns: 17 are left out, 15 are not; nor is the other order.
+        search.trials.push(known(16, 20.0, 0.5));
+        assert_eq!([asked(&search, 15), asked(&search, 17)], [[false, false], [true, false]]);
+        // Not good, but slower than one and a half times the fastest good one; or the limit.
+        search.trials = vec![known(8, 31.0, 2.0), known(64, 20.0, 0.5)];
+        assert_eq!(asked(&search, 16), [true, false]);
+        search.trials = vec![known(8, 76.0, 2.0)];
+        assert_eq!(asked(&search, 16), [true, false]);
+        search.trials = vec![known(8, 74.0, 2.0)];
+        assert_eq!(asked(&search, 16), [false, false]);
+    }
+
+    #[test]
+    fn bisection_ends_at_the_least_that_is_good() {
+        let scene = scenes::load("stack:4").unwrap().scene;
+        let limits = Limits { penetration: Some(2e-3), ..Limits::default() };
+        let plan = Plan { scene: "stack:4".to_string(), steps: Some(60), ..plan(limits) };
+        let mut search = Search::new(&plan, &scene, &|_| ());
+        // Known to be good, and so slow that no time leaves anything out.
+        let mut known = trial(1e15, 0.5);
+        known.setting.budget = from_parts([1, 64, 0, 0]);
+        search.trials.push(known);
+        search.refine().unwrap();
+        let tried: Vec<(u32, bool)> =
+            search.trials[1..].iter().map(|t| (t.setting.budget.velocity_iterations, t.is_good())).collect();
+        // 48 first, then towards the boundary between the largest bad and the least good one.
+        assert_eq!((tried.len(), tried[0].0), (5, 48));
+        let least_good = tried.iter().filter(|t| t.1).map(|t| t.0).min().unwrap_or(64);
+        let most_bad = tried.iter().filter(|t| !t.1).map(|t| t.0).max().unwrap_or(32);
+        assert_eq!(least_good, most_bad + 1, "{tried:?}");
+    }
+
+    #[test]
+    fn no_time_is_no_trial() {
+        let scene = scenes::load("stack:1").unwrap().scene;
+        let plan = Plan { seconds: -1.0, ..plan(Limits::default()) };
+        let mut search = Search::new(&plan, &scene, &|_| ());
+        search.coarse().unwrap();
+        assert!(search.is_cut_short && search.trials.is_empty());
+    }
+}

@@ -1,0 +1,99 @@
+//! Freezing: the contact problem that a world's next step is about to solve.
+//!
+//! What the world stores is converted exactly, since every `f32` is an `f64`: velocities, inverse
+//! masses and inertias, normals, gaps, friction coefficients, and warm-start impulses. What the
+//! step would compute in `f32` is computed in `f64` from those: the arms r × n and r × t, and the
+//! free velocities
+//!
+//! ```text
+//! v* = v/(1 + h c) + h a,    h = dt.
+//! ```
+//!
+//! So the problem differs from the one in the solver's registers by the rounding of `f32`, and a
+//! solver's residual on it has a floor of that size.
+//!
+//! The problem is that of the whole step, as if it were not cut into substeps. Impulses kept from
+//! a run with k substeps are those of its last substep, of length dt/k; a warm start of the whole
+//! step begins with k times as much.
+//!
+//! Bouncing is no part of it: sweeps solve the inelastic problem, and restitution is a pass of its
+//! own after them (see [`crate::engine::constraints::restitution`]). So `rebound` is zero.
+
+use crate::engine::bodies::BodyKind;
+use crate::engine::contacts::{Contact, ManifoldPoint};
+use crate::engine::world::World;
+use crate::lab::reference::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+use glam::Vec2;
+
+/// The problem of the coming step, under this name.
+///
+/// Finds the contacts of the step, but moves nothing. Static bodies are left out; bodies keep
+/// their order, contacts are sorted by shape pair. Where nothing in the scene can turn a body,
+/// inertias are infinite, as they are in the step.
+pub fn capture(world: &mut World, name: impl Into<String>) -> ContactProblem {
+    world.find_contacts();
+    let mut bodies = Vec::new();
+    let mut index = Vec::new();
+    for i in 0..world.bodies.len() {
+        let moves = world.bodies.kind[i] != BodyKind::Static;
+        index.push(moves.then_some(bodies.len() as u32));
+        if moves {
+            bodies.push(body(world, i));
+        }
+    }
+    let substeps = f64::from(world.settings.budget.substeps);
+    let mut contacts = Vec::new();
+    for (manifold, contact) in world.contacts.iter().enumerate() {
+        for point in contact.manifold.points() {
+            contacts.push(ProblemContact {
+                body_a: index[contact.body_a as usize],
+                body_b: index[contact.body_b as usize],
+                manifold: manifold as u32,
+                ..row(contact, point, substeps)
+            });
+        }
+    }
+    ContactProblem { name: name.into(), h: f64::from(world.settings.dt), bodies, contacts }
+}
+
+fn body(world: &World, i: usize) -> ProblemBody {
+    let b = &world.bodies;
+    let features = world.features().union(world.settings.extra_features);
+    let turns = features.rotation || features.friction || features.two_points;
+    let h = f64::from(world.settings.dt);
+    let inv_mass = f64::from(b.inv_mass[i]);
+    let inv_inertia = if turns { f64::from(b.inv_inertia[i]) } else { 0.0 };
+    let velocity: Velocity = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+    let mut free_velocity = velocity;
+    if b.kind[i] == BodyKind::Dynamic {
+        let scale = f64::from(b.gravity_scale[i]);
+        let [gx, gy] = world.settings.gravity.map(f64::from);
+        let [fx, fy, torque] = [b.force_x[i], b.force_y[i], b.torque[i]].map(f64::from);
+        let damping = [b.linear_damping[i], b.linear_damping[i], b.angular_damping[i]].map(f64::from);
+        let acceleration = [gx * scale + fx * inv_mass, gy * scale + fy * inv_mass, torque * inv_inertia];
+        for k in 0..3 {
+            free_velocity[k] = velocity[k] / (1.0 + h * damping[k]) + h * acceleration[k];
+        }
+    }
+    ProblemBody { inv_mass, inv_inertia, velocity, free_velocity }
+}
+
+/// Everything of a point but whose it is.
+fn row(contact: &Contact, point: &ManifoldPoint, substeps: f64) -> ProblemContact {
+    let n = contact.manifold.normal;
+    let t = Vec2::new(n.y, -n.x);
+    let cross = |r: Vec2, u: Vec2| f64::from(r.x) * f64::from(u.y) - f64::from(r.y) * f64::from(u.x);
+    let arm = |r: Vec2| -> Pair { [cross(r, n), cross(r, t)] };
+    ProblemContact {
+        body_a: None,
+        body_b: None,
+        manifold: 0,
+        normal: [n.x, n.y].map(f64::from),
+        arm_a: arm(point.anchor_a),
+        arm_b: arm(point.anchor_b),
+        gap: f64::from(point.separation),
+        friction: f64::from(contact.friction),
+        rebound: 0.0,
+        warm_impulse: [point.normal_impulse, point.tangent_impulse].map(|l| substeps * f64::from(l)),
+    }
+}

@@ -1,0 +1,345 @@
+//! How many iterations every solver needs on exactly the same problem.
+//!
+//! A frozen problem is solved by the simulation's own code ([`replay`]): one step without
+//! substeps, with a budget of k iterations, for k = 0, 1, 2, … After each the natural-map residual
+//! is measured in `f64` on the `f32` velocities and impulses, in units of
+//! [`ContactProblem::impulse_unit`], against two laws that are never mixed:
+//!
+//! - the *rigid* law, the same for all;
+//! - the solver's *own* law, that of its last velocity sweep. Position feedback, softness and
+//!   missing friction are other laws; a solver may solve its own to the last bit and stay far
+//!   from the rigid one for ever.
+//!
+//! An *iteration* is one velocity sweep, and one relaxing sweep where the solver relaxes; position
+//! sweeps stay at the standard number. *Sweeps* are what the solver itself counts. No residual
+//! gets below what `f32` can hold, some 1e-6 times the largest impulse; where a tolerance is not
+//! reached within the cap, there is no number.
+//!
+//! Iterations to a tolerance are exact: k is dense up to 128 and then grows by 1/64, and between
+//! two such k the first one that reaches a tolerance is looked for.
+//!
+//! Methods in `f64` that share no code with the solvers ([`crate::lab::reference`]) stand beside them.
+
+pub mod plot;
+pub mod replay;
+mod scalar;
+mod setup;
+pub mod table;
+mod timing;
+
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::solvers::{VARIANTS, Variant};
+use crate::lab::error::Error;
+use crate::lab::reference::ContactProblem;
+use crate::lab::reference::certify::{Certificate, Reference};
+use crate::lab::reference::rates;
+use crate::lab::reference::residual::{Summary, Target, contact_residuals, natural_map};
+use replay::{Outcome, Replay, Sequence, Start};
+use serde::Serialize;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+/// Residuals whose first iteration is reported (1).
+pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Solvers, in this order.
+    pub solvers: Vec<&'static Variant>,
+    /// Most iterations.
+    pub max_iterations: u32,
+    /// Seed of the shuffled order.
+    pub seed: u64,
+    /// Lanes in coloured order; the other orders are serial.
+    pub width: LaneWidth,
+    /// Stiffness of soft contacts (Hz).
+    pub contact_hertz: f32,
+    /// Timing rounds; none for no times.
+    pub rounds: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            solvers: VARIANTS.iter().collect(),
+            max_iterations: 1000,
+            seed: 1,
+            width: LaneWidth::W8,
+            contact_hertz: CONTACT_HERTZ,
+            rounds: 15,
+        }
+    }
+}
+
+/// State after some iterations.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Budget k.
+    pub iterations: u32,
+    /// Constraint sweeps made.
+    pub sweeps: usize,
+    /// Residual of the rigid law (1).
+    pub rigid: f64,
+    /// Residual of the solver's own law (1); none before the first velocity sweep.
+    pub own: Option<f64>,
+    /// Relative mass-norm distance of the velocities from the reference (1).
+    pub velocity_error: Option<f64>,
+}
+
+/// What a curve came to under one law.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Reached {
+    /// Index into [`Curve::points`] of the first point within each of [`TOLERANCES`].
+    pub first: [Option<usize>; TOLERANCES.len()],
+    /// Smallest residual (1).
+    pub smallest: f64,
+    /// Asymptotic factor per iteration, fitted above the rounding floor; none where the fall is
+    /// too fast or too short to fit.
+    pub rate: Option<f64>,
+}
+
+/// One solver in one order from one start.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    /// Name of the solver, with its stage where that is not all of it.
+    pub solver: String,
+    /// `f32` for the simulation's code, `f64` for methods to compare with.
+    pub arithmetic: &'static str,
+    /// Order of the contacts.
+    pub order: Sequence,
+    /// Impulses at the start.
+    pub start: Start,
+    /// States, by iterations.
+    pub points: Vec<Point>,
+    /// Under the rigid law.
+    pub rigid: Reached,
+    /// Under the solver's own law.
+    pub own: Reached,
+    /// Whether the two laws were the same all along.
+    pub own_is_rigid: bool,
+    /// Median time of an iteration (ns), set-up excluded; none if not measured.
+    pub ns_per_iteration: Option<f64>,
+}
+
+/// All curves of one problem.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Name of the problem.
+    pub problem: String,
+    /// Bodies that are not static.
+    pub bodies: usize,
+    /// Contact points.
+    pub contacts: usize,
+    /// Unit of residuals (N·s).
+    pub impulse_unit: f64,
+    /// The reference's certificate; none if velocities could not be compared.
+    pub certificate: Option<Certificate>,
+    /// Whether there are warm-start impulses at all; if not, there are no warm curves.
+    pub has_warm_start: bool,
+    /// Lanes in coloured order.
+    pub lanes: usize,
+    /// See [`TOLERANCES`].
+    pub tolerances: [f64; TOLERANCES.len()],
+    /// Curves, solver by solver.
+    pub curves: Vec<Curve>,
+}
+
+/// A solver's schedule as a function of the number of iterations.
+struct Schedule {
+    variant: &'static Variant,
+    name: String,
+    relaxes: bool,
+}
+
+impl Schedule {
+    /// The whole schedule, and the one without its relaxing sweeps, which would hide what the
+    /// sweeps before them converge to.
+    fn of(variant: &'static Variant) -> Vec<Schedule> {
+        let whole = Schedule { variant, name: variant.name.into(), relaxes: variant.uses.relax };
+        let name = format!("{} without relaxing", variant.name);
+        let bare = Schedule { variant, name, relaxes: false };
+        if variant.uses.relax { vec![whole, bare] } else { vec![whole] }
+    }
+
+    fn budget(&self, iterations: u32) -> Budget {
+        Budget {
+            substeps: 1,
+            velocity_iterations: iterations,
+            relax_iterations: if self.relaxes { iterations } else { 0 },
+            position_iterations: self.variant.budget.position_iterations,
+        }
+    }
+}
+
+/// Runs everything on `problem`. Errors: a problem that is not valid, is out of the range of
+/// `f32`, or has no contacts; a reference that does not hold.
+pub fn converge(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    options: &Options,
+) -> Result<Report, Error> {
+    problem.validate()?;
+    if problem.contacts.is_empty() {
+        return Err(Error::invalid("contacts", format!("'{}' has none", problem.name)));
+    }
+    if let Some(reference) = reference {
+        reference.check(problem).map_err(|why| Error::invalid("reference", why))?;
+    }
+    let has_warm_start = problem.contacts.iter().any(|c| c.warm_impulse != [0.0; 2]);
+    let orders = [Sequence::Natural, Sequence::Colored, Sequence::Shuffled(options.seed)];
+    let schedules: Vec<Schedule> = options.solvers.iter().flat_map(|v| Schedule::of(v)).collect();
+    let mut curves = Vec::new();
+    let mut timers = Vec::new();
+    for schedule in &schedules {
+        for order in orders {
+            let mut replay = Replay::new(problem, order, options.width, options.contact_hertz)?;
+            let first = curves.len();
+            curves.push(curve(problem, reference, schedule, order, Start::Cold, &mut replay, options));
+            if has_warm_start && remembers(schedule, &mut replay) {
+                curves.push(curve(problem, reference, schedule, order, Start::Warm, &mut replay, options));
+            }
+            timers.push((schedule, replay, first..curves.len()));
+        }
+    }
+    if options.rounds > 0 {
+        let mut cases: Vec<_> = timers.iter_mut().map(|(schedule, replay, _)| (*schedule, replay)).collect();
+        let times = timing::time(&mut cases, options.rounds);
+        for (ns, (_, _, range)) in times.into_iter().zip(&timers) {
+            curves[range.clone()].iter_mut().for_each(|curve| curve.ns_per_iteration = Some(ns));
+        }
+    }
+    curves.extend(scalar::curves(problem, reference, has_warm_start, options));
+    Ok(Report {
+        problem: problem.name.clone(),
+        bodies: problem.bodies.len(),
+        contacts: problem.contacts.len(),
+        impulse_unit: problem.impulse_unit(),
+        certificate: reference.map(|r| r.certificate),
+        has_warm_start,
+        lanes: options.width.lanes(),
+        tolerances: TOLERANCES,
+        curves,
+    })
+}
+
+/// Whether warm-start impulses make a difference to this solver.
+fn remembers(schedule: &Schedule, replay: &mut Replay) -> bool {
+    let [cold, warm] =
+        [Start::Cold, Start::Warm].map(|start| replay.run(schedule.variant, schedule.budget(1), start));
+    cold.velocities != warm.velocities || cold.impulses != warm.impulses
+}
+
+/// Measures an outcome; also whether its own law was the rigid one.
+fn measure(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    iterations: u32,
+    outcome: &Outcome,
+) -> (Point, bool) {
+    let Outcome { velocities, impulses, .. } = outcome;
+    let unit = problem.impulse_unit();
+    let rigid = natural_map(problem, Target::Rigid, velocities, impulses) / unit;
+    let mut own_is_rigid = true;
+    let own = outcome.own.as_ref().map(|own| {
+        let target = Target::Own(&own.rows);
+        let parts: Vec<f64> = contact_residuals(problem, target, velocities, impulses)
+            .iter()
+            .flat_map(|r| [r.normal, if own.friction { r.tangent } else { 0.0 }])
+            .collect();
+        let rubs = problem.contacts.iter().any(|c| c.friction > 0.0);
+        own_is_rigid = own.friction || !rubs;
+        for (i, row) in own.rows.iter().enumerate() {
+            let rigid = Target::Rigid.row(problem, i);
+            // Gaps over h, in f32.
+            let rounding = 1e-6 * (1.0 + rigid.bias.abs());
+            own_is_rigid &= (row.bias - rigid.bias).abs() <= rounding && row.compliance == 0.0;
+        }
+        Summary::of(&parts).max / unit
+    });
+    let velocity_error = reference.map(|r| r.compare(problem, velocities, impulses).velocity);
+    (Point { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
+}
+
+/// A curve that stands still within this many times the rounding floor has reached it.
+const NEAR_FLOOR: f64 = 20.0;
+
+fn curve(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    schedule: &Schedule,
+    order: Sequence,
+    start: Start,
+    replay: &mut Replay,
+    options: &Options,
+) -> Curve {
+    let mut own_is_rigid = true;
+    let mut points = BTreeMap::new();
+    // Changes below half a unit in the last place of the largest impulse are lost.
+    let unit = problem.impulse_unit();
+    let floor = Cell::new(0.0_f64);
+    let mut visit = |k: u32, points: &mut BTreeMap<u32, Point>| {
+        let outcome = replay.run(schedule.variant, schedule.budget(k), start);
+        let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
+        floor.set(floor.get().max(0.5 * f64::from(f32::EPSILON) * largest / unit));
+        let (point, same) = measure(problem, reference, k, &outcome);
+        own_is_rigid &= same;
+        points.insert(k, point);
+        point
+    };
+    let (mut k, mut best, mut best_at) = (0, f64::INFINITY, 0);
+    while k <= options.max_iterations {
+        let point = visit(k, &mut points);
+        let own = point.own.unwrap_or(f64::INFINITY);
+        if own < 0.9 * best {
+            (best, best_at) = (own, k);
+        }
+        let at_floor = best == 0.0 || best < NEAR_FLOOR * floor.get() && k > 64 + best_at + best_at / 4;
+        if !point.rigid.is_finite() || at_floor {
+            break;
+        }
+        k += if k < 128 { 1 } else { k / 64 };
+    }
+    for law in LAWS {
+        for tolerance in TOLERANCES {
+            let within = |p: &&Point| law(p).is_some_and(|r| r <= tolerance);
+            let Some(reached) = points.values().find(within).map(|p| p.iterations) else { break };
+            let before = points.range(..reached).next_back().map_or(reached, |(&k, _)| k);
+            for k in before + 1..reached {
+                if within(&&visit(k, &mut points)) {
+                    break;
+                }
+            }
+        }
+    }
+    let points: Vec<Point> = points.into_values().collect();
+    let [rigid, own] = LAWS.map(|law| reached(&points, law, floor.get()));
+    Curve {
+        solver: schedule.name.clone(),
+        arithmetic: "f32",
+        order,
+        start,
+        points,
+        rigid,
+        own,
+        own_is_rigid,
+        ns_per_iteration: None,
+    }
+}
+
+const LAWS: [fn(&Point) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
+
+/// Fits end this many times above the rounding floor: a residual there is off by 1 %.
+const ABOVE_FLOOR: f64 = 100.0;
+
+/// What `points` came to under `law`, with residuals rounded to about `floor`.
+fn reached(points: &[Point], law: fn(&Point) -> Option<f64>, floor: f64) -> Reached {
+    let first =
+        TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));
+    let residuals: Vec<[f64; 2]> =
+        points.iter().filter_map(|p| Some([f64::from(p.iterations), law(p)?])).collect();
+    let smallest = residuals.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    let usable = residuals.iter().position(|p| p[1] <= ABOVE_FLOOR * floor).unwrap_or(residuals.len());
+    Reached { first, smallest, rate: rates::rate_at(&residuals[..usable]) }
+}

@@ -1,0 +1,234 @@
+//! `converge.svg`: residual against sweeps and against time, a row of two panels per law and start.
+//!
+//! Both axes are logarithmic. One colour per solver, one line style and marker per order; a marker
+//! stands where a curve first reaches a tolerance. Thin curves are the `f64` methods, which have no
+//! time.
+
+use super::replay::{Sequence, Start};
+use super::{Curve, Point, Reached, Report};
+use crate::lab::error::Error;
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+const PANEL: (i32, i32) = (560, 300);
+const LEGEND_LINE: i32 = 20;
+const HEADING: i32 = 30;
+/// Space for labels left of and below a panel, and to its right.
+const LEFT: i32 = 64;
+const BOTTOM: i32 = 44;
+const RIGHT: i32 = 16;
+const INK: RGBColor = RGBColor(40, 40, 40);
+const GRID: RGBColor = RGBColor(225, 225, 225);
+/// Distinct with any colour vision (Okabe and Ito), and a grey.
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(0, 0, 0),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(140, 140, 140),
+];
+/// Decades of residuals that are shown; what is outside is drawn at the edge.
+const DECADES: (i32, i32) = (-8, 1);
+
+/// Value of a curve's point on the horizontal axis.
+type Across = fn(&Curve, &Point) -> Option<f64>;
+
+struct Row {
+    title: String,
+    start: Start,
+    residual: fn(&Point) -> Option<f64>,
+    reached: fn(&Curve) -> &Reached,
+}
+
+/// The picture as SVG text.
+pub fn svg(report: &Report) -> Result<String, Error> {
+    let mut text = String::new();
+    draw(report, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
+    Ok(text)
+}
+
+fn draw(report: &Report, text: &mut String) -> Drawn {
+    let mut solvers: Vec<(&str, &str)> = Vec::new();
+    for curve in &report.curves {
+        if !solvers.contains(&(&curve.solver, curve.arithmetic)) {
+            solvers.push((&curve.solver, curve.arithmetic));
+        }
+    }
+    let rows = rows(report);
+    let legend_lines = solvers.len().div_ceil(4) as i32 + 2;
+    let top = HEADING + LEGEND_LINE * legend_lines;
+    let size = (2 * PANEL.0, top + (HEADING + PANEL.1) * rows.len() as i32);
+    let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
+    root.fill(&WHITE)?;
+    write(&root, &format!("{}: residual against work", report.problem), (8, 18), 18, HPos::Left)?;
+    legend(&root, &solvers, report)?;
+    for (i, row) in rows.iter().enumerate() {
+        let y = top + (HEADING + PANEL.1) * i as i32;
+        write(&root, &row.title, (8, y + 16), 16, HPos::Left)?;
+        panel(&root, (0, y + HEADING), report, &solvers, row, "constraint sweeps", |_, p| {
+            (p.sweeps > 0).then_some(p.sweeps as f64)
+        })?;
+        panel(&root, (PANEL.0, y + HEADING), report, &solvers, row, "time (s), set-up excluded", |c, p| {
+            Some(1e-9 * c.ns_per_iteration? * f64::from(p.iterations)).filter(|&t| t > 0.0)
+        })?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn rows(report: &Report) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for start in [Start::Cold, Start::Warm] {
+        if start == Start::Warm && !report.has_warm_start {
+            continue;
+        }
+        rows.push(Row {
+            title: format!("Rigid law, {start} start"),
+            start,
+            residual: |p| Some(p.rigid),
+            reached: |c| &c.rigid,
+        });
+        rows.push(Row {
+            title: format!("Each solver's own law, {start} start"),
+            start,
+            residual: |p| p.own,
+            reached: |c| &c.own,
+        });
+    }
+    rows
+}
+
+fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
+    let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
+    area.draw(&Text::new(text.to_string(), at, style))?;
+    Ok(())
+}
+
+fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report) -> Drawn {
+    for (i, (solver, arithmetic)) in solvers.iter().enumerate() {
+        let at = (12 + 275 * (i % 4) as i32, HEADING + 10 + LEGEND_LINE * (i / 4) as i32);
+        let style = COLORS[i % COLORS.len()].stroke_width(width(arithmetic));
+        area.draw(&PathElement::new(vec![at, (at.0 + 26, at.1)], style))?;
+        let name = if *arithmetic == "f32" { solver.to_string() } else { format!("{solver} ({arithmetic})") };
+        write(area, &name, (at.0 + 32, at.1), 14, HPos::Left)?;
+    }
+    let y = HEADING + 10 + LEGEND_LINE * solvers.len().div_ceil(4) as i32;
+    let orders = [
+        (Sequence::Natural, "natural order".to_string()),
+        (Sequence::Colored, format!("colored, {} lanes", report.lanes)),
+        (Sequence::Shuffled(0), "shuffled".to_string()),
+    ];
+    for (i, (order, name)) in orders.into_iter().enumerate() {
+        let x = 12 + 275 * i as i32;
+        line(area, vec![(x, y), (x + 52, y)], order, INK.stroke_width(2))?;
+        marker(area, (x + 26, y), order, &INK)?;
+        write(area, &name, (x + 60, y), 14, HPos::Left)?;
+    }
+    Ok(())
+}
+
+fn width(arithmetic: &str) -> u32 {
+    if arithmetic == "f32" { 2 } else { 1 }
+}
+
+fn line(area: &Area, points: Vec<(i32, i32)>, order: Sequence, style: ShapeStyle) -> Drawn {
+    match order {
+        Sequence::Natural => area.draw(&PathElement::new(points, style))?,
+        Sequence::Colored => area.draw(&DashedPathElement::new(points, 9, 5, style))?,
+        Sequence::Shuffled(_) => area.draw(&DashedPathElement::new(points, 2, 4, style))?,
+    }
+    Ok(())
+}
+
+fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBColor) -> Drawn {
+    match order {
+        Sequence::Natural => area.draw(&Circle::new(at, 4, color.filled()))?,
+        Sequence::Colored => {
+            area.draw(&Rectangle::new([(at.0 - 4, at.1 - 4), (at.0 + 4, at.1 + 4)], color.stroke_width(2)))?
+        }
+        Sequence::Shuffled(_) => area.draw(&TriangleMarker::new(at, 5, color.filled()))?,
+    }
+    Ok(())
+}
+
+fn panel(
+    area: &Area,
+    corner: (i32, i32),
+    report: &Report,
+    solvers: &[(&str, &str)],
+    row: &Row,
+    title: &str,
+    across: Across,
+) -> Drawn {
+    let (left, top) = (corner.0 + LEFT, corner.1);
+    let (right, bottom) = (corner.0 + PANEL.0 - RIGHT, corner.1 + PANEL.1 - BOTTOM);
+    // Where the start makes no difference to a solver, its cold curve stands for both.
+    let remembers = |c: &Curve| {
+        let same = |o: &&Curve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
+        report.curves.iter().any(|o| same(&o))
+    };
+    let curves: Vec<&Curve> =
+        report.curves.iter().filter(|c| c.start == row.start || !remembers(c)).collect();
+    let values = curves.iter().flat_map(|c| c.points.iter().filter_map(|p| across(c, p)));
+    let (least, most) = values.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+    if most == 0.0 {
+        return write(area, "not measured", ((left + right) / 2, (top + bottom) / 2), 13, HPos::Center);
+    }
+    let low = least.log10().floor() as i32;
+    let range = (low, (most.log10().ceil() as i32).max(low + 1));
+    let along = |value: f64, range: (i32, i32), from: i32, to: i32| {
+        let share = (value.log10() - f64::from(range.0)) / f64::from(range.1 - range.0);
+        from + (share.clamp(0.0, 1.0) * f64::from(to - from)).round() as i32
+    };
+    for exponent in range.0..=range.1 {
+        let x = along(10f64.powi(exponent), range, left, right);
+        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
+        write(area, &decade(exponent), (x, bottom + 12), 12, HPos::Center)?;
+    }
+    for exponent in DECADES.0..=DECADES.1 {
+        let y = along(10f64.powi(exponent), DECADES, bottom, top);
+        area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
+        write(area, &decade(exponent), (left - 6, y), 12, HPos::Right)?;
+    }
+    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
+    write(area, title, ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
+    for curve in curves {
+        let id = (curve.solver.as_str(), curve.arithmetic);
+        let color = COLORS[solvers.iter().position(|s| *s == id).unwrap_or(0) % COLORS.len()];
+        let at = |p: &Point| {
+            let residual = (row.residual)(p).filter(|r| r.is_finite())?;
+            let x = along(across(curve, p)?, range, left, right);
+            Some((x, along(residual.max(1e-300), DECADES, bottom, top)))
+        };
+        let path: Vec<(i32, i32)> = curve.points.iter().filter_map(at).collect();
+        if path.len() > 1 {
+            line(area, path, curve.order, color.stroke_width(width(curve.arithmetic)))?;
+        }
+        if curve.arithmetic == "f32" {
+            for first in (row.reached)(curve).first.into_iter().flatten() {
+                if let Some(at) = at(&curve.points[first]) {
+                    marker(area, at, curve.order, &color)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// 10ⁿ, or the number itself where that is shorter.
+fn decade(exponent: i32) -> String {
+    match exponent {
+        0 => "1".into(),
+        1 => "10".into(),
+        2 => "100".into(),
+        n => format!("1e{n}"),
+    }
+}

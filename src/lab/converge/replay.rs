@@ -1,0 +1,241 @@
+//! One frozen problem, solved by the simulation's own code: rows, contacts and batches are made
+//! from the problem instead of a world, and a step is run on them again and again.
+//!
+//! Masses, velocities, gaps and impulses are rounded to `f32`. Anchors are recovered from the arms,
+//! r = −(r × t) n + (r × n) t, and the step forms its arms from them again; so the arms that are
+//! solved differ from the frozen ones by a few roundings, as everything in `f32` does.
+
+use super::setup;
+use crate::engine::clock::Clock;
+use crate::engine::constraints::assign::{Assignment, Sides};
+use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
+use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneWidth};
+use crate::engine::params::Budget;
+use crate::engine::solvers::Variant;
+use crate::lab::error::Error;
+use crate::lab::reference::residual::OwnRow;
+use crate::lab::reference::{ContactProblem, Pair, ProblemContact, Velocity};
+use rand::{SeedableRng, seq::SliceRandom};
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// In which order the contacts are solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sequence {
+    /// One after the other, as the problem lists them.
+    Natural,
+    /// Colour by colour, in lanes.
+    Colored,
+    /// One after the other, in an order drawn from this seed.
+    Shuffled(u64),
+}
+
+impl fmt::Display for Sequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Sequence::Natural => "natural",
+            Sequence::Colored => "colored",
+            Sequence::Shuffled(_) => "shuffled",
+        })
+    }
+}
+
+impl Sequence {
+    /// `0..count` in this order; colours keep the natural one.
+    pub fn order(self, count: usize) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..count as u32).collect();
+        if let Sequence::Shuffled(seed) = self {
+            order.shuffle(&mut rand_pcg::Pcg64Mcg::seed_from_u64(seed));
+        }
+        order
+    }
+}
+
+/// What a run begins with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Start {
+    /// Without impulses.
+    Cold,
+    /// With the problem's warm-start impulses.
+    Warm,
+}
+
+impl fmt::Display for Start {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(if *self == Start::Cold { "cold" } else { "warm" })
+    }
+}
+
+/// What a step ended with.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// v⁺, one per body.
+    pub velocities: Vec<Velocity>,
+    /// (λn, λt), one per contact point (N·s).
+    pub impulses: Vec<Pair>,
+    /// Constraint sweeps of every kind.
+    pub sweeps: usize,
+    /// The law of the last velocity sweep, if there was one.
+    pub own: Option<OwnLaw>,
+}
+
+/// The law that a solver's last velocity sweep solved.
+#[derive(Clone, Debug)]
+pub struct OwnLaw {
+    /// One row per contact point.
+    pub rows: Vec<OwnRow>,
+    /// Whether it had friction rows.
+    pub friction: bool,
+}
+
+/// Bias (m/s) of a row whose impulse is to be zero: no body is as fast.
+const OUT_OF_REACH: f64 = 1e30;
+
+/// A frozen problem in the form that solvers run on, in one order.
+pub struct Replay<'a> {
+    problem: &'a ContactProblem,
+    work: Workspace,
+    rows: Vec<BodyRow>,
+    contacts: Vec<Contact>,
+    /// Contact and point within it that each contact of the problem became.
+    places: Vec<(usize, usize)>,
+    scratch: Vec<Contact>,
+    input: StepInput,
+    width: LaneWidth,
+}
+
+impl<'a> Replay<'a> {
+    /// Sets the problem up. Errors: a problem that is not valid, or has numbers beyond `f32`.
+    pub fn new(
+        problem: &'a ContactProblem,
+        sequence: Sequence,
+        width: LaneWidth,
+        contact_hertz: f32,
+    ) -> Result<Self, Error> {
+        problem.validate()?;
+        let h = problem.h as f32;
+        let bodies = setup::bodies(problem);
+        let inert = problem.bodies.len() as u32;
+        let (contacts, places) = setup::contacts(problem, inert);
+        let features = setup::features(problem, &contacts);
+        let width = if sequence == Sequence::Colored { width } else { LaneWidth::W1 };
+        let budget =
+            Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
+        let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
+        let input = StepInput { features, budget, h, contact_hertz, record_impulses: false, points };
+        // The rows start at v*, and nothing is added to them: forces are in it already.
+        let motion = MotionInput {
+            gravity: [0.0; 2],
+            h,
+            features,
+            integrator: Integrator::SemiImplicitEuler,
+            rotation: RotationUpdate::Exact,
+        };
+        let mut work = Workspace::default();
+        let mut rows = Vec::new();
+        work.motion.load(&bodies, &mut rows, &motion);
+        setup::check_range(h, &rows, &contacts)?;
+        let mut replay = Replay { problem, work, rows, contacts, places, scratch: Vec::new(), input, width };
+        replay.assign_lanes(sequence);
+        Ok(replay)
+    }
+
+    /// One step of `variant` with `budget`, from the problem's start.
+    pub fn run(&mut self, variant: &Variant, budget: Budget, start: Start) -> Outcome {
+        self.reset(start);
+        self.work.observe = true;
+        self.work.last_rule = None;
+        let input = StepInput { budget, ..self.input };
+        let effort =
+            variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
+        let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
+        let bodies = self.problem.bodies.len();
+        Outcome {
+            velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
+            impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
+            sweeps: effort.sweeps,
+            own: self.own_law(),
+        }
+    }
+
+    /// Time of one such step, its preparation included.
+    pub fn time(&mut self, variant: &Variant, budget: Budget, start: Start) -> Duration {
+        self.reset(start);
+        self.work.observe = false;
+        let input = StepInput { budget, ..self.input };
+        let mut clock = Clock::start(false);
+        let begin = Instant::now();
+        variant.run(&mut self.work, &mut self.scratch, &mut clock, &input, self.width);
+        begin.elapsed()
+    }
+
+    fn reset(&mut self, start: Start) {
+        self.work.rows.clone_from(&self.rows);
+        self.scratch.clone_from(&self.contacts);
+        if start == Start::Cold {
+            for point in self.scratch.iter_mut().flat_map(|c| &mut c.manifold.points) {
+                (point.normal_impulse, point.tangent_impulse) = (0.0, 0.0);
+            }
+        }
+    }
+
+    /// The law of the last sweep, at the separations that it saw.
+    ///
+    /// s = gap + n·(Δx + (R(Δθ) − 1) r), b minus a, with n·(R(Δθ) − 1) r = sin Δθ (r × n) +
+    /// (1 − cos Δθ)(r × t).
+    fn own_law(&self) -> Option<OwnLaw> {
+        let rule = self.work.last_rule.as_ref()?;
+        let diagonal = self.problem.delassus_diagonal();
+        let moved = |c: &ProblemContact| {
+            let along = |body: Option<u32>, arm: Pair| {
+                let delta = body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
+                let turn = delta[2].sin() * arm[0] + (1.0 - delta[2].cos()) * arm[1];
+                c.normal[0] * delta[0] + c.normal[1] * delta[1] + turn
+            };
+            c.gap + along(c.body_b, c.arm_b) - along(c.body_a, c.arm_a)
+        };
+        let row = |(i, c): (usize, &ProblemContact)| {
+            let contact = &self.scratch[self.places[i].0];
+            let against_static = opposite(self.problem, contact) != OppositeKind::Dynamic;
+            match rule.law(against_static, moved(c) as f32, 1.0 / diagonal[i][0]) {
+                Some(law) => OwnRow { bias: law.bias, compliance: law.compliance },
+                None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
+            }
+        };
+        let rows = self.problem.contacts.iter().enumerate().map(row).collect();
+        Some(OwnLaw { rows, friction: rule.friction })
+    }
+
+    /// Gives every contact its lane, as a world's step does.
+    fn assign_lanes(&mut self, sequence: Sequence) {
+        let problem = self.problem;
+        let sides =
+            Sides { bodies: problem.bodies.len(), opposite: |contact: &Contact| opposite(problem, contact) };
+        let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
+        let mut assignment = Assignment::default();
+        if sequence == Sequence::Colored {
+            assignment.colored(work, self.width, features, contacts, &sides);
+        } else {
+            let order = sequence.order(contacts.len()).into_iter();
+            assignment.serial(work, features, contacts, order, &sides);
+        }
+    }
+}
+
+/// What stands opposite the dynamic body of a contact.
+fn opposite(problem: &ContactProblem, contact: &Contact) -> OppositeKind {
+    match problem.bodies.get(contact.body_a as usize) {
+        None => OppositeKind::Static,
+        Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
+        Some(_) => OppositeKind::Dynamic,
+    }
+}
+
+fn impulse(contacts: &[Contact], (manifold, point): (usize, usize)) -> Pair {
+    let point = &contacts[manifold].manifold.points[point];
+    [point.normal_impulse, point.tangent_impulse].map(f64::from)
+}

@@ -1,0 +1,74 @@
+//! Methods in `f64` that share no code with the solvers, as curves to compare with.
+
+use super::replay::{Sequence, Start};
+use super::{Curve, LAWS, Options, Point, reached};
+use crate::lab::reference::certify::Reference;
+use crate::lab::reference::nncg::nncg;
+use crate::lab::reference::residual::Target;
+use crate::lab::reference::sweeps::{self, Splitting, Stop};
+use crate::lab::reference::{ContactProblem, Pair, ProblemContact};
+
+/// Scalar methods in `f64`, from `truth`. A contact is solved row by row there, so where there is
+/// friction the order of rows differs a little from the solvers'.
+pub(super) fn curves(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    has_warm_start: bool,
+    options: &Options,
+) -> Vec<Curve> {
+    let stop = Stop { tolerance: 1e-9, iterations: options.max_iterations as usize };
+    let mut shuffled = problem.clone();
+    let order = Sequence::Shuffled(options.seed);
+    let manifolds: Vec<_> = problem.contacts.chunk_by(|p, q| p.manifold == q.manifold).collect();
+    shuffled.contacts =
+        order.order(manifolds.len()).iter().flat_map(|&i| manifolds[i as usize].iter().copied()).collect();
+    type Method = fn(&ContactProblem, &[Pair], Stop) -> sweeps::Run;
+    let methods: [(&str, &ContactProblem, Sequence, usize, Method); 5] = [
+        ("Gauss-Seidel", problem, Sequence::Natural, 1, |p, l, s| {
+            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
+        }),
+        ("Gauss-Seidel", &shuffled, order, 1, |p, l, s| {
+            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
+        }),
+        ("Jacobi", problem, Sequence::Natural, 1, |p, l, s| {
+            sweeps::jacobi(p, Target::Rigid, l, Splitting::Whole, s)
+        }),
+        ("Jacobi, mass splitting", problem, Sequence::Natural, 1, |p, l, s| {
+            sweeps::jacobi(p, Target::Rigid, l, Splitting::Mass, s)
+        }),
+        ("NNCG", problem, Sequence::Natural, 2, |p, l, s| nncg(p, Target::Rigid, l, s)),
+    ];
+    let mut curves = Vec::new();
+    for (name, problem, order, sweeps, method) in methods {
+        for start in [Start::Cold, Start::Warm].into_iter().take(if has_warm_start { 2 } else { 1 }) {
+            let warm = |c: &ProblemContact| {
+                if start == Start::Warm { c.warm_impulse } else { [0.0; 2] }
+            };
+            let run = method(problem, &problem.contacts.iter().map(warm).collect::<Vec<_>>(), stop);
+            let last = run.history.len() - 1;
+            let error = reference.map(|r| problem.velocity_error(&run.velocities, &r.velocities));
+            let points: Vec<Point> = (0..=last)
+                .map(|k| Point {
+                    iterations: k as u32,
+                    sweeps: k * sweeps,
+                    rigid: run.history[k],
+                    own: Some(run.history[k]),
+                    velocity_error: if k == last { error } else { None },
+                })
+                .collect();
+            let [rigid, own] = LAWS.map(|law| reached(&points, law, 0.0));
+            curves.push(Curve {
+                solver: name.into(),
+                arithmetic: "f64",
+                order,
+                start,
+                points,
+                rigid,
+                own,
+                own_is_rigid: true,
+                ns_per_iteration: None,
+            });
+        }
+    }
+    curves
+}

@@ -1,0 +1,336 @@
+//! What a step should have kept: momentum, angular momentum and energy.
+//!
+//! External to the dynamic bodies are weight, applied forces and the impulses of contacts
+//! with static and kinematic bodies, all of which are known. Damping is external too, but
+//! its impulse is not known: a scene with damping shows it as imbalance and as lost energy.
+
+use super::law::{BodyStep, PointStep};
+use super::state::{BodyState, shadow_energy_change};
+use crate::engine::bodies::BodyKind;
+use glam::DVec2;
+
+/// Sums over a run; see [`Balance::close`] for what they are measured in.
+#[derive(Clone, Debug)]
+pub struct Balance {
+    dt: f64,
+    substeps: f64,
+    /// Reference point of angular momentum: the centre of mass at the start, so that
+    /// nothing cancels far from the origin (m).
+    center: DVec2,
+    mass: f64,
+    /// √(Σ(m r² + I)/Σm) about `center` (m).
+    gyration: f64,
+    /// √(ΣI/Σm) (m)
+    body_size: f64,
+    /// Σ|F| (N)
+    weight: f64,
+    momentum: DVec2,
+    momentum_max: f64,
+    angular: f64,
+    angular_max: f64,
+    energy: f64,
+    created_max: f64,
+    friction: f64,
+    impact: f64,
+    unexplained_max: f64,
+    kinetic_start: f64,
+    kinetic_max: f64,
+    /// Work of weight, applied forces and kinematic bodies so far (J).
+    work: f64,
+}
+
+/// A scene whose kinetic energy exceeds all that it can have by this factor has blown up (1).
+const BLOW_UP: f64 = 100.0;
+
+/// Imbalances, all relative.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Imbalance {
+    /// Of momentum.
+    pub momentum: f64,
+    /// Of angular momentum.
+    pub angular_momentum: f64,
+    /// Energy gained (positive) or lost over the run.
+    pub energy_change: f64,
+    /// Most energy created in one step.
+    pub energy_created: f64,
+    /// Energy that friction took over the run; negative if it gave.
+    pub friction_loss: f64,
+    /// Energy that normal impulses took over the run; negative if they gave.
+    pub impact_loss: f64,
+    /// Most energy in one step that no impulse explains.
+    pub energy_unexplained: f64,
+}
+
+impl Balance {
+    /// A run of steps `dt` (s) in equal substeps that starts at `bodies`.
+    pub fn new(bodies: &[BodyState], dt: f64, substeps: u32) -> Self {
+        let mass: f64 = bodies.iter().map(BodyState::mass).sum();
+        let inertia: f64 = bodies.iter().map(BodyState::inertia).sum();
+        let per_mass = |sum: f64| if mass > 0.0 { sum / mass } else { 0.0 };
+        // Relative to the first body: sums of products with far positions would round.
+        let origin = bodies.first().map_or(DVec2::ZERO, |b| b.position);
+        let moment: DVec2 = bodies.iter().map(|b| b.mass() * (b.position - origin)).sum();
+        let center = if mass > 0.0 { origin + moment / mass } else { origin };
+        let polar: f64 = bodies.iter().map(|b| b.mass() * (b.position - center).length_squared()).sum();
+        Balance {
+            dt,
+            substeps: substeps.max(1) as f64,
+            center,
+            mass,
+            gyration: per_mass(polar + inertia).sqrt(),
+            body_size: per_mass(inertia).sqrt(),
+            weight: weight(bodies),
+            momentum: DVec2::ZERO,
+            momentum_max: 0.0,
+            angular: 0.0,
+            angular_max: 0.0,
+            energy: 0.0,
+            created_max: 0.0,
+            friction: 0.0,
+            impact: 0.0,
+            unexplained_max: 0.0,
+            work: 0.0,
+            kinetic_start: bodies.iter().map(BodyState::kinetic_energy).sum(),
+            kinetic_max: bodies.iter().map(BodyState::kinetic_energy).sum(),
+        }
+    }
+
+    /// Sum of the dynamic bodies' mass (kg).
+    pub fn mass(&self) -> f64 {
+        self.mass
+    }
+
+    /// Adds a step: every body, and every contact point with its bodies' indices.
+    ///
+    /// *Where forces act.* In free fall in n substeps weight acts at x₀, x₁, … x_{n−1}; the
+    /// torque that this makes about any fixed point is that of Δt F at
+    /// x̄ = x₀ + ½(1 − 1/n)(x_n − x₀), exactly, because all xₖ − x₀ − k h v₀ are parallel
+    /// to F. Contact impulses are spread over the substeps alike, and are taken there too.
+    ///
+    /// *Work of kinematic bodies* is the impulse on b times the velocity of the kinematic
+    /// material point.
+    ///
+    /// *What impulses take* is, by the midpoint rule, −λ (u⁻ + u⁺)/2 along each axis of a
+    /// contact. In one substep that is all that changes the shadow energy, exactly but for the
+    /// rounding; what is left over is positions that were moved without velocities, and, in
+    /// more substeps, that velocities did not run straight from u⁻ to u⁺.
+    pub fn add(&mut self, bodies: &[BodyStep], points: &[([usize; 2], PointStep)]) {
+        let (mut momentum, mut angular, mut energy, mut kinetic) = (DVec2::ZERO, 0.0, 0.0, 0.0);
+        let middle = 0.5 * (1.0 - 1.0 / self.substeps);
+        let acts_at =
+            |b: &BodyStep| b.before.position + middle * (b.after.position - b.before.position) - self.center;
+        for body in bodies.iter().filter(|b| b.after.inv_mass > 0.0) {
+            let BodyStep { before, after } = body;
+            let (mass, inertia) = (after.mass(), after.inertia());
+            momentum += mass * (after.velocity - before.velocity) - self.dt * after.force;
+            let about = |s: &BodyState| {
+                mass * (s.position - self.center).perp_dot(s.velocity) + inertia * s.angular_velocity
+            };
+            angular +=
+                about(after) - about(before) - self.dt * (acts_at(body).perp_dot(after.force) + after.torque);
+            energy += shadow_energy_change(before, after, self.dt / self.substeps);
+            kinetic += after.kinetic_energy();
+            self.work +=
+                after.force.dot(after.position - before.position) + after.torque * after.turn_since(before);
+        }
+        let mut lost = 0.0;
+        for ([a, b], point) in points {
+            let (wall, other) = (&bodies[*a], &bodies[*b]);
+            let before = point.relative_velocity(&wall.before, &other.before);
+            let after = point.relative_velocity(&wall.after, &other.after);
+            let [impact, friction] = [0, 1].map(|i| -0.5 * point.impulse[i] * (before[i] + after[i]));
+            self.impact += impact;
+            self.friction += friction;
+            lost += impact + friction;
+            if wall.after.kind == BodyKind::Dynamic {
+                continue;
+            }
+            let impulse = point.impulse_on_b();
+            momentum -= impulse;
+            angular -= (acts_at(other) + point.anchor_b).perp_dot(impulse);
+            let given = impulse.dot(wall.before.velocity_at(point.anchor_a));
+            energy -= given;
+            self.work += given;
+        }
+        self.momentum += momentum;
+        self.momentum_max = self.momentum_max.max(self.momentum.length());
+        self.angular += angular;
+        self.angular_max = self.angular_max.max(self.angular.abs());
+        self.energy += energy;
+        self.created_max = self.created_max.max(energy);
+        self.unexplained_max = self.unexplained_max.max(energy + lost);
+        self.kinetic_max = self.kinetic_max.max(kinetic);
+    }
+
+    /// The imbalances of the run so far, relative to these scales:
+    /// - momentum: M v with v the larger of the fastest rms speed √(2 E_kin/M) of the run
+    ///   and the speed that weight gives in one step; the largest that the sum of
+    ///   imbalances ever was;
+    /// - angular momentum: the same times the radius of gyration of the whole scene;
+    /// - energy: the largest kinetic energy plus weight × the radius of gyration of the
+    ///   bodies about their own centres; the energy is the shadow energy of
+    ///   [`shadow_energy_change`], less the work of kinematic bodies.
+    ///
+    /// Where a scale is zero, nothing ever moved, and the imbalance is zero.
+    pub fn close(&self) -> Imbalance {
+        let by_weight = self.weight * self.dt;
+        let momentum = (2.0 * self.kinetic_max * self.mass).sqrt().max(by_weight);
+        let energy = self.kinetic_max + self.weight * self.body_size;
+        Imbalance {
+            momentum: ratio(self.momentum_max, momentum),
+            angular_momentum: ratio(self.angular_max, momentum * self.gyration),
+            energy_change: ratio(self.energy, energy),
+            energy_created: ratio(self.created_max, energy),
+            friction_loss: ratio(self.friction, energy),
+            impact_loss: ratio(self.impact, energy),
+            energy_unexplained: ratio(self.unexplained_max, energy),
+        }
+    }
+
+    /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, were
+    /// given since, and would gain by falling their own size.
+    pub fn is_blown_up(&self, kinetic: f64) -> bool {
+        let has = self.kinetic_start + self.work.max(0.0) + self.weight * self.body_size;
+        has > 0.0 && kinetic > BLOW_UP * has
+    }
+}
+
+/// Sum of the forces' magnitudes on dynamic bodies (N).
+pub fn weight(bodies: &[BodyState]) -> f64 {
+    bodies.iter().filter(|b| b.inv_mass > 0.0).map(|b| b.force.length()).sum()
+}
+
+/// value / scale, or zero if the scale is.
+pub(super) fn ratio(value: f64, scale: f64) -> f64 {
+    if scale > 0.0 { value / scale } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::state::tests::{body, fixed};
+    use super::*;
+
+    const DT: f64 = 0.1;
+
+    fn point(impulse: [f64; 2], anchor_b: DVec2) -> PointStep {
+        PointStep {
+            normal: DVec2::Y,
+            anchor_a: DVec2::ZERO,
+            anchor_b,
+            gap: 0.0,
+            friction: 1.0,
+            restitution: 0.0,
+            impulse,
+        }
+    }
+
+    fn run(wall: BodyState, before: BodyState, after: BodyState, point: PointStep) -> Imbalance {
+        let mut balance = Balance::new(&[wall, before], DT, 1);
+        let steps = [BodyStep { before: wall, after: wall }, BodyStep { before, after }];
+        balance.add(&steps, &[([0, 1], point)]);
+        balance.close()
+    }
+
+    #[test]
+    fn of_nothing_everything_is_zero() {
+        let mut balance = Balance::new(&[], DT, 4);
+        balance.add(&[], &[]);
+        assert_eq!(balance.close(), Imbalance::default());
+        let rest = body();
+        let none = run(fixed(BodyKind::Static), rest, rest, point([0.0; 2], DVec2::ZERO));
+        assert_eq!(none, Imbalance::default());
+    }
+
+    #[test]
+    fn weight_that_the_floor_carries_is_balanced_and_a_lost_impulse_is_not() {
+        // 2 kg × 10 m/s² × 0.1 s = 2 N·s, below the centre of mass.
+        let rest = BodyState { force: DVec2::new(0.0, -20.0), ..body() };
+        let floor = fixed(BodyKind::Static);
+        assert_eq!(run(floor, rest, rest, point([2.0, 0.0], DVec2::NEG_Y)), Imbalance::default());
+        // Half of it is lost; the scale is the 2 N·s of weight in a step.
+        assert_eq!(run(floor, rest, rest, point([1.0, 0.0], DVec2::NEG_Y)).momentum, 0.5);
+    }
+
+    #[test]
+    fn angular_momentum_needs_the_right_arm() {
+        // 1 N·s upwards at arm +1 m: v = ½ m/s, ω = 2 rad/s.
+        let rest = body();
+        let after = BodyState {
+            velocity: DVec2::new(0.0, 0.5),
+            position: DVec2::new(0.0, 0.05),
+            angular_velocity: 2.0,
+            ..body()
+        };
+        let floor = fixed(BodyKind::Static);
+        let right = run(floor, rest, after, point([1.0, 0.0], DVec2::X));
+        assert_eq!((right.momentum, right.angular_momentum), (0.0, 0.0));
+        // With half the arm 0.5 N·m·s are too many. Scale: √(2 E M) r, with
+        // E = ¼ + 1 J, M = 2 kg and r = √(0.5/2) m: √5/2.
+        let wrong = run(floor, rest, after, point([1.0, 0.0], 0.5 * DVec2::X));
+        assert!((wrong.angular_momentum - 0.5 / (0.5 * 5.0_f64.sqrt())).abs() < 1e-15);
+    }
+
+    #[test]
+    fn angular_momentum_of_free_fall_in_substeps_is_balanced() {
+        let n = 4;
+        let mut balance = Balance::new(&[body()], DT, n);
+        let before = BodyState {
+            position: DVec2::new(3.0, 1.0),
+            velocity: DVec2::new(2.0, 5.0),
+            force: DVec2::new(0.0, -20.0),
+            ..body()
+        };
+        let mut after = before;
+        for _ in 0..n {
+            after.velocity += DT / n as f64 * after.force * after.inv_mass;
+            after.position += DT / n as f64 * after.velocity;
+        }
+        balance.add(&[BodyStep { before, after }], &[]);
+        // Terms of 30 N·m·s cancel.
+        assert!(balance.angular_max < 1e-13, "{}", balance.angular_max);
+        assert!(balance.momentum_max < 1e-14);
+    }
+
+    #[test]
+    fn energy_from_nowhere_is_created_and_a_kinematic_body_may_give_it() {
+        // Kicked from rest to 2 m/s: 4 J, all of the kinetic energy.
+        let after = BodyState { velocity: DVec2::new(0.0, 2.0), ..body() };
+        let kicked = run(fixed(BodyKind::Static), body(), after, point([4.0, 0.0], DVec2::ZERO));
+        assert_eq!((kicked.energy_change, kicked.energy_created), (1.0, 1.0));
+        // No impulse takes it: the one there is gives 4 N·s × 1 m/s at the middle of the step.
+        assert_eq!((kicked.impact_loss, kicked.energy_unexplained), (-1.0, 0.0));
+        let by_magic = run(fixed(BodyKind::Static), body(), after, point([0.0; 2], DVec2::ZERO));
+        assert_eq!((by_magic.impact_loss, by_magic.energy_unexplained), (0.0, 1.0));
+        // An elastic bounce off a plate that rises with 1 m/s: 4 N·s × 1 m/s.
+        let plate = BodyState { velocity: DVec2::Y, ..fixed(BodyKind::Kinematic) };
+        let bounced = run(plate, body(), after, point([4.0, 0.0], DVec2::ZERO));
+        assert_eq!((bounced.energy_change, bounced.energy_created), (0.0, 0.0));
+    }
+
+    #[test]
+    fn friction_and_impact_take_what_the_bodies_lose() {
+        // 2 kg fall with 3 m/s and slide with 4; the floor stops the fall, friction half the slide.
+        let before = BodyState { velocity: DVec2::new(4.0, -3.0), ..body() };
+        let after = BodyState { velocity: DVec2::new(2.0, 0.0), position: DVec2::new(0.2, 0.0), ..body() };
+        let lost = run(fixed(BodyKind::Static), before, after, point([6.0, -4.0], DVec2::ZERO));
+        // 16 − 4 = 12 J and 9 J, of 25 J.
+        assert!((lost.friction_loss - 12.0 / 25.0).abs() < 1e-15, "{lost:?}");
+        assert!((lost.impact_loss - 9.0 / 25.0).abs() < 1e-15, "{lost:?}");
+        assert!((lost.energy_change + 21.0 / 25.0).abs() < 1e-15, "{lost:?}");
+        assert!(lost.energy_unexplained < 1e-15, "{lost:?}");
+    }
+
+    #[test]
+    fn blown_up_is_a_hundred_times_more_than_there_can_be() {
+        // 4 J to begin with; no weight.
+        let start = BodyState { velocity: DVec2::new(0.0, -2.0), ..body() };
+        let mut balance = Balance::new(&[start], DT, 1);
+        assert!(!balance.is_blown_up(400.0) && balance.is_blown_up(401.0));
+        // A force of 10 N that moves the body by 0.4 m adds 4 J.
+        let pushed = BodyState { force: DVec2::new(10.0, 0.0), ..start };
+        let after = BodyState { position: DVec2::new(0.4, 0.0), ..pushed };
+        balance.add(&[BodyStep { before: pushed, after }], &[]);
+        assert!(!balance.is_blown_up(800.0) && balance.is_blown_up(801.0));
+        assert!(!Balance::new(&[], DT, 1).is_blown_up(1.0));
+    }
+}

@@ -1,0 +1,342 @@
+//! How wrong a simulation is, read from its states and impulses alone.
+//!
+//! Everything is computed in double precision from the single-precision state, and nothing
+//! here knows which solver ran. Make an [`Observation`] of the world before its first step
+//! and show it the world after every step, with `Settings::record_impulses` on.
+//!
+//! | error | says | computed in |
+//! |---|---|---|
+//! | penetration | how deep bodies overlap *after* the step, found by colliding anew | [`Observation`] |
+//! | excess penetration | what of that soft contacts do not account for, at rest | [`softness`] |
+//! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
+//! | complementarity, cone, dissipation | which part of the law is broken | [`violation`] |
+//! | own residual | how far the solver is from what it set out to solve | [`own`] |
+//! | momentum, angular momentum | whether impulses come in pairs | [`balance`] |
+//! | energy | what was gained from nowhere, or lost, and what took it | [`balance`], [`state`] |
+//! | rest velocity, creep, settle time | whether what should rest does | [`rest`] |
+//! | velocity error | how far velocities are from a reference | [`velocity`] |
+//!
+//! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
+//!
+//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report.
+
+pub mod balance;
+pub mod distribution;
+pub mod law;
+pub mod own;
+pub mod rest;
+pub mod softness;
+pub mod state;
+pub mod velocity;
+pub mod violation;
+
+use crate::engine::bodies::BodyKind;
+use crate::engine::contacts::Contact;
+use crate::engine::narrowphase::collide;
+use crate::engine::params::SPECULATIVE_DISTANCE;
+use crate::engine::world::{Divergence, World};
+use balance::{Balance, ratio, weight};
+use distribution::Distribution;
+use glam::{DVec2, Vec2};
+use law::{BodyStep, PointStep};
+use rest::Rest;
+use softness::{Depths, RestDepths};
+use state::BodyState;
+use violation::Violation;
+
+/// The errors of a run. All are finite, and zero where there is nothing to measure; absent is
+/// what was not asked for, or has no meaning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Errors {
+    /// Steps observed.
+    pub steps: u64,
+    /// Contact points observed, over all steps.
+    pub points: u64,
+    /// Deepest overlap (m).
+    pub penetration_max: f64,
+    /// Mean overlap of contact points, open ones counted as zero (m).
+    pub penetration_mean: f64,
+    /// Root mean square of the same (m).
+    pub penetration_rms: f64,
+    /// What 99 % of the contact points do not exceed (m).
+    pub penetration_p99: f64,
+    /// Deepest overlap, in half the width of the thinnest dynamic shape.
+    pub penetration_relative: f64,
+    /// Deepest overlap of the last second beyond what soft contacts give way at rest (m); none
+    /// without soft contacts.
+    pub penetration_excess: Option<f64>,
+    /// The most that soft contacts give way under the last second's load (m).
+    pub soft_floor: Option<f64>,
+    /// Normal law residual, root mean square, in the weight of the scene × step.
+    pub law_normal_rms: f64,
+    /// Largest normal law residual.
+    pub law_normal_max: f64,
+    /// Tangential law residual, root mean square.
+    pub law_tangent_rms: f64,
+    /// Largest tangential law residual.
+    pub law_tangent_max: f64,
+    /// Both parts together, root mean square.
+    pub law_rms: f64,
+    /// Largest violation of complementarity, in (weight × step)²/mass.
+    pub complementarity: f64,
+    /// Largest violation of the friction cone, in weight × step.
+    pub cone: f64,
+    /// Largest gap to maximal dissipation, in (weight × step)²/mass.
+    pub dissipation: f64,
+    /// Residual of what the solver set out to solve, both parts, root mean square, in the
+    /// weight of the scene × substep; only with `Settings::observe_rule`.
+    pub own_rms: Option<f64>,
+    /// Largest of its normal and tangential parts.
+    pub own_max: Option<f64>,
+    /// Momentum out of balance, see [`Balance::close`].
+    pub momentum: f64,
+    /// Angular momentum out of balance.
+    pub angular_momentum: f64,
+    /// Energy gained (positive) or lost over the run.
+    pub energy_change: f64,
+    /// Most energy created in one step.
+    pub energy_created: f64,
+    /// Energy that friction took.
+    pub friction_loss: f64,
+    /// Energy that normal impulses took.
+    pub impact_loss: f64,
+    /// Most energy in one step that no impulse explains.
+    pub energy_unexplained: f64,
+    /// Root mean square of √(2 E_kin/M) over the last second (m/s).
+    pub rest_velocity: f64,
+    /// Fastest creep of one body on another over the last second, without its sign (m/s).
+    pub creep: f64,
+    /// Half the width of its 95 % interval (m/s).
+    pub creep_half_width: f64,
+    /// When the scene came to rest for good (s), if it did.
+    pub settled: Option<f64>,
+}
+
+/// Root mean square and maximum of residuals (N·s).
+#[derive(Clone, Copy, Debug, Default)]
+struct Residuals {
+    sum_of_squares: f64,
+    max: f64,
+    count: u64,
+}
+
+impl Residuals {
+    fn add(&mut self, residual: f64) {
+        self.count += 1;
+        self.sum_of_squares += residual * residual;
+        self.max = self.max.max(residual.abs());
+    }
+}
+
+/// Watches a world and sums its errors up.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    previous: Vec<BodyState>,
+    balance: Balance,
+    /// Smallest half-extent of the dynamic shapes (m), infinite without any.
+    half_extent: f64,
+    dt: f64,
+    weight: f64,
+    steps: u64,
+    penetration: Distribution,
+    normal: Residuals,
+    tangent: Residuals,
+    own: [Residuals; 2],
+    violation: Violation,
+    largest_impulse: f64,
+    rest: Rest,
+    depths: RestDepths,
+    /// Frequencies of soft contacts (rad/s): between dynamic bodies, and with others.
+    softness: Option<[f64; 2]>,
+    substeps: f64,
+    blown_up: Option<Divergence>,
+}
+
+impl Observation {
+    /// Begins with the world as it stands.
+    pub fn new(world: &World) -> Self {
+        let settings = &world.settings;
+        let previous = snapshot(world);
+        let dynamic = world
+            .shapes
+            .iter()
+            .zip(&world.shape_body)
+            .filter(|&(_, &body)| world.bodies.is_dynamic(body as usize))
+            .map(|(shape, _)| shape.min_half_extent() as f64);
+        Observation {
+            balance: Balance::new(&previous, settings.dt as f64, settings.budget.substeps),
+            half_extent: dynamic.fold(f64::INFINITY, f64::min),
+            dt: settings.dt as f64,
+            weight: weight(&previous),
+            previous,
+            steps: 0,
+            penetration: Distribution::default(),
+            normal: Residuals::default(),
+            tangent: Residuals::default(),
+            own: Default::default(),
+            violation: Violation::default(),
+            largest_impulse: 0.0,
+            rest: Rest::new(settings.dt as f64),
+            depths: RestDepths::default(),
+            softness: settings
+                .solver
+                .softness
+                .map(|s| s(settings.contact_hertz, settings.h()).map(f64::from)),
+            substeps: settings.budget.substeps.max(1) as f64,
+            blown_up: None,
+        }
+    }
+
+    /// Adds the step that the world has just taken. Bodies must not have been added since
+    /// the observation began; if they were, the step is left out.
+    pub fn observe(&mut self, world: &World) {
+        let now = snapshot(world);
+        if now.len() != self.previous.len() {
+            return;
+        }
+        let bodies: Vec<BodyStep> =
+            self.previous.iter().zip(&now).map(|(&before, &after)| BodyStep { before, after }).collect();
+        let points = contact_points(world);
+        for ([a, b], point) in &points {
+            let [normal, tangent] = point.residual(&bodies[*a], &bodies[*b], self.dt);
+            self.normal.add(normal);
+            self.tangent.add(tangent);
+            self.violation = self.violation.max(point.violation(&bodies[*a], &bodies[*b], self.dt));
+            self.largest_impulse = self.largest_impulse.max(point.impulse[0]);
+        }
+        for residual in own::residuals(world, &bodies, &points) {
+            self.own.iter_mut().zip(residual).for_each(|(sum, r)| sum.add(r));
+        }
+        self.balance.add(&bodies, &points);
+        self.add_penetrations(world, &points);
+
+        let kinetic: f64 = now.iter().map(BodyState::kinetic_energy).sum();
+        self.rest.add(ratio(2.0 * kinetic, self.balance.mass()), &now, &points);
+        if self.blown_up.is_none() && self.balance.is_blown_up(kinetic) {
+            self.blown_up = Some(fastest(&now, world.step_index));
+        }
+        self.previous = now;
+        self.steps += 1;
+    }
+
+    /// The first step whose kinetic energy had no source ([`Balance::is_blown_up`]), with the
+    /// fastest body: as much a failure as a speed out of all bounds.
+    pub fn blown_up(&self) -> Option<Divergence> {
+        self.blown_up
+    }
+
+    /// Collides the step's contacts anew, where their bodies are now.
+    fn add_penetrations(&mut self, world: &World, points: &[([usize; 2], PointStep)]) {
+        let mut depths = Depths::default();
+        let mut steps = points;
+        for contact in &world.contacts {
+            let (own, rest) = steps.split_at(contact.manifold.count as usize);
+            steps = rest;
+            let [a, b] = [contact.shape_a, contact.shape_b].map(|s| &world.shapes[s as usize]);
+            let [pose_a, pose_b] =
+                world.bodies.relative_poses(contact.body_a as usize, contact.body_b as usize);
+            let manifold = collide(a, &pose_a, b, &pose_b, SPECULATIVE_DISTANCE);
+            for point in manifold.points() {
+                self.penetration.add(-point.separation as f64);
+                let floor = self.floor(world, contact, own, point.feature_id);
+                depths.add(-point.separation as f64, floor);
+            }
+        }
+        self.depths.add(depths, self.dt);
+    }
+
+    /// How far the soft contact at this feature gives way under its load of the step (m).
+    fn floor(&self, world: &World, contact: &Contact, own: &[([usize; 2], PointStep)], feature: u32) -> f64 {
+        let Some(softness) = self.softness else { return 0.0 };
+        let loaded = contact.manifold.points().iter().zip(own).find(|(p, _)| p.feature_id == feature);
+        let Some((_, (_, point))) = loaded else { return 0.0 };
+        let [a, b] = [contact.body_a, contact.body_b].map(|i| &self.previous[i as usize]);
+        let omega = softness[(world.bodies.kind[contact.body_a as usize] != BodyKind::Dynamic) as usize];
+        softness::floor(point.impulse[0] / self.dt, point.effective_mass(point.normal, a, b), omega)
+    }
+
+    /// The errors of the steps so far.
+    ///
+    /// Residuals are in units of Σ m g Δt, the impulse that carries the whole scene for a
+    /// step; without gravity, of the largest impulse of any point.
+    pub fn errors(&self) -> Errors {
+        let unit = if self.weight > 0.0 { self.weight * self.dt } else { self.largest_impulse };
+        let energy_unit = ratio(unit * unit, self.balance.mass());
+        let rms = |sum: f64, count: u64, unit: f64| ratio((sum / count.max(1) as f64).sqrt(), unit);
+        let count = self.normal.count;
+        let [normal, tangent] = [self.normal, self.tangent].map(|r| r.sum_of_squares);
+        let own_unit = unit / self.substeps;
+        let own = (self.own[0].count > 0).then_some(&self.own);
+        let own_squares = |o: &[Residuals; 2]| o[0].sum_of_squares + o[1].sum_of_squares;
+        let touched = self.penetration.count() > 0;
+        let depths = self.softness.filter(|_| touched).map(|_| self.depths.largest());
+        let balance = self.balance.close();
+        let creep = self.rest.creep();
+        Errors {
+            steps: self.steps,
+            points: self.penetration.count(),
+            penetration_max: self.penetration.max(),
+            penetration_mean: self.penetration.mean(),
+            penetration_rms: self.penetration.rms(),
+            penetration_p99: self.penetration.p99(),
+            penetration_relative: self.penetration.max() / self.half_extent,
+            penetration_excess: depths.map(|d| d.excess),
+            soft_floor: depths.map(|d| d.floor),
+            law_normal_rms: rms(normal, count, unit),
+            law_normal_max: ratio(self.normal.max, unit),
+            law_tangent_rms: rms(tangent, count, unit),
+            law_tangent_max: ratio(self.tangent.max, unit),
+            law_rms: rms(normal + tangent, count, unit),
+            complementarity: ratio(self.violation.complementarity, energy_unit),
+            cone: ratio(self.violation.cone, unit),
+            dissipation: ratio(self.violation.dissipation, energy_unit),
+            own_rms: own.map(|o| rms(own_squares(o), o[0].count, own_unit)),
+            own_max: own.map(|o| ratio(o[0].max.max(o[1].max), own_unit)),
+            momentum: balance.momentum,
+            angular_momentum: balance.angular_momentum,
+            energy_change: balance.energy_change,
+            energy_created: balance.energy_created,
+            friction_loss: balance.friction_loss,
+            impact_loss: balance.impact_loss,
+            energy_unexplained: balance.energy_unexplained,
+            rest_velocity: self.rest.speed(),
+            creep: creep.speed.abs(),
+            creep_half_width: creep.half_width,
+            settled: self.rest.settled(),
+        }
+    }
+}
+
+/// The fastest body, as what a run failed by.
+fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
+    let speeds = bodies.iter().map(|b| b.velocity.length().max(b.angular_velocity.abs()));
+    let (body, speed) = speeds.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+    Divergence { step, body, speed: speed as f32 }
+}
+
+/// Every body in double precision.
+fn snapshot(world: &World) -> Vec<BodyState> {
+    let gravity = DVec2::from(world.settings.gravity.map(f64::from));
+    (0..world.bodies.len()).map(|i| BodyState::of(&world.bodies, i, gravity)).collect()
+}
+
+/// Every contact point of the last step, with its bodies.
+fn contact_points(world: &World) -> Vec<([usize; 2], PointStep)> {
+    let wide = |v: Vec2| v.as_dvec2();
+    let mut points = Vec::with_capacity(world.counts.points);
+    for contact in &world.contacts {
+        for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
+            let step = PointStep {
+                normal: wide(contact.manifold.normal),
+                anchor_a: wide(point.anchor_a),
+                anchor_b: wide(point.anchor_b),
+                gap: point.separation as f64,
+                friction: contact.friction as f64,
+                restitution: contact.restitution as f64,
+                impulse: impulse.map(f64::from),
+            };
+            points.push(([contact.body_a as usize, contact.body_b as usize], step));
+        }
+    }
+    points
+}

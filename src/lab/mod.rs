@@ -1,0 +1,26 @@
+//! The laboratory: what is simulated, what is known about it, and how solvers compare.
+//!
+//! Floors, each importing from those before it only:
+//!
+//! ```text
+//! error  files                   what can go wrong; result files
+//! scenes                         what is simulated, and its known truth
+//! reference  metrics             certified solutions; errors read from states
+//! capture  verify                frozen problems; hard cases
+//! study  converge                solver × scene × budget; iterations to a tolerance
+//! advise  report                 the cheapest setting; tables, plots, records
+//! profile                        phases against the roofline; cost by size
+//! ```
+
+pub mod advise;
+pub mod capture;
+pub mod converge;
+pub mod error;
+pub mod files;
+pub mod metrics;
+pub mod profile;
+pub mod reference;
+pub mod report;
+pub mod scenes;
+pub mod study;
+pub mod verify;

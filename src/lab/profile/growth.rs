@@ -1,0 +1,318 @@
+//! The cost of a contact as scenes grow: what stays flat, what steps where a cache ends, and what
+//! grows.
+//!
+//! Scenes of all sizes are held still and take turns, so that whatever the machine does, it does to
+//! all of them. A turn is a few whole steps on the same state, pairs looked for anew in each; the
+//! first finds cold caches and is not timed.
+
+use super::ceilings::ReadCurve;
+use super::waiting::{self, waited};
+use crate::engine::clock::{Phase, Timings};
+use crate::engine::world::{Memory, StepCounts, World};
+use crate::lab::metrics::Errors;
+use crate::lab::study::interleave::median;
+use std::time::{Duration, Instant};
+
+/// A world that takes part.
+pub struct Entry {
+    /// Name with its size.
+    pub scene: String,
+    /// Settled.
+    pub world: World,
+    /// Errors of its last settling steps.
+    pub errors: Option<Errors>,
+}
+
+/// Median and median deviation (ns).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Time {
+    /// Median.
+    pub ns: f64,
+    /// Median distance from it.
+    pub spread_ns: f64,
+}
+
+impl Time {
+    fn of(samples: &[f64]) -> Time {
+        let ns = median(samples);
+        let deviations: Vec<f64> = samples.iter().map(|t| (t - ns).abs()).collect();
+        Time { ns, spread_ns: median(&deviations) }
+    }
+}
+
+/// One size.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Name with its size.
+    pub scene: String,
+    /// Bodies.
+    pub bodies: usize,
+    /// Counts of the step that is repeated.
+    pub counts: StepCounts,
+    /// The whole step.
+    pub step: Time,
+    /// Each phase, in the order of [`Phase::ALL`].
+    pub phases: [Time; Phase::ALL.len()],
+    /// What the world holds.
+    pub memory: Memory,
+    /// Errors beside the times.
+    pub errors: Option<Errors>,
+}
+
+impl Row {
+    /// Time per contact (ns).
+    pub fn per_contact(&self, time: Time) -> f64 {
+        time.ns / self.counts.contacts.max(1) as f64
+    }
+
+    fn phase(&self, phase: Phase) -> Time {
+        self.phases[phase as usize]
+    }
+}
+
+/// Time of one world in one round, beyond its first step.
+const TURN: Duration = Duration::from_millis(40);
+/// Time of one size of memory in one round.
+const READ: Duration = Duration::from_millis(1);
+/// Pauses are taken out of steps longer than this (ns), in which reading them costs little; shorter
+/// ones mostly have none, and those that have are left out.
+const LONG_NS: u64 = 4_000_000;
+/// A step that waited for a processor for more than this share of its time is left out, where enough
+/// others are left.
+const PAUSE: f64 = 0.01;
+/// Steps that are kept at least.
+const FEWEST: usize = 3;
+/// Steps of a turn, at most: the caches are warm long before.
+const STEPS: usize = 400;
+
+/// What was measured.
+pub struct Measurement {
+    /// In the order of the entries.
+    pub rows: Vec<Row>,
+    /// How fast memory was read, in the same rounds.
+    pub memory: ReadCurve,
+    /// Share of the time in which the thread waited for a processor, where that is known.
+    pub waiting: Option<f64>,
+}
+
+/// A step, and the share of its time in which the thread waited.
+type Sample = (Timings, f64);
+
+/// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
+pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> Measurement {
+    let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
+    let mut memory = ReadCurve::new(largest);
+    let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); entries.len()];
+    let (start, before) = (Instant::now(), waited());
+    for round in 0..repeats {
+        progress(round);
+        memory.sample(READ);
+        for (entry, samples) in entries.iter_mut().zip(&mut samples) {
+            turn(&mut entry.world, samples);
+        }
+    }
+    let waiting = waiting::share(before, start.elapsed());
+    let rows = entries.iter().zip(samples).map(|(entry, samples)| row(entry, samples)).collect();
+    Measurement { rows, memory, waiting }
+}
+
+fn row(entry: &Entry, mut samples: Vec<Sample>) -> Row {
+    // Steps without a pause, or those with the shortest ones.
+    samples.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let whole = samples.iter().take_while(|s| s.1 <= PAUSE).count();
+    samples.truncate(whole.max(FEWEST));
+    let time = |of: &dyn Fn(&Timings) -> u64| {
+        Time::of(&samples.iter().map(|(timings, _)| of(timings) as f64).collect::<Vec<_>>())
+    };
+    Row {
+        scene: entry.scene.clone(),
+        bodies: entry.world.bodies.len(),
+        counts: entry.world.counts,
+        step: time(&|t| t.step_ns),
+        phases: std::array::from_fn(|k| time(&|t| t.phase_ns[k])),
+        memory: entry.world.memory(),
+        errors: entry.errors,
+    }
+}
+
+/// One turn: a step that finds cold caches and is not timed, then as many as fit.
+fn turn(world: &mut World, samples: &mut Vec<Sample>) {
+    let mut frozen = world.hold();
+    let net = frozen.step(false).step_ns > LONG_NS;
+    let (start, mut steps) = (Instant::now(), 0);
+    while steps == 0 || (start.elapsed() < TURN && steps < STEPS) {
+        let before = waited();
+        let begin = Instant::now();
+        let timings = frozen.step(net);
+        let share = waiting::share(before, begin.elapsed()).unwrap_or(0.0);
+        samples.push((timings, if net { 0.0 } else { share }));
+        steps += 1;
+    }
+}
+
+/// The size at which a scene has `target` contacts, if contacts grow as a power of the size, from
+/// two sizes and their contacts. None if they do not grow.
+pub fn size_for(target: f64, [small, large]: [(f64, f64); 2]) -> Option<f64> {
+    let power = (large.1 / small.1).ln() / (large.0 / small.0).ln();
+    let size = large.0 * (target / large.1).powf(1.0 / power);
+    (power > 0.1 && size.is_finite()).then_some(size)
+}
+
+/// How the cost per contact went from one size to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// It stayed or fell.
+    Flat,
+    /// It rose by no more than memory of the phase's working set became slower.
+    Cache,
+    /// It rose by no more than that and the logarithm.
+    Logarithm,
+    /// It rose by more than n log n and memory account for.
+    Faster,
+}
+
+/// One step from size to size.
+#[derive(Clone, Copy, Debug)]
+pub struct Growth {
+    /// Contacts before and after.
+    pub contacts: [usize; 2],
+    /// Cost per contact, after over before.
+    pub ratio: f64,
+    /// How much slower memory is read, before over after.
+    pub memory: f64,
+    /// What that was.
+    pub change: Change,
+}
+
+/// What a ratio may be off for other reasons than growth: measured, ratios of equal worlds differ by
+/// a tenth on a machine with other guests.
+const TOLERANCE: f64 = 1.15;
+
+/// Judges a ratio of costs per contact by the contacts on both sides, the spread of the times
+/// (relative) and how much slower memory has become.
+///
+/// Of an n log n method the cost per contact grows by ln n₂/ln n₁; streams cost what their bytes
+/// cost. Faster growth is what the product of both, with the tolerance and twice the spread, does
+/// not reach.
+pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Growth {
+    let [before, after] = contacts.map(|n| (n.max(2) as f64).ln());
+    let room = TOLERANCE + 2.0 * spread;
+    // Not a number, where nothing was measured, excuses nothing.
+    let (memory, logarithm) = (memory.max(1.0), (after / before).max(1.0));
+    let change = match ratio {
+        r if r <= room => Change::Flat,
+        r if r <= room * memory => Change::Cache,
+        r if r <= room * memory * logarithm => Change::Logarithm,
+        _ => Change::Faster,
+    };
+    Growth { contacts, ratio, memory, change }
+}
+
+/// What is known of one phase over all sizes.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// None for the whole step.
+    pub phase: Option<Phase>,
+    /// p in time ~ contactsᵖ, least squares on logarithms.
+    pub exponent: f64,
+    /// Least and largest cost per contact (ns).
+    pub range: [f64; 2],
+    /// From each size to the next.
+    pub steps: Vec<Growth>,
+    /// From the smallest size to the largest: many small rises are none of them a step.
+    pub whole: Growth,
+}
+
+/// Below this a phase's cost is not judged (ns per contact).
+const NEGLIGIBLE: f64 = 0.5;
+
+/// Judges every phase and the whole step; rows are in ascending order of contacts.
+pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
+    let kinds = std::iter::once(None).chain(Phase::ALL.into_iter().map(Some));
+    let mut verdicts = Vec::new();
+    for phase in kinds {
+        let time = |row: &Row| phase.map_or(row.step, |p| row.phase(p));
+        let costs: Vec<f64> = rows.iter().map(|r| r.per_contact(time(r))).collect();
+        let range =
+            [costs.iter().copied().fold(f64::INFINITY, f64::min), costs.iter().copied().fold(0.0, f64::max)];
+        if costs.len() < 2 || range[1] < NEGLIGIBLE {
+            continue;
+        }
+        let speeds: Vec<f64> = rows.iter().map(|r| memory.at(working_set(&r.memory, phase))).collect();
+        let between = |i: usize, j: usize| {
+            let spread = |r: &Row| time(r).spread_ns / time(r).ns.max(1.0);
+            judge(
+                [rows[i].counts.contacts, rows[j].counts.contacts],
+                costs[j] / costs[i],
+                spread(&rows[i]) + spread(&rows[j]),
+                speeds[i] / speeds[j],
+            )
+        };
+        let steps = (1..rows.len()).map(|j| between(j - 1, j)).collect();
+        let whole = between(0, rows.len() - 1);
+        let points: Vec<[f64; 2]> =
+            rows.iter().map(|r| [r.counts.contacts as f64, time(r).ns].map(|x| x.max(1.0).ln())).collect();
+        verdicts.push(Verdict { phase, exponent: slope(&points), range, steps, whole });
+    }
+    verdicts
+}
+
+/// Bytes that a phase goes through, by the arrays that it names.
+fn working_set(memory: &Memory, phase: Option<Phase>) -> usize {
+    let names: &[&str] = match phase {
+        None => return memory.used(),
+        Some(Phase::Pairs) => &["shapes", "proxies", "broad phase", "candidates"],
+        Some(Phase::Collide) => &["candidates", "contacts", "shapes"],
+        Some(Phase::Color) => &["contacts", "colouring"],
+        Some(Phase::Prepare) => &["bodies", "contacts", "records", "rows"],
+        Some(Phase::Integrate) => &["rows"],
+        Some(Phase::Store) => &["bodies", "contacts", "records", "rows"],
+        Some(_) => &["records", "rows"],
+    };
+    memory.components.iter().filter(|c| names.contains(&c.name)).map(|c| c.used).sum()
+}
+
+/// Slope of the least-squares line.
+fn slope(points: &[[f64; 2]]) -> f64 {
+    let count = points.len().max(1) as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / count);
+    let sum = |f: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>();
+    sum(&|p| (p[0] - mean[0]) * (p[1] - mean[1])) / sum(&|p| (p[0] - mean[0]).powi(2)).max(1e-300)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_follow_the_power_of_their_contacts() {
+        // 1.5 N²: a pyramid; N: a column.
+        let size = size_for(15_000.0, [(10.0, 150.0), (20.0, 600.0)]).unwrap();
+        assert!((size - 100.0).abs() < 1e-9, "{size}");
+        assert!((size_for(500.0, [(10.0, 10.0), (20.0, 20.0)]).unwrap() - 500.0).abs() < 1e-9);
+        assert_eq!(size_for(500.0, [(10.0, 10.0), (20.0, 10.0)]), None);
+        assert_eq!(size_for(500.0, [(10.0, 0.0), (20.0, 0.0)]), None);
+    }
+
+    #[test]
+    fn growth_is_told_from_caches_and_logarithms() {
+        let judge = |ratio, memory| judge([1000, 1_000_000], ratio, 0.0, memory).change;
+        // ln 10⁶/ln 10³ = 2.
+        assert_eq!(judge(0.5, 1.0), Change::Flat);
+        assert_eq!(judge(1.1, 1.0), Change::Flat);
+        assert_eq!(judge(2.2, 1.0), Change::Logarithm);
+        assert_eq!(judge(2.4, 1.0), Change::Faster);
+        assert_eq!(judge(2.4, 3.0), Change::Cache);
+        assert_eq!(judge(6.0, 3.0), Change::Logarithm);
+        assert_eq!(judge(7.0, 3.0), Change::Faster);
+        // Memory that happens to be read faster excuses nothing less.
+        assert_eq!(judge(2.2, 0.5), Change::Logarithm);
+        assert_eq!(super::judge([1000, 1_000_000], 1.3, 0.1, 1.0).change, Change::Flat);
+    }
+
+    #[test]
+    fn a_power_law_has_its_exponent() {
+        let points: Vec<[f64; 2]> = (1..6).map(f64::from).map(|x| [x, 1.5 * x + 0.3]).collect();
+        assert!((slope(&points) - 1.5).abs() < 1e-12);
+    }
+}

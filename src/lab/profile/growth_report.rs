@@ -1,0 +1,266 @@
+//! Growth as tables, words, a file and a picture.
+
+use super::growth::{Change, Row, Verdict};
+use crate::engine::clock::Phase;
+use crate::lab::error::Error;
+use crate::lab::report::axes::{Area, Drawn, GRID, INK, Scale, color, write, write_upwards};
+use crate::lab::report::table::{finish, table};
+use crate::lab::report::units::{digits, ratio, si};
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+/// Phases that any of the rows spent time in.
+fn phases(rows: &[Row]) -> Vec<Phase> {
+    let has = |p: &Phase| rows.iter().any(|r| r.phases[*p as usize].ns > 0.0);
+    Phase::ALL.into_iter().filter(has).collect()
+}
+
+/// Times and memory per contact, and what that means.
+pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
+    let phases = phases(rows);
+    let mut header = vec!["scene", "bodies", "contacts", "step", "±"];
+    header.extend(phases.iter().map(|p| p.name()));
+    header.extend(["pen.max", "law"]);
+    let mut times = table(&header);
+    for row in rows {
+        let mut cells = vec![row.scene.clone(), row.bodies.to_string(), row.counts.contacts.to_string()];
+        cells.push(digits(row.per_contact(row.step)));
+        cells.push(digits(row.step.spread_ns / row.counts.contacts.max(1) as f64));
+        cells.extend(phases.iter().map(|&p| digits(row.per_contact(row.phases[p as usize]))));
+        cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max, "m")));
+        cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms)));
+        times.add_row(cells);
+    }
+    let mut text = format!(
+        "ns per contact; a step looks for all pairs and colours anew; pauses in which the thread waited for a processor are left out\n{}\n",
+        finish(times, 1)
+    );
+    let names: Vec<&str> =
+        rows.first().map_or(Vec::new(), |r| r.memory.components.iter().map(|c| c.name).collect());
+    let mut header = vec!["scene"];
+    header.extend(&names);
+    header.extend(["all", "in use", "B/body"]);
+    let mut memory = table(&header);
+    for row in rows {
+        let per = |bytes: usize, count: usize| format!("{:.0}", bytes as f64 / count.max(1) as f64);
+        let mut cells = vec![row.scene.clone()];
+        cells.extend(row.memory.components.iter().map(|c| per(c.held, row.counts.contacts)));
+        cells.push(per(row.memory.held(), row.counts.contacts));
+        cells.push(per(row.memory.used(), row.counts.contacts));
+        cells.push(per(row.memory.held(), row.bodies));
+        memory.add_row(cells);
+    }
+    text += &format!(
+        "bytes held per contact (capacities), of that in use, and per body\n{}\n",
+        finish(memory, 1)
+    );
+    text += &verdicts.iter().map(sentence).collect::<String>();
+    text
+}
+
+/// One phase in words.
+fn sentence(verdict: &Verdict) -> String {
+    let name = verdict.phase.map_or("whole step", Phase::name);
+    let range = verdict.range.map(digits);
+    let whole = &verdict.whole;
+    let meaning = match whole.change {
+        Change::Flat => "flat".to_string(),
+        Change::Cache => {
+            format!("no more than its memory, which streams {} times slower", digits(whole.memory))
+        }
+        Change::Logarithm => "within n log n".to_string(),
+        Change::Faster => {
+            format!("FASTER than n log n and streams, which account for {}", digits(whole.memory))
+        }
+    };
+    let mut text = format!(
+        "{name}: {} to {} ns per contact, time ~ contacts^{:.2}; × {} over all sizes, {meaning}",
+        range[0],
+        range[1],
+        verdict.exponent,
+        digits(whole.ratio)
+    );
+    let of = |change: Change| verdict.steps.iter().filter(move |s| s.change == change);
+    if of(Change::Flat).count() == verdict.steps.len() {
+        return text + "; no single step\n";
+    }
+    let place = |s: &super::growth::Growth| {
+        format!("× {} from {} to {} contacts", digits(s.ratio), s.contacts[0], s.contacts[1])
+    };
+    let mut parts = Vec::new();
+    let caches: Vec<String> = of(Change::Cache)
+        .map(|s| format!("{} (its working set streams {} times slower)", place(s), digits(s.memory)))
+        .collect();
+    if !caches.is_empty() {
+        parts.push(format!("steps where a cache ends: {}", caches.join(", ")));
+    }
+    let logarithms: Vec<String> = of(Change::Logarithm).map(place).collect();
+    if !logarithms.is_empty() {
+        parts.push(format!("within n log n: {}", logarithms.join(", ")));
+    }
+    let faster: Vec<String> = of(Change::Faster)
+        .map(|s| format!("{}, where streams account for {}", place(s), digits(s.memory)))
+        .collect();
+    if !faster.is_empty() {
+        parts.push(format!("FASTER than n log n and streams account for: {}", faster.join("; ")));
+    }
+    text += &format!("; {}\n", parts.join("; "));
+    text
+}
+
+/// Everything, a row per size.
+pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
+    let failed = |e: csv::Error| Error::invalid("growth.csv", e.to_string());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let phases = phases(rows);
+    let mut header: Vec<String> =
+        ["scene", "bodies", "pairs", "contacts", "points", "step_ns", "step_spread_ns"]
+            .map(String::from)
+            .into();
+    for phase in &phases {
+        let name = phase.name().replace(' ', "_");
+        header.extend([format!("{name}_ns"), format!("{name}_spread_ns")]);
+    }
+    for component in rows.first().map_or(&[][..], |r| &r.memory.components) {
+        let name = component.name.replace(' ', "_");
+        header.extend([format!("{name}_held_bytes"), format!("{name}_used_bytes")]);
+    }
+    header.extend(["penetration_max", "law_rms"].map(String::from));
+    writer.write_record(&header).map_err(failed)?;
+    for row in rows {
+        let c = &row.counts;
+        let mut record = vec![row.scene.clone()];
+        record.extend([row.bodies, c.pairs, c.contacts, c.points].map(|n| n.to_string()));
+        record.extend([row.step.ns, row.step.spread_ns].map(|t| t.to_string()));
+        for &phase in &phases {
+            let time = row.phases[phase as usize];
+            record.extend([time.ns, time.spread_ns].map(|t| t.to_string()));
+        }
+        for component in &row.memory.components {
+            record.extend([component.held, component.used].map(|b| b.to_string()));
+        }
+        let error = |of: fn(&crate::lab::metrics::Errors) -> f64| {
+            row.errors.as_ref().map_or(String::new(), |e| of(e).to_string())
+        };
+        record.extend([error(|e| e.penetration_max), error(|e| e.law_rms)]);
+        writer.write_record(&record).map_err(failed)?;
+    }
+    writer.into_inner().map_err(|e| Error::invalid("growth.csv", e.to_string()))
+}
+
+const PANEL: (i32, i32) = (620, 430);
+const LEFT: i32 = 76;
+const RIGHT: i32 = 130;
+const TOP: i32 = 56;
+const BOTTOM: i32 = 60;
+/// Least distance of two labels.
+const LINE: i32 = 15;
+
+/// A curve: name, and a value per row.
+type Curve = (String, Vec<f64>);
+
+/// Time and memory per contact against contacts, as SVG text.
+pub fn svg(rows: &[Row], title: &str) -> Result<String, Error> {
+    let mut text = String::new();
+    draw(rows, title, &mut text).map_err(|e| Error::invalid("growth.svg", e.to_string()))?;
+    Ok(text)
+}
+
+fn draw(rows: &[Row], title: &str, text: &mut String) -> Drawn {
+    let root = SVGBackend::with_string(text, (2 * PANEL.0 as u32, PANEL.1 as u32)).into_drawing_area();
+    root.fill(&WHITE)?;
+    write(&root, title, (12, 20), 17, HPos::Left)?;
+    let mut times: Vec<Curve> =
+        vec![("whole step".into(), rows.iter().map(|r| r.per_contact(r.step)).collect())];
+    for phase in phases(rows) {
+        let costs: Vec<f64> = rows.iter().map(|r| r.per_contact(r.phases[phase as usize])).collect();
+        times.push((phase.name().into(), costs));
+    }
+    let per = |bytes: usize, r: &Row| bytes as f64 / r.counts.contacts.max(1) as f64;
+    let mut memory: Vec<Curve> = vec![("all".into(), rows.iter().map(|r| per(r.memory.held(), r)).collect())];
+    for (k, component) in rows.first().map_or(&[][..], |r| &r.memory.components).iter().enumerate() {
+        let held = rows.iter().map(|r| per(r.memory.components[k].held, r)).collect();
+        memory.push((component.name.into(), held));
+    }
+    panel(&root, 0, rows, &times, "ns per contact", &|v| digits_short(v))?;
+    panel(&root, PANEL.0, rows, &memory, "bytes held per contact", &|v| digits_short(v))?;
+    root.present()?;
+    Ok(())
+}
+
+fn digits_short(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+fn panel(
+    area: &Area,
+    corner: i32,
+    rows: &[Row],
+    curves: &[Curve],
+    name: &str,
+    label: &dyn Fn(f64) -> String,
+) -> Drawn {
+    let (left, right) = (corner + LEFT, corner + PANEL.0 - RIGHT);
+    let (top, bottom) = (TOP, PANEL.1 - BOTTOM);
+    let contacts: Vec<f64> = rows.iter().map(|r| r.counts.contacts.max(1) as f64).collect();
+    // What is nothing at some size has no place on a logarithmic axis, and none matters below 0.1.
+    let shown = |value: &f64| value.is_finite() && *value >= 0.1;
+    let values: Vec<f64> = curves.iter().flat_map(|c| c.1.iter().copied().filter(shown)).collect();
+    let (x, y) = (Scale::of(contacts.iter().copied(), 7), Scale::of(values.iter().copied(), 8));
+    for &tick in &x.ticks {
+        let at = x.pixel(tick, left, right);
+        area.draw(&PathElement::new(vec![(at, top), (at, bottom)], GRID))?;
+        write(area, &si_count(tick), (at, bottom + 13), 12, HPos::Center)?;
+    }
+    for &tick in &y.ticks {
+        let at = y.pixel(tick, bottom, top);
+        area.draw(&PathElement::new(vec![(left, at), (right, at)], GRID))?;
+        write(area, &label(tick), (left - 6, at), 12, HPos::Right)?;
+    }
+    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
+    write(area, "contacts", ((left + right) / 2, bottom + 34), 13, HPos::Center)?;
+    write_upwards(area, name, (corner + 18, (top + bottom) / 2), 13)?;
+    let mut ends = Vec::new();
+    for (i, (name, values)) in curves.iter().enumerate() {
+        // The first is the sum.
+        let (color, width) = if i == 0 { (INK, 3) } else { (color(i - 1), 2) };
+        let points: Vec<(i32, i32)> = contacts
+            .iter()
+            .zip(values)
+            .filter(|(_, v)| shown(v))
+            .map(|(&n, &v)| (x.pixel(n, left, right), y.pixel(v, bottom, top)))
+            .collect();
+        for &at in &points {
+            area.draw(&Circle::new(at, 3, color.filled()))?;
+        }
+        if let Some(&end) = points.last() {
+            ends.push((end, name, color));
+        }
+        // Colours come again after eight.
+        match i {
+            0..=8 => area.draw(&PathElement::new(points, color.stroke_width(width)))?,
+            _ => area.draw(&DashedPathElement::new(points, 6, 4, color.stroke_width(width)))?,
+        }
+    }
+    ends.sort_by_key(|(end, ..)| end.1);
+    let (mut free, count) = (top, ends.len() as i32);
+    for (i, ((px, py), name, color)) in ends.into_iter().enumerate() {
+        // Room for those that are still to come.
+        let y = py.max(free).min(bottom - LINE * (count - 1 - i as i32)).max(free);
+        area.draw(&PathElement::new(vec![(px, py), (right + 14, y)], color.mix(0.5).stroke_width(1)))?;
+        write(area, name, (right + 18, y), 12, HPos::Left)?;
+        free = y + LINE;
+    }
+    Ok(())
+}
+
+/// `1k`, `300k`, `1M`.
+fn si_count(value: f64) -> String {
+    match value {
+        v if v >= 1e6 => format!("{}M", digits_short(v / 1e6)),
+        v if v >= 1e3 => format!("{}k", digits_short(v / 1e3)),
+        v => digits_short(v),
+    }
+}

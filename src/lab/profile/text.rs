@@ -1,0 +1,230 @@
+//! What `simpulse profile` prints.
+
+use super::{PhaseReport, Report, waiting};
+use crate::engine::clock::Phase;
+use crate::lab::report::table::{finish, table};
+use crate::lab::report::units::digits;
+
+/// Phases whose arithmetic is partly outside of lanes: their operations are a lower bound.
+fn is_partly_scalar(phase: Phase) -> bool {
+    matches!(phase, Phase::Prepare | Phase::Restitution)
+}
+
+/// Bytes with a binary prefix.
+pub fn bytes(value: f64) -> String {
+    match value {
+        v if v < 1024.0 => format!("{v:.0} B"),
+        v if v < 1024.0 * 1024.0 => format!("{} KiB", digits(v / 1024.0)),
+        v => format!("{} MiB", digits(v / (1024.0 * 1024.0))),
+    }
+}
+
+/// Everything: one phase at length, several as a table.
+pub fn text(report: &Report) -> String {
+    let mut text = match report.phases.as_slice() {
+        [phase] => single(report, phase),
+        phases => several(report, phases),
+    };
+    text += &waiting::note(report.waiting);
+    if let Some(rate) = report.multiply_adds {
+        text += &ceilings(report, rate);
+        for phase in &report.phases {
+            text += &reading(report, phase);
+        }
+    }
+    text
+}
+
+/// What is held still.
+pub fn head(report: &Report) -> String {
+    let c = &report.counts;
+    format!(
+        "{} · {}, {} substeps, {} lanes · {} bodies, {} contacts, {} points, {} colours, {:.0} % of lanes filled\n",
+        report.scene,
+        report.solver,
+        report.substeps,
+        report.lanes,
+        report.bodies,
+        c.contacts,
+        c.points,
+        c.colors,
+        100.0 * c.contacts as f64 / c.lane_slots.max(1) as f64,
+    )
+}
+
+fn per(total: f64, count: usize) -> String {
+    if count == 0 { "–".to_string() } else { digits(total / count as f64) }
+}
+
+fn single(report: &Report, phase: &PhaseReport) -> String {
+    let probe = &phase.probe;
+    let mut text = format!(
+        "{}: {} µs a pass, ± {}; {} in a step; median of {} timed passes; {:.1} % of the time went into \
+         bringing the state back\n",
+        probe.phase.name(),
+        digits(1e-3 * phase.pass_ns),
+        digits(1e-3 * phase.spread_ns),
+        probe.passes,
+        phase.passes,
+        100.0 * report.reset_share,
+    );
+    let mut rows = table(&["", "count", "ns", "bytes", "flop"]);
+    let units =
+        [("row", probe.rows), ("contact", report.counts.contacts), ("body", report.bodies), ("pass", 1)];
+    for (name, count) in units {
+        if count == 0 {
+            continue;
+        }
+        let flops = phase.flops.map_or("–".to_string(), |f| at_least(probe.phase, &per(f, count)));
+        let cells = [per(phase.pass_ns, count), per(phase.traffic.total(), count), flops];
+        let mut row = vec![format!("  per {name}"), count.to_string()];
+        row.extend(cells);
+        rows.add_row(row);
+    }
+    text += &finish(rows, 1);
+    text += &format!(
+        "  {} read, {} written, working set {}\n",
+        bytes(phase.traffic.read),
+        bytes(phase.traffic.written),
+        bytes(phase.traffic.working_set)
+    );
+    if let Some(o) = phase.probe.operations {
+        let each = |count: u64| {
+            digits(count as f64 / phase.probe.counted_contacts as f64 / f64::from(phase.probe.passes))
+        };
+        text += &format!(
+            "  per contact on lanes: {} additions, {} multiplications, {} multiply-adds, {} divisions or roots; \
+             {} minima, maxima and selections, which are no flop\n",
+            each(o.adds),
+            each(o.multiplies),
+            each(o.multiply_adds),
+            each(o.divisions),
+            each(o.choices)
+        );
+    }
+    text
+}
+
+fn at_least(phase: Phase, number: &str) -> String {
+    format!("{}{number}", if is_partly_scalar(phase) { "≥ " } else { "" })
+}
+
+fn several(report: &Report, phases: &[PhaseReport]) -> String {
+    let mut rows = table(&[
+        "phase",
+        "passes",
+        "µs/pass",
+        "±",
+        "µs/step",
+        "ns/row",
+        "ns/contact",
+        "ns/body",
+        "B/contact",
+        "set",
+        "GB/s",
+        "of",
+        "flop/contact",
+        "GFLOP/s",
+        "flop/B",
+    ]);
+    let (contacts, mut sum) = (report.counts.contacts, 0.0);
+    for phase in phases {
+        let (probe, ns) = (&phase.probe, phase.pass_ns);
+        let optional = |value: Option<f64>| value.map_or("–".to_string(), digits);
+        let ceiling = phase.bandwidth.map(|b| b.of_mix(&phase.traffic));
+        sum += ns * f64::from(probe.passes);
+        rows.add_row([
+            probe.phase.name().to_string(),
+            probe.passes.to_string(),
+            digits(1e-3 * ns),
+            digits(1e-3 * phase.spread_ns),
+            digits(1e-3 * ns * f64::from(probe.passes)),
+            per(ns, probe.rows),
+            per(ns, contacts),
+            per(ns, report.bodies),
+            per(phase.traffic.total(), contacts),
+            bytes(phase.traffic.working_set),
+            digits(phase.bytes_rate()),
+            optional(ceiling),
+            phase.flops.map_or("–".to_string(), |f| at_least(probe.phase, &per(f, contacts))),
+            optional(phase.flops_rate()),
+            optional(phase.intensity()),
+        ]);
+    }
+    let mut text = finish(rows, 1);
+    text += &format!(
+        "  all phases: {} µs a step, pairs looked for anew; {:.1} % of the time went into bringing the state back\n",
+        digits(1e-3 * sum),
+        100.0 * report.reset_share
+    );
+    text
+}
+
+/// What this machine reached in the same run.
+fn ceilings(report: &Report, multiply_adds: f64) -> String {
+    let mut rows = table(&["level", "set", "read GB/s", "update GB/s"]);
+    for (level, bandwidth) in &report.levels {
+        rows.add_row([
+            format!("  {}", level.name),
+            bytes(level.bytes as f64),
+            digits(bandwidth.read),
+            digits(bandwidth.update),
+        ]);
+    }
+    format!(
+        "\nthis machine, one thread, measured in turn with the above\n{}  multiply-adds, {} lanes: {} GFLOP/s\n\n",
+        finish(rows, 1),
+        report.lanes,
+        digits(multiply_adds)
+    )
+}
+
+/// The roofline in words.
+fn reading(report: &Report, phase: &PhaseReport) -> String {
+    let (Some(peak), Some(bandwidth)) = (report.multiply_adds, phase.bandwidth) else {
+        return String::new();
+    };
+    let bandwidth = bandwidth.of_mix(&phase.traffic);
+    let set = bytes(phase.traffic.working_set);
+    let name = phase.probe.phase.name();
+    let memory_ns = phase.traffic.total() / bandwidth;
+    if phase.pass_ns <= 0.0 || phase.traffic.total() <= 0.0 {
+        return format!("{name}: nothing to do\n");
+    }
+    let share = 100.0 * memory_ns / phase.pass_ns;
+    let memory = format!(
+        "{} of {} GB/s that a set of {set} ({}) allows, {share:.0} %",
+        digits(phase.bytes_rate()),
+        digits(bandwidth),
+        level_of(report, phase.traffic.working_set),
+    );
+    let Some((flops, rate)) = phase.flops.zip(phase.flops_rate()) else {
+        return format!("{name}: {memory}; operations are not counted here\n");
+    };
+    let arithmetic_ns = flops / peak;
+    let bound = memory_ns.max(arithmetic_ns);
+    let binds = if memory_ns >= arithmetic_ns { "bandwidth" } else { "arithmetic" };
+    let times = phase.pass_ns / bound;
+    let rest = match times {
+        t if t < 1.1 => "it is at its ceiling".to_string(),
+        t if t < 2.0 => format!("a pass takes {} times what that allows", digits(t)),
+        t => format!(
+            "a pass takes {} times what that allows: neither binds, but chains of operations and gathers",
+            digits(t)
+        ),
+    };
+    format!(
+        "{name}: {memory}; {} of {} GFLOP/s, {:.0} %; intensity {} flop/B, so {binds} is the lower ceiling; {rest}\n",
+        digits(rate),
+        digits(peak),
+        100.0 * arithmetic_ns / phase.pass_ns,
+        digits(phase.intensity().unwrap_or(0.0)),
+    )
+}
+
+/// The level of memory that holds a working set: levels are measured at half of their size.
+fn level_of(report: &Report, bytes: f64) -> &str {
+    let last = report.levels.last().map_or("memory", |l| l.0.name.as_str());
+    let caches = report.levels.split_last().map_or(&[][..], |(_, caches)| caches);
+    caches.iter().find(|(level, _)| bytes <= 2.0 * level.bytes as f64).map_or(last, |(level, _)| &level.name)
+}

@@ -1,0 +1,178 @@
+//! Bytes that a pass asks for.
+//!
+//! Counted is what the code names, each time it names it, in the layout that it is stored in:
+//!
+//! * *records*: 4 B per float of a record that the pass reads, and again per float that it writes
+//!   (accumulated impulses); lanes without a contact are read like the others;
+//! * *indices*: 4 B per body whose row is gathered;
+//! * *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
+//! * *body passes*: what is read and written of each row and of the arrays beside it;
+//! * *pairs, collide, color*: what goes in once and what comes out once; what they look up in
+//!   between (nodes of the tree, shapes, colours of a body) is not in it, so theirs is a lower bound.
+//!
+//! It is not counted in cache lines, and a row that is gathered four times in a sweep counts four
+//! times though it mostly comes from a nearer cache than the records. The *working set* is what
+//! there is of all that, each byte once: it decides which level of memory has to deliver.
+
+use crate::engine::bodies::BodyKind;
+use crate::engine::clock::Phase;
+use crate::engine::constraints::{Layout, OppositeKind};
+use crate::engine::contacts::quad;
+use crate::engine::lanes::BodyRow;
+use crate::engine::world::{HeldWorld, Probe};
+
+/// Bytes of one pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Traffic {
+    /// Bytes read.
+    pub read: f64,
+    /// Bytes written.
+    pub written: f64,
+    /// Bytes touched, each once.
+    pub working_set: f64,
+}
+
+impl Traffic {
+    /// Bytes read and written.
+    pub fn total(&self) -> f64 {
+        self.read + self.written
+    }
+}
+
+const ROW: f64 = size_of::<BodyRow>() as f64;
+const HALF: f64 = ROW / 2.0;
+/// The quads of a contact that the narrow phase and preparation share.
+const MANIFOLD: f64 = 16.0 * (quad::HEADER + 1) as f64;
+
+/// Bytes per lane of a pass over constraints.
+struct PerLane {
+    /// Floats of the record that are read, and that are written.
+    floats: [usize; 2],
+    /// Rows gathered, and half rows written back.
+    rows: [usize; 2],
+}
+
+/// Floats that a pass reads and writes in a record of this layout.
+fn floats(phase: Phase, layout: &Layout, friction: bool) -> [usize; 2] {
+    let points = layout.points;
+    let arms = 2 * layout.has_arms.iter().filter(|&&has| has).count();
+    let impulses = if friction { 2 } else { 1 };
+    match phase {
+        // Normal, friction; arms, separation, masses and impulses of each point.
+        Phase::Solve | Phase::Relax => {
+            let read = 2 + usize::from(friction) + points * (arms + 1 + 2 * impulses);
+            [read, points * impulses]
+        }
+        // Without friction only the arms along the normal.
+        Phase::WarmStart => [2 + points * (impulses + if layout.has_friction { arms } else { arms / 2 }), 0],
+        Phase::Position => [2 + points * (arms + 2), 0],
+        _ => [0, 0],
+    }
+}
+
+/// Bytes of one pass of a phase.
+pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
+    let (world, work, features) = (frozen.world(), frozen.workspace(), frozen.features());
+    let memory = world.memory();
+    let used = |name| memory.of(name).used as f64;
+    let bodies = world.bodies.len() as f64;
+    let rows = work.rows.len() as f64;
+    let moving = world.bodies.kind.iter().filter(|&&kind| kind != BodyKind::Static).count() as f64;
+    let poses = 16.0 * bodies;
+    let contacts = world.contacts.len() as f64;
+    let damping = if world.features().damping { HALF } else { 0.0 };
+    let in_and_out = |read: f64, written: f64| Traffic { read, written, working_set: read + written };
+    match probe.phase {
+        Phase::Pairs => in_and_out(poses + used("bounds"), used("candidates")),
+        Phase::Collide => {
+            // Six numbers of a candidate, a pose with its rests. Of a contact the header and the
+            // state of both points are read, and what the narrow phase fills is written.
+            let read = 24.0 * world.counts.pairs as f64 + 24.0 * bodies + 48.0 * contacts;
+            in_and_out(read, 32.0 * bodies + MANIFOLD * contacts)
+        }
+        // Both bodies of each contact.
+        Phase::Color => in_and_out(8.0 * contacts, 12.0 * world.counts.lane_slots as f64),
+        Phase::Prepare => {
+            // Velocities, masses, forces, gravity: nine floats and two flags; then row and kick.
+            let load = in_and_out(bodies * 38.0, rows * (ROW + HALF + damping));
+            let per_lane = |layout: &Layout, opposite| PerLane {
+                floats: [1, layout.stride],
+                rows: [1 + usize::from(opposite == OppositeKind::Dynamic), 0],
+            };
+            let records = constraints(frozen, per_lane);
+            Traffic {
+                read: load.read + MANIFOLD * contacts + records.read,
+                written: load.written + records.written,
+                working_set: load.working_set + MANIFOLD * contacts + used("records"),
+            }
+        }
+        Phase::Integrate => {
+            // A substep has a velocity pass (velocity, kick, free velocity) and a position pass
+            // (velocity, motion): the mean of both.
+            let read = (HALF + HALF + damping) + (HALF + HALF);
+            let written = (HALF + HALF) + HALF;
+            let set = rows * (ROW + 2.0 * HALF + damping);
+            Traffic { read: 0.5 * rows * read, written: 0.5 * rows * written, working_set: set }
+        }
+        Phase::Store => {
+            let layout = Layout::for_features(&features, OppositeKind::Dynamic);
+            let floats = (layout.points * if features.friction { 2 } else { 1 }) as f64;
+            let lanes = world.counts.lane_slots as f64;
+            // Impulses to contacts; velocities, four parts of the position and the rotation to bodies.
+            let turned = if world.features().rotation { 8.0 } else { 0.0 };
+            Traffic {
+                read: lanes * 4.0 * (1.0 + floats) + moving * (24.0 + 16.0 + turned),
+                written: world.contacts.len() as f64 * 4.0 * floats + moving * (12.0 + 16.0 + turned),
+                working_set: used("records") + MANIFOLD * contacts + moving * (ROW + 28.0 + turned),
+            }
+        }
+        Phase::Restitution => {
+            let substeps = f64::from(world.settings.budget.substeps);
+            let layout = Layout::for_features(&features, OppositeKind::Dynamic);
+            let points = layout.points as f64;
+            let lanes = world.counts.lane_slots as f64;
+            // Every substep reads an impulse and keeps the largest; the last one also reads each
+            // point's record and energy, gathers both rows twice per point and applies an impulse.
+            let track = in_and_out(lanes * points * 8.0, lanes * points * 4.0);
+            let record = 4.0 * (2.0 + 4.0 + 3.0 + 3.0);
+            Traffic {
+                read: substeps * track.read + lanes * points * (record + 4.0 * ROW + 16.0),
+                written: substeps * track.written + lanes * points * (4.0 + 2.0 * HALF),
+                working_set: used("records") + rows * ROW,
+            }
+        }
+        Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position => {
+            let friction = match probe.phase {
+                Phase::Solve | Phase::Relax => probe.rows > world.counts.points,
+                _ => features.friction,
+            };
+            let sweep = constraints(frozen, |layout, opposite| {
+                let moves = usize::from(opposite == OppositeKind::Dynamic);
+                let has_row = usize::from(opposite != OppositeKind::Static);
+                PerLane { floats: floats(probe.phase, layout, friction), rows: [1 + has_row, 1 + moves] }
+            });
+            Traffic { working_set: used_by_sweeps(frozen) + rows * ROW, ..sweep }
+        }
+    }
+}
+
+/// Records and the indices of the rows that sweeps gather.
+fn used_by_sweeps(frozen: &HeldWorld<'_>) -> f64 {
+    let work = frozen.workspace();
+    (work.lanes.bytes() + work.serial.bytes()) as f64
+}
+
+fn constraints(frozen: &HeldWorld<'_>, per_lane: impl Fn(&Layout, OppositeKind) -> PerLane) -> Traffic {
+    let (work, features) = (frozen.workspace(), frozen.features());
+    let mut sum = Traffic::default();
+    for batches in [&work.lanes, &work.serial] {
+        for segment in &batches.segments {
+            let layout = Layout::for_features(&features, segment.opposite);
+            let PerLane { floats, rows } = per_lane(&layout, segment.opposite);
+            let lanes = (segment.batches * batches.width) as f64;
+            sum.read += lanes * (4.0 * (floats[0] + rows[0]) as f64 + ROW * rows[0] as f64);
+            sum.written += lanes * (4.0 * floats[1] as f64 + HALF * rows[1] as f64);
+        }
+    }
+    sum
+}

@@ -1,0 +1,33 @@
+//! How long this thread has waited for a processor: time that a clock on the wall books on whatever
+//! phase happens to run.
+
+pub use crate::engine::clock::waited;
+use std::time::Duration;
+
+/// Share of `elapsed` in which the thread waited since `before`.
+pub fn share(before: Option<Duration>, elapsed: Duration) -> Option<f64> {
+    let waiting = waited()?.saturating_sub(before?);
+    Some(waiting.as_secs_f64() / elapsed.as_secs_f64().max(1e-9))
+}
+
+/// A line for reports: none where there is nothing to say.
+pub fn note(share: Option<f64>) -> String {
+    match share {
+        Some(share) if share >= 0.01 => format!(
+            "this thread waited for a processor {:.0} % of the time; others use this machine too\n",
+            100.0 * share
+        ),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waiting_is_said_where_there_is_some() {
+        assert_eq!(share(None, Duration::from_secs(1)), None);
+        assert!(note(Some(0.5)).contains("50 %") && note(Some(0.001)).is_empty() && note(None).is_empty());
+    }
+}

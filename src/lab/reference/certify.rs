@@ -1,0 +1,337 @@
+//! References: solutions that are accepted only with evidence.
+//!
+//! An answer becomes a reference if its certificate holds, a natural-map residual of at most
+//! [`CERTIFIED`] measured by [`super::residual`], which shares nothing with the methods; or if two
+//! methods of different families agree on velocities to [`AGREED`] in the mass norm. What was found
+//! is stored with it.
+//!
+//! Impulses of a hyperstatic pile are an affine family; velocities v⁺ and net body impulses Jᵀλ
+//! are unique without friction (a strictly convex problem in v). With friction even velocities may
+//! not be: the residual alone then says whether an answer is right. So [`Reference::compare`] never
+//! looks at single impulses, and [`Uniqueness`] says whether a distance means anything.
+
+use super::newton::newton;
+use super::nncg::nncg;
+use super::problem::{ContactProblem, Pair, Velocity};
+use super::residual::{Target, natural_map};
+use super::stewart_trinkle::stewart_trinkle;
+use super::sweeps::{Stop, Sweep, pgs};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Largest natural-map residual of a certified reference (1), see [`certify`].
+pub const CERTIFIED: f64 = 1e-11;
+/// Largest relative mass-norm distance of velocities that agree (1).
+pub const AGREED: f64 = 1e-8;
+/// Most contacts that are given to Lemke's method, whose work grows with their cube.
+pub const LEMKE_CONTACTS: usize = 150;
+
+/// A family of methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Lemke on the exact LCP.
+    StewartTrinkle,
+    /// Semi-smooth Newton.
+    Newton,
+    /// Nonsmooth conjugate gradients.
+    Nncg,
+    /// Converged projected Gauss–Seidel.
+    Pgs,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Method::StewartTrinkle => "Stewart-Trinkle",
+            Method::Newton => "Newton",
+            Method::Nncg => "NNCG",
+            Method::Pgs => "PGS",
+        })
+    }
+}
+
+/// Whether the velocities are the only ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Uniqueness {
+    /// No friction: the velocities solve a strictly convex problem.
+    Proven,
+    /// Two families found the same velocities.
+    Agreed,
+    /// Two families found different velocities, each certified: only a residual can judge.
+    Multiple,
+    /// Only one family found an answer.
+    Unknown,
+}
+
+/// A second answer that was compared.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Witness {
+    /// Who found it.
+    pub method: Method,
+    /// Its own residual (1).
+    pub natural_map: f64,
+    /// Relative mass-norm distance of its velocities from the reference (1).
+    pub distance: f64,
+}
+
+/// Why a reference was accepted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// Who found it.
+    pub method: Method,
+    /// Natural-map residual, see [`certify`] (1).
+    pub natural_map: f64,
+    /// The answer of another family, if it came near one.
+    pub witness: Option<Witness>,
+    /// Whether the velocities are the only ones.
+    pub uniqueness: Uniqueness,
+}
+
+/// An accepted solution of the rigid contact law.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// v⁺ (m/s, m/s, rad/s), one per body.
+    pub velocities: Vec<Velocity>,
+    /// λ (N·s), one per contact; one of many if the problem is hyperstatic.
+    pub impulses: Vec<Pair>,
+    /// Why it was accepted.
+    pub certificate: Certificate,
+}
+
+/// No method found an answer with sufficient evidence.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("no reference for '{problem}': {why}")]
+pub struct NoReference {
+    /// Name of the problem.
+    pub problem: String,
+    /// What each method ended with.
+    pub why: String,
+}
+
+/// How far an answer is from a reference, in what the problem determines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// [`ContactProblem::velocity_error`] (1).
+    pub velocity: f64,
+    /// ‖M⁻¹ Jᵀ (λ − λ_ref)‖ in the mass norm, by the same scale (1): like `velocity`, but read from
+    /// the impulses.
+    pub body_impulse: f64,
+}
+
+impl Reference {
+    /// Distance of an answer from this reference.
+    pub fn compare(
+        &self,
+        problem: &ContactProblem,
+        velocities: &[Velocity],
+        impulses: &[Pair],
+    ) -> Comparison {
+        Comparison {
+            velocity: problem.velocity_error(velocities, &self.velocities),
+            body_impulse: problem.velocity_error(&problem.velocities(impulses), &self.velocities),
+        }
+    }
+
+    /// Checks this reference against the problem afresh; says what does not hold.
+    pub fn check(&self, problem: &ContactProblem) -> Result<(), String> {
+        if (self.velocities.len(), self.impulses.len()) != (problem.bodies.len(), problem.contacts.len()) {
+            return Err(format!(
+                "reference has {} velocities and {} impulses for {} bodies and {} contacts",
+                self.velocities.len(),
+                self.impulses.len(),
+                problem.bodies.len(),
+                problem.contacts.len()
+            ));
+        }
+        let residual = certify(problem, &self.impulses);
+        let bound = if self.accepted_by_agreement() { self.certificate.natural_map * 2.0 } else { CERTIFIED };
+        if residual.is_nan() || residual > bound {
+            return Err(format!("the reference has a natural-map residual of {residual:e}, not {bound:e}"));
+        }
+        // Velocities follow from the impulses to rounding.
+        let defect = problem.velocity_error(&problem.velocities(&self.impulses), &self.velocities);
+        if defect.is_nan() || defect > 1e-12 {
+            return Err(format!("the velocities of the reference are {defect:e} off its impulses"));
+        }
+        Ok(())
+    }
+
+    fn accepted_by_agreement(&self) -> bool {
+        let agrees = |w: Witness| w.distance <= AGREED;
+        self.certificate.natural_map > CERTIFIED && self.certificate.witness.is_some_and(agrees)
+    }
+}
+
+/// Natural-map residual of impulses under the rigid law, relative to the larger of
+/// [`ContactProblem::impulse_unit`] and the largest impulse: both below the total load, so that the
+/// certificate of a large pile is no weaker than that of a small one.
+pub fn certify(problem: &ContactProblem, impulses: &[Pair]) -> f64 {
+    let largest = impulses.iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
+    let residual = natural_map(problem, Target::Rigid, &problem.velocities(impulses), impulses);
+    residual / problem.impulse_unit().max(largest)
+}
+
+struct Candidate {
+    method: Method,
+    natural_map: f64,
+    velocities: Vec<Velocity>,
+    impulses: Vec<Pair>,
+}
+
+/// Solves by one method; none if it ended without impulses. Budgets grow no worse than linearly
+/// with the number of contacts.
+fn attempt(problem: &ContactProblem, method: Method) -> Option<Candidate> {
+    let cold = vec![[0.0; 2]; problem.contacts.len()];
+    // Two decades below the certificate, whose scale is at least as large as that of the history.
+    let stop = |iterations| Stop { tolerance: 0.01 * CERTIFIED, iterations };
+    let impulses = match method {
+        Method::StewartTrinkle => stewart_trinkle(problem, Target::Rigid).ok()?,
+        Method::Newton => newton(problem, Target::Rigid, &cold, stop(60)).impulses,
+        Method::Nncg => nncg(problem, Target::Rigid, &cold, stop(5_000)).impulses,
+        Method::Pgs => pgs(problem, Target::Rigid, &cold, Sweep::Symmetric, stop(5_000)).impulses,
+    };
+    let natural_map = certify(problem, &impulses);
+    let velocities = problem.velocities(&impulses);
+    natural_map.is_finite().then_some(Candidate { method, natural_map, velocities, impulses })
+}
+
+/// A solution of the rigid contact law, with its certificate.
+///
+/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, until two are
+/// certified or all are spent; the first certified one is the reference and the other its witness.
+pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
+    let fail = |why| NoReference { problem: problem.name.clone(), why };
+    problem.validate().map_err(|e| fail(e.to_string()))?;
+    let mut methods = vec![Method::Nncg, Method::Newton, Method::Pgs];
+    if problem.contacts.len() <= LEMKE_CONTACTS {
+        methods.insert(0, Method::StewartTrinkle);
+    }
+    let mut found: Vec<Candidate> = Vec::new();
+    let certified = |c: &Candidate| c.natural_map <= CERTIFIED;
+    for method in methods {
+        found.extend(attempt(problem, method));
+        if found.iter().filter(|c| certified(c)).count() >= 2 {
+            break;
+        }
+    }
+    // Stable: among the certified the earlier method stays first, the others follow by residual.
+    found.sort_by(|a, b| a.natural_map.max(CERTIFIED).total_cmp(&b.natural_map.max(CERTIFIED)));
+    let mut found = found.into_iter();
+    let Some(best) = found.next() else { return Err(fail("every method failed".into())) };
+    let second = found.next();
+    let witness = second.as_ref().map(|c| Witness {
+        method: c.method,
+        natural_map: c.natural_map,
+        distance: problem.velocity_error(&c.velocities, &best.velocities),
+    });
+    let agreed = witness.is_some_and(|w| w.distance <= AGREED);
+    if !certified(&best) && !agreed {
+        return Err(fail(match witness {
+            Some(w) => format!(
+                "{} ended at a residual of {:e}, {} at {:e}, their velocities {:e} apart",
+                best.method, best.natural_map, w.method, w.natural_map, w.distance
+            ),
+            None => format!("{} ended at a residual of {:e}", best.method, best.natural_map),
+        }));
+    }
+    let uniqueness = if problem.contacts.iter().all(|c| c.friction == 0.0) {
+        Uniqueness::Proven
+    } else if agreed {
+        Uniqueness::Agreed
+    } else if witness.is_some_and(|w| w.natural_map <= CERTIFIED) {
+        Uniqueness::Multiple
+    } else {
+        Uniqueness::Unknown
+    };
+    let certificate = Certificate { method: best.method, natural_map: best.natural_map, witness, uniqueness };
+    Ok(Reference { velocities: best.velocities, impulses: best.impulses, certificate })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::gallery::*;
+
+    #[test]
+    fn the_library_has_references() {
+        for (_, p) in library() {
+            let r = reference(&p).unwrap();
+            assert!(r.certificate.natural_map <= CERTIFIED, "{}: {:?}", p.name, r.certificate);
+            assert!(
+                matches!(r.certificate.uniqueness, Uniqueness::Proven | Uniqueness::Agreed),
+                "{}: {:?}",
+                p.name,
+                r.certificate
+            );
+            r.check(&p).unwrap();
+        }
+    }
+
+    #[test]
+    fn large_problems_are_certified_without_lemke() {
+        let p = box_pyramid(12, 0.6);
+        assert!(p.contacts.len() > LEMKE_CONTACTS);
+        let r = reference(&p).unwrap();
+        assert_eq!(r.certificate.method, Method::Nncg);
+        assert_eq!(r.certificate.witness.unwrap().method, Method::Newton);
+        assert_eq!(r.certificate.uniqueness, Uniqueness::Agreed);
+        assert!(p.mass_norm(&r.velocities) < 1e-11);
+    }
+
+    #[test]
+    fn comparison_ignores_self_stress() {
+        // A squeeze between the walls of a wedge: λn ± equal, no net impulse.
+        let p = wedge(0.0, 0.5);
+        let r = reference(&p).unwrap();
+        let squeezed: Vec<Pair> = r.impulses.iter().map(|l| [l[0] + 1.0, l[1]]).collect();
+        let c = r.compare(&p, &p.velocities(&squeezed), &squeezed);
+        assert!(c.velocity < 1e-14 && c.body_impulse < 1e-14, "{c:?}");
+        let mut pushed = r.velocities.clone();
+        pushed[0][1] += 0.5;
+        // 0.5 m/s relative to g h = 1/24 m/s, or to a reference that falls that fast: 12.
+        assert!((r.compare(&p, &pushed, &r.impulses).velocity - 12.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn both_answers_of_a_jammed_block_hold() {
+        // Between parallel walls a block may fall freely or hang: velocities are not unique.
+        let p = wedge(0.0, 0.5);
+        let load = GRAVITY * p.h;
+        let falls = [[0.0, 0.0]; 2];
+        // µ λn = load/2 holds on either side; t = (n_y, −n_x) points down on the left wall.
+        let hangs = [[load, -load / 2.0], [load, load / 2.0]];
+        assert!(certify(&p, &falls) < 1e-15 && certify(&p, &hangs) < 1e-15);
+        assert!((p.velocity_error(&p.velocities(&falls), &p.velocities(&hangs)) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tampering_is_noticed() {
+        let p = sliding_box();
+        let good = reference(&p).unwrap();
+        let mut r = good.clone();
+        r.impulses[0][0] *= 1.0 + 1e-9;
+        assert!(r.check(&p).is_err());
+        let mut r = good.clone();
+        r.velocities[0][0] += 1e-9;
+        assert!(r.check(&p).is_err());
+        let mut r = good;
+        r.velocities.pop();
+        assert!(r.check(&p).is_err());
+    }
+
+    #[test]
+    fn inconsistent_data_have_no_reference() {
+        // A body squeezed from both sides by walls that close: un ≥ 0 is impossible on both.
+        let mut p = wedge(0.0, 0.0);
+        p.contacts.iter_mut().for_each(|c| c.rebound = 1.0);
+        let e = reference(&p).unwrap_err();
+        assert!(e.to_string().contains("wedge"), "{e}");
+        p.h = f64::NAN;
+        assert!(reference(&p).unwrap_err().why.contains("NaN"));
+    }
+}

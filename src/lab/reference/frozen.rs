@@ -1,0 +1,258 @@
+//! Frozen problems: contact problems in files, with their certified solution.
+//!
+//! # Format
+//!
+//! UTF-8 text of two lines, each a JSON object and ended by a line feed. The first is the header:
+//!
+//! ```text
+//! {"format":"simpulse-frozen","version":1,"bytes":4711,"checksum":"fnv1a64:0123456789abcdef"}
+//! ```
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `format` | always `simpulse-frozen` |
+//! | `version` | 1; a reader refuses larger ones |
+//! | `bytes` | length of the second line without its line feed |
+//! | `checksum` | FNV-1a, 64 bits, of those bytes: 16 lower-case hexadecimal digits |
+//!
+//! The second line is the payload. Units are SI; vectors are arrays (x, y); velocities of bodies are
+//! arrays (vx, vy, w); pairs are arrays (normal, tangential), with t = (n_y, −n_x).
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `problem.name` | what it is |
+//! | `problem.h` | step (s) |
+//! | `problem.bodies[]` | bodies that are not static: `inv_mass` (1/kg), `inv_inertia` (1/(kg·m²)), `velocity` before the step, `free_velocity` v* it would have after it without contacts |
+//! | `problem.contacts[]` | contact points: `body_a`, `body_b` (index, or null for static), `manifold`, `normal` (from a to b), `arm_a`, `arm_b` (r × n, r × t; m), `gap` (m, negative is overlap), `friction`, `rebound` (m/s), `warm_impulse` (N·s) |
+//! | `reference` | null, or the solution of the rigid law |
+//! | `reference.velocities[]` | v⁺ of every body |
+//! | `reference.impulses[]` | (λn, λt) of every contact (N·s) |
+//! | `reference.certificate` | `method`, `natural_map`, `witness` (null, or `method`, `natural_map`, `distance`), `uniqueness` |
+//!
+//! Numbers are decimal in the shortest form that reads back as the same `f64`, so writing and
+//! reading keep every bit. A file that is cut short, altered, newer, or whose reference does not
+//! solve its problem is refused.
+
+use super::certify::Reference;
+use super::problem::ContactProblem;
+use crate::lab::error::Error;
+use crate::lab::files;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+
+/// Value of `format` in the header.
+pub const FORMAT: &str = "simpulse-frozen";
+/// Newest version that this crate reads, and the one it writes.
+pub const VERSION: u64 = 1;
+
+/// A contact problem and, if it is known, its solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frozen {
+    /// The problem.
+    pub problem: ContactProblem,
+    /// Its certified solution.
+    pub reference: Option<Reference>,
+}
+
+/// Later versions may add keys, so that unknown ones are let through until the version is known.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    version: u64,
+    bytes: u64,
+    checksum: String,
+}
+
+impl Frozen {
+    /// The text of the file; refuses invalid problems and references that do not hold.
+    pub fn to_text(&self) -> Result<String, Error> {
+        self.validate()?;
+        let payload = serde_json::to_string(self).map_err(|e| Error::invalid("payload", e.to_string()))?;
+        let header = Header {
+            format: FORMAT.into(),
+            version: VERSION,
+            bytes: payload.len() as u64,
+            checksum: checksum(payload.as_bytes()),
+        };
+        let header = serde_json::to_string(&header).map_err(|e| Error::invalid("header", e.to_string()))?;
+        Ok(format!("{header}\n{payload}\n"))
+    }
+
+    /// Reads the text of a file; `path` is named in errors.
+    pub fn from_text(text: &str, path: &Path) -> Result<Self, Error> {
+        let refuse = |message: String| Error::Format { path: path.into(), message };
+        let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
+        // Format and version come first: what else stands in the header depends on them.
+        let header: serde_json::Value = serde_json::from_str(first)
+            .map_err(|e| refuse(format!("not a frozen problem: the first line is no JSON header ({e})")))?;
+        if header["format"] != FORMAT {
+            return Err(refuse(format!(
+                "not a frozen problem: format is {}, not \"{FORMAT}\"",
+                header["format"]
+            )));
+        }
+        match header["version"].as_u64() {
+            Some(v) if v > VERSION => {
+                return Err(refuse(format!(
+                    "version {v} is newer than {VERSION}, the newest this program reads"
+                )));
+            }
+            Some(VERSION) => {}
+            _ => return Err(refuse(format!("version is {}, must be {VERSION}", header["version"]))),
+        }
+        let header: Header = serde_json::from_value(header).map_err(|e| refuse(format!("header: {e}")))?;
+        let payload = rest.strip_suffix('\n').unwrap_or(rest);
+        let length = payload.len() as u64;
+        if length < header.bytes {
+            return Err(refuse(format!("truncated: {length} bytes of {}", header.bytes)));
+        }
+        if length > header.bytes {
+            return Err(refuse(format!(
+                "{} bytes more than the header's {}",
+                length - header.bytes,
+                header.bytes
+            )));
+        }
+        let actual = checksum(payload.as_bytes());
+        if actual != header.checksum {
+            return Err(refuse(format!("corrupted: checksum {actual}, header has {}", header.checksum)));
+        }
+        let frozen: Frozen = serde_json::from_str(payload).map_err(|e| refuse(format!("payload: {e}")))?;
+        frozen.validate().map_err(|e| refuse(e.to_string()))?;
+        Ok(frozen)
+    }
+
+    /// Writes the file as a whole: a reader sees the old file or the new one, never a part.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        files::write(path, self.to_text()?.as_bytes())
+    }
+
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let bytes = fs::read(path).map_err(Error::io(path))?;
+        let text = std::str::from_utf8(&bytes).map_err(|e| Error::Format {
+            path: path.into(),
+            message: format!("not a frozen problem: not UTF-8 at byte {}", e.valid_up_to()),
+        })?;
+        Self::from_text(text, path)
+    }
+
+    fn validate(&self) -> Result<(), Error> {
+        self.problem.validate()?;
+        match &self.reference {
+            Some(reference) => reference.check(&self.problem).map_err(|why| Error::invalid("reference", why)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// FNV-1a, 64 bits. Each step is a bijection of the state, so a single altered byte always shows.
+fn checksum(bytes: &[u8]) -> String {
+    let hash = bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325u64, |hash, &b| (hash ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("fnv1a64:{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::certify::reference;
+    use crate::lab::reference::gallery::{box_pyramid, sliding_box};
+
+    fn sample() -> Frozen {
+        let problem = sliding_box();
+        let reference = Some(reference(&problem).unwrap());
+        Frozen { problem, reference }
+    }
+
+    fn refusal(text: &str) -> String {
+        Frozen::from_text(text, Path::new("some/file.frozen")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn checksum_matches_published_vectors() {
+        // Fowler, Noll & Vo's own test vectors for 64-bit FNV-1a.
+        assert_eq!(checksum(b""), "fnv1a64:cbf29ce484222325");
+        assert_eq!(checksum(b"a"), "fnv1a64:af63dc4c8601ec8c");
+        assert_eq!(checksum(b"foobar"), "fnv1a64:85944171f73967e8");
+    }
+
+    #[test]
+    fn every_bit_survives() {
+        let mut f = sample();
+        f.problem.contacts[0].warm_impulse = [-0.0, 5e-324];
+        f.problem.contacts[1].gap = -0.1 - f64::EPSILON;
+        f.reference = None;
+        let back = Frozen::from_text(&f.to_text().unwrap(), Path::new("x")).unwrap();
+        assert_eq!(back, f);
+        assert!(back.problem.contacts[0].warm_impulse[0].is_sign_negative());
+        for problem in [box_pyramid(3, 0.6), sliding_box()] {
+            let f = Frozen { reference: Some(reference(&problem).unwrap()), problem };
+            assert_eq!(Frozen::from_text(&f.to_text().unwrap(), Path::new("x")).unwrap(), f);
+        }
+    }
+
+    #[test]
+    fn every_truncation_is_refused() {
+        let text = sample().to_text().unwrap();
+        // The last byte is a line feed, which may be missing.
+        for end in (0..text.len() - 1).filter(|&i| text.is_char_boundary(i)) {
+            assert!(refusal(&text[..end]).starts_with("some/file.frozen: "), "{end}");
+        }
+        assert!(refusal(&text[..text.len() - 9]).contains("truncated"));
+    }
+
+    #[test]
+    fn every_altered_digit_is_refused() {
+        let text = sample().to_text().unwrap();
+        let payload = text.find('\n').unwrap() + 1;
+        for i in (payload..text.len()).filter(|&i| text.as_bytes()[i].is_ascii_digit()) {
+            let mut bytes = text.clone().into_bytes();
+            bytes[i] = if bytes[i] == b'9' { b'0' } else { bytes[i] + 1 };
+            let altered = String::from_utf8(bytes).unwrap();
+            assert!(refusal(&altered).contains("corrupted"), "byte {i}");
+        }
+    }
+
+    #[test]
+    fn other_files_and_newer_versions_are_refused() {
+        let text = sample().to_text().unwrap();
+        let newer = text.replacen("\"version\":1", "\"version\":2", 1);
+        assert!(refusal(&newer).contains("version 2 is newer"));
+        assert!(refusal(&text.replacen("\"version\":1", "\"version\":0", 1)).contains("version is 0"));
+        assert!(refusal("").contains("not a frozen problem"));
+        assert!(refusal("{}\n{}\n").contains("not a frozen problem"));
+        assert!(refusal("[1]\n").contains("not a frozen problem"));
+        assert!(refusal(&(text.clone() + "{}")).contains("more than the header"));
+    }
+
+    #[test]
+    fn bad_problems_are_neither_written_nor_read() {
+        let mut f = sample();
+        f.problem.contacts[0].gap = f64::NAN;
+        assert!(f.to_text().unwrap_err().to_string().contains("contacts[0]"));
+        let mut f = sample();
+        f.problem.contacts[1].body_b = Some(7);
+        assert!(f.to_text().unwrap_err().to_string().contains("names body 7 of 1"));
+        let mut f = sample();
+        f.problem.contacts[0].friction = 0.4;
+        assert!(f.to_text().unwrap_err().to_string().contains("natural-map"));
+    }
+
+    #[test]
+    fn files_are_written_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.frozen");
+        sample().write(&path).unwrap();
+        sample().write(&path).unwrap();
+        assert_eq!(Frozen::read(&path).unwrap(), sample());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(Frozen::read(&folder.path().join("b")).unwrap_err().to_string().contains('b'));
+        assert!(sample().write(&folder.path().join("no/such")).is_err());
+        fs::write(&path, [0xff, 0xfe]).unwrap();
+        assert!(Frozen::read(&path).unwrap_err().to_string().contains("UTF-8"));
+    }
+}

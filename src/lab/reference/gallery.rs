@@ -1,0 +1,253 @@
+//! Contact problems whose solution can be derived by hand.
+//!
+//! All start from rest unless stated, with gravity 10 m/s² downwards; each function derives its
+//! solution in its docs. They are the material for tests of references and for exact
+//! convergence rates.
+
+use super::problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// m/s²
+pub const GRAVITY: f64 = 10.0;
+
+/// A problem built body by body, contact by contact, with static bodies left out.
+struct Builder {
+    problem: ContactProblem,
+    centers: Vec<[f64; 2]>,
+    gravity: [f64; 2],
+}
+
+impl Builder {
+    fn new(name: String, h: f64) -> Self {
+        let problem = ContactProblem { name, h, bodies: Vec::new(), contacts: Vec::new() };
+        Builder { problem, centers: Vec::new(), gravity: [0.0, -GRAVITY] }
+    }
+
+    /// A body of `mass` and `inertia` (infinite allowed) with velocity v before the step.
+    fn body(&mut self, center: [f64; 2], mass: f64, inertia: f64, velocity: Velocity) -> u32 {
+        let h = self.problem.h;
+        let [vx, vy, w] = velocity;
+        let free_velocity = [vx + h * self.gravity[0], vy + h * self.gravity[1], w];
+        let body = ProblemBody { inv_mass: 1.0 / mass, inv_inertia: 1.0 / inertia, velocity, free_velocity };
+        self.problem.bodies.push(body);
+        self.centers.push(center);
+        self.problem.bodies.len() as u32 - 1
+    }
+
+    /// A contact at `point` in a manifold of its own, `normal` from a to b; `None` is static.
+    fn contact(&mut self, a: Option<u32>, b: Option<u32>, point: [f64; 2], normal: [f64; 2], friction: f64) {
+        let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold + 1);
+        let arm = |body: Option<u32>| -> Pair {
+            let Some(body) = body else { return [0.0; 2] };
+            let c = self.centers[body as usize];
+            let r = [point[0] - c[0], point[1] - c[1]];
+            let t = [normal[1], -normal[0]];
+            [r[0] * normal[1] - r[1] * normal[0], r[0] * t[1] - r[1] * t[0]]
+        };
+        let (arm_a, arm_b) = (arm(a), arm(b));
+        self.problem.contacts.push(ProblemContact {
+            body_a: a,
+            body_b: b,
+            manifold,
+            normal,
+            arm_a,
+            arm_b,
+            gap: 0.0,
+            friction,
+            rebound: 0.0,
+            warm_impulse: [0.0; 2],
+        });
+    }
+
+    /// A manifold of two points.
+    fn manifold(&mut self, a: Option<u32>, b: Option<u32>, points: [[f64; 2]; 2], normal: [f64; 2], mu: f64) {
+        self.contact(a, b, points[0], normal, mu);
+        let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold);
+        self.contact(a, b, points[1], normal, mu);
+        self.problem.contacts.last_mut().expect("just pushed").manifold = manifold;
+    }
+}
+
+const UP: [f64; 2] = [0.0, 1.0];
+const H: f64 = 1.0 / 240.0;
+
+/// A frictionless column of discs of the given masses (kg), contacts listed bottom-up.
+///
+/// At rest contact i carries the weight of the discs i, i + 1, …: λ_i = g h ∑_{j ≥ i} m_j.
+pub fn column(masses: &[f64]) -> ContactProblem {
+    let mut p = Builder::new(format!("column of {} discs", masses.len()), H);
+    let mut below = None;
+    for (i, &m) in masses.iter().enumerate() {
+        let disc = p.body([0.0, 0.5 + i as f64], m, 0.5 * m * 0.25, [0.0; 3]);
+        p.contact(below, Some(disc), [0.0, i as f64], UP, 0.0);
+        below = Some(disc);
+    }
+    p.problem
+}
+
+/// `n` equal discs of 1 kg. G is tridiagonal, and the Jacobi iteration matrix is the random walk
+/// that reflects at the ground and is absorbed above the top: with θ = π/(2n) its spectral radius
+/// is cos θ, and that of Gauss–Seidel (consistently ordered, Young 1954) is cos² θ.
+pub fn disc_column(n: usize) -> ContactProblem {
+    column(&vec![1.0; n])
+}
+
+/// A disc of `ratio` = R kg on one of 1 kg. G = [[1, −1], [−1, 1 + 1/R]], so the Jacobi matrix has
+/// off-diagonal entries 1 and R/(1 + R); their product R/(1 + R) is the Gauss–Seidel rate.
+pub fn heavy_on_light(ratio: f64) -> ContactProblem {
+    let mut problem = column(&[1.0, ratio]);
+    problem.name = format!("{ratio} kg on 1 kg");
+    problem
+}
+
+/// A disc of 1 kg on one of `ratio` kg; the Gauss–Seidel rate is 1/(1 + ratio).
+pub fn light_on_heavy(ratio: f64) -> ContactProblem {
+    let mut problem = column(&[ratio, 1.0]);
+    problem.name = format!("1 kg on {ratio} kg");
+    problem
+}
+
+/// A box of 2 kg, 1 m × 1 m, sliding to the right at 1 m/s on the flat with µ = 0.3; contacts rear,
+/// front. Friction µ m g at half a height below the centre turns the box forwards:
+/// N_front,rear = m g/2 (1 ± µ) = 13 N, 7 N, and the box slows by µ g h.
+pub fn sliding_box() -> ContactProblem {
+    let mut p = Builder::new("sliding box".into(), H);
+    let b = p.body([0.0, 0.5], 2.0, 2.0 / 6.0, [1.0, 0.0, 0.0]);
+    p.manifold(None, Some(b), [[-0.5, 0.0], [0.5, 0.0]], UP, 0.3);
+    p.problem
+}
+
+/// A unit box at rest on a plane that falls to the left at `slope` rad, seen in the frame of the
+/// plane. It stays if µ ≥ tan θ, else gains h g (sin θ − µ cos θ) downhill (−x).
+pub fn block_on_incline(slope: f64, friction: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("block on a slope of {slope} rad, µ {friction}"), H);
+    p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
+    let b = p.body([0.0, 0.5], 1.0, 1.0 / 6.0, [0.0; 3]);
+    p.manifold(None, Some(b), [[-0.5, 0.0], [0.5, 0.0]], UP, friction);
+    p.problem
+}
+
+/// A disc (1 kg, 0.5 m) at rest on such a plane. It rolls, gaining (2/3) h g sin θ, if
+/// µ ≥ tan θ/3, else slips and gains h g (sin θ − µ cos θ).
+pub fn disc_on_incline(slope: f64, friction: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("disc on a slope of {slope} rad, µ {friction}"), H);
+    p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
+    let b = p.body([0.0, 0.5], 1.0, 0.125, [0.0; 3]);
+    p.contact(None, Some(b), [0.0, 0.0], UP, friction);
+    p.problem
+}
+
+/// A plank (1 kg, 4 m × 0.2 m) on static supports at the given x (m, from its middle). It rests if
+/// they lie on both sides; with three or more of them only sum and moment of the impulses are
+/// determined. λ_max(D⁻¹G) exceeds 2 for three supports close together: Jacobi diverges.
+pub fn plank(supports: &[f64], friction: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("plank on {} supports", supports.len()), H);
+    let b = p.body([0.0, 0.1], 1.0, (16.0 + 0.04) / 12.0, [0.0; 3]);
+    for &x in supports {
+        p.contact(None, Some(b), [x, 0.0], UP, friction);
+    }
+    p.problem
+}
+
+/// A pyramid of unit boxes of 1 kg with `base` boxes at the bottom, neighbours in a row touching.
+/// It rests; impulses are highly hyperstatic.
+pub fn box_pyramid(base: usize, friction: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("pyramid of boxes, base {base}"), H);
+    let mut below: Vec<u32> = Vec::new();
+    for row in 0..base {
+        let (y, x0) = (row as f64, 0.5 * row as f64);
+        let boxes: Vec<u32> =
+            (0..base - row).map(|i| p.body([x0 + i as f64, y + 0.5], 1.0, 1.0 / 6.0, [0.0; 3])).collect();
+        for (i, &b) in boxes.iter().enumerate() {
+            let x = x0 + i as f64;
+            if i > 0 {
+                let points = [[x - 0.5, y], [x - 0.5, y + 1.0]];
+                p.manifold(Some(boxes[i - 1]), Some(b), points, [1.0, 0.0], friction);
+            }
+            if row == 0 {
+                p.manifold(None, Some(b), [[x - 0.5, y], [x + 0.5, y]], UP, friction);
+            } else {
+                p.manifold(Some(below[i]), Some(b), [[x - 0.5, y], [x, y]], UP, friction);
+                p.manifold(Some(below[i + 1]), Some(b), [[x, y], [x + 0.5, y]], UP, friction);
+            }
+        }
+        below = boxes;
+    }
+    p.problem
+}
+
+/// Painlevé's rod: 1 kg, half-length 1 m, leaning at θ = atan 2 with its lower end on the ground,
+/// which slides at 1 m/s so that friction (µ = 2) presses it down.
+///
+/// With rn = −cos θ, rt = sin θ and I = 1/3: G_nn = 1 + 3 cos² θ = 1.6, G_tt = 3.4,
+/// G_nt = −3 sin θ cos θ = −1.2. Slipping would need (1.6 − 1.2 µ) λn = g h, impossible for
+/// µ > 4/3, and lift-off un = −g h; so the end sticks, with λ = G⁻¹ (g h, 1):
+/// λn = (3.4 g h + 1.2)/4 = 0.3 + 0.85 g h, λt = 0.4 + 0.3 g h, an impact without a collision.
+pub fn painleve_rod(h: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("Painlevé rod, h {h} s"), h);
+    let (sin, cos) = (2.0 / 5.0f64.sqrt(), 1.0 / 5.0f64.sqrt());
+    let rod = p.body([cos, sin], 1.0, 1.0 / 3.0, [-1.0, 0.0, 0.0]);
+    p.contact(None, Some(rod), [0.0, 0.0], UP, 2.0);
+    p.problem
+}
+
+/// A wedge (1 kg, not turning) between walls leaning outwards by `half_angle` from the vertical.
+/// If it does not slip it rests with impulses that self-stress leaves undetermined:
+/// with friction, any squeeze may be added once µ > tan(half_angle).
+///
+/// At half angle 0 the walls are parallel, and every fall speed from 0 to g h has impulses: at
+/// rest 2 µ λn ≥ m g h, falling freely λ = 0. The velocities are not unique.
+pub fn wedge(half_angle: f64, friction: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("wedge of half angle {half_angle} rad, µ {friction}"), H);
+    let b = p.body([0.0, 0.0], 1.0, f64::INFINITY, [0.0; 3]);
+    let (sin, cos) = half_angle.sin_cos();
+    p.contact(None, Some(b), [-0.5, 0.0], [cos, sin], friction);
+    p.contact(None, Some(b), [0.5, 0.0], [-cos, sin], friction);
+    p.problem
+}
+
+/// The problem with everything a little off, always in the same way for the same `seed`: velocities by
+/// up to `velocity_increment`/2 (m/s, rad/s), normals by 0.5 mrad, arms by 0.5 mm, gaps from −1.4 mm to 0.6 mm,
+/// friction by 20 %. Walls that lean by chance make piles jam, with G close to singular: the hardest
+/// problems here. Their solutions are known only through their certificates.
+pub fn shaken(mut problem: ContactProblem, seed: u64, velocity_increment: f64) -> ContactProblem {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    // 53 bits, in [−½, ½).
+    let mut next = || (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+    problem.name = format!("{}, shaken by {velocity_increment}, seed {seed}", problem.name);
+    for b in &mut problem.bodies {
+        for k in 0..3 {
+            let change = velocity_increment * next();
+            b.velocity[k] += change;
+            b.free_velocity[k] += change;
+        }
+    }
+    let mut previous: Option<ProblemContact> = None;
+    for c in &mut problem.contacts {
+        let (sin, cos) = (1e-3 * next()).sin_cos();
+        c.normal = match previous {
+            Some(p) if p.manifold == c.manifold => p.normal,
+            _ => [cos * c.normal[0] - sin * c.normal[1], sin * c.normal[0] + cos * c.normal[1]],
+        };
+        c.arm_a[0] += 1e-3 * next();
+        c.arm_b[0] += 1e-3 * next();
+        c.gap = 2e-3 * (next() - 0.2);
+        c.friction *= 1.0 + 0.4 * next();
+        previous = Some(*c);
+    }
+    problem
+}
+
+/// The problems that ship as frozen files, with their file names.
+pub fn library() -> Vec<(&'static str, ContactProblem)> {
+    vec![
+        ("disc-column-10", disc_column(10)),
+        ("heavy-on-light-100", heavy_on_light(100.0)),
+        ("sliding-box", sliding_box()),
+        ("plank-4-supports", plank(&[-1.5, -0.5, 0.5, 1.5], 0.5)),
+        ("box-pyramid-5", box_pyramid(5, 0.6)),
+        ("painleve-rod", painleve_rod(1e-3)),
+        ("wedge", wedge(0.25, 0.5)),
+    ]
+}

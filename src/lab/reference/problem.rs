@@ -1,0 +1,449 @@
+//! The velocity-level contact problem of one step, in `f64`.
+//!
+//! Bodies have velocities v = (vx, vy, w) and the mass matrix M = diag(m, m, I). Contact `i`
+//! has a unit normal n from a to b, the tangent t = (n_y, −n_x), and arms r × n and r × t from
+//! each centre of mass to the contact point. The velocity of b relative to a at the point,
+//!
+//! ```text
+//! un = n·(v_b + w_b ẑ × r_b) − n·(v_a + w_a ẑ × r_a) = n·v_b + (r_b × n) w_b − n·v_a − (r_a × n) w_a,
+//! ```
+//!
+//! is the row (−n, −r_a × n | n, r_b × n) of J times (v_a | v_b); the tangential row has t for n.
+//! A step looks for impulses λ, one (normal, tangential) pair per contact, and velocities
+//!
+//! ```text
+//! v⁺ = v* + M⁻¹ Jᵀ λ,      v* = v + h M⁻¹ f,
+//! ```
+//!
+//! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
+
+use crate::lab::error::Error;
+use faer::Mat;
+use serde::{Deserialize, Serialize};
+
+/// Velocity of a body: (m/s, m/s, rad/s).
+pub type Velocity = [f64; 3];
+/// Normal and tangential component of a contact: impulses (N·s) or velocities (m/s).
+pub type Pair = [f64; 2];
+/// Normal and tangential row of one side of a contact, sign included: (1, 1, m) each.
+pub type Block = [Velocity; 2];
+
+/// A body of a contact problem.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemBody {
+    /// 1/kg; zero for a body that moves as it likes.
+    pub inv_mass: f64,
+    /// 1/(kg·m²), about the centre of mass; zero if it does not turn.
+    pub inv_inertia: f64,
+    /// Velocity at the start of the step.
+    pub velocity: Velocity,
+    /// Velocity v* that the step would end with if there were no contacts.
+    pub free_velocity: Velocity,
+}
+
+/// A contact point of a contact problem.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemContact {
+    /// Body a; none if that side is static.
+    pub body_a: Option<u32>,
+    /// Body b; none if that side is static.
+    pub body_b: Option<u32>,
+    /// Points with the same number belong to one manifold: they are neighbours in the list and
+    /// share bodies and normal.
+    pub manifold: u32,
+    /// Unit normal from a to b.
+    pub normal: [f64; 2],
+    /// (r × n, r × t) from the centre of mass of a to the point (m).
+    pub arm_a: Pair,
+    /// (r × n, r × t) from the centre of mass of b to the point (m).
+    pub arm_b: Pair,
+    /// Signed distance at the start of the step (m); negative is overlap.
+    pub gap: f64,
+    /// Coulomb coefficient (1).
+    pub friction: f64,
+    /// Separation speed that restitution demands (m/s), ≥ 0; zero for an inelastic contact.
+    pub rebound: f64,
+    /// Impulses that a warm-started solver begins with (N·s).
+    pub warm_impulse: Pair,
+}
+
+impl ProblemContact {
+    /// t = (n_y, −n_x).
+    pub fn tangent(&self) -> [f64; 2] {
+        [self.normal[1], -self.normal[0]]
+    }
+
+    /// Each side that is not static: its body and its rows of J.
+    pub fn sides(&self) -> impl Iterator<Item = (usize, Block)> + use<> {
+        let (n, t) = (self.normal, self.tangent());
+        let side = move |body: Option<u32>, arm: Pair, sign: f64| {
+            let block = [[n[0], n[1], arm[0]], [t[0], t[1], arm[1]]];
+            body.map(|b| (b as usize, block.map(|row| row.map(|x| sign * x))))
+        };
+        [side(self.body_a, self.arm_a, -1.0), side(self.body_b, self.arm_b, 1.0)].into_iter().flatten()
+    }
+
+    /// The vectors r from both centres of mass to the point (m), recovered from the arms.
+    ///
+    /// Write r = α n + β t. Since t × n = 1, r × n = β and r × t = −α.
+    pub fn anchors(&self) -> [[f64; 2]; 2] {
+        let (n, t) = (self.normal, self.tangent());
+        [self.arm_a, self.arm_b].map(|[rn, rt]| [-rt * n[0] + rn * t[0], -rt * n[1] + rn * t[1]])
+    }
+
+    /// (un, ut) = J v of this contact (m/s).
+    pub fn velocity(&self, velocities: &[Velocity]) -> Pair {
+        let mut u = [0.0; 2];
+        for (body, block) in self.sides() {
+            for (u, row) in u.iter_mut().zip(&block) {
+                *u += dot(row, &velocities[body]);
+            }
+        }
+        u
+    }
+}
+
+fn dot(a: &Velocity, b: &Velocity) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The contact problem of one step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactProblem {
+    /// What it is, and where it comes from.
+    pub name: String,
+    /// Step (s), > 0.
+    pub h: f64,
+    /// Bodies that are not static.
+    pub bodies: Vec<ProblemBody>,
+    /// Contact points, those of a manifold together.
+    pub contacts: Vec<ProblemContact>,
+}
+
+impl ContactProblem {
+    /// Checks that all numbers are finite and in range, all indices valid, and that every contact
+    /// has a side that answers to impulses.
+    pub fn validate(&self) -> Result<(), Error> {
+        let h = [self.h];
+        finite("h", &h)?;
+        require(self.h > 0.0, "h", || format!("the step is {} s, must be > 0", self.h))?;
+        for (i, b) in self.bodies.iter().enumerate() {
+            let place = || format!("bodies[{i}]");
+            finite(place(), &[b.inv_mass, b.inv_inertia])?;
+            finite(place(), &b.velocity)?;
+            finite(place(), &b.free_velocity)?;
+            require(b.inv_mass >= 0.0, place(), || format!("inv_mass is {}, must be ≥ 0", b.inv_mass))?;
+            require(b.inv_inertia >= 0.0, place(), || {
+                format!("inv_inertia is {}, must be ≥ 0", b.inv_inertia)
+            })?;
+        }
+        for (i, c) in self.contacts.iter().enumerate() {
+            let place = || format!("contacts[{i}]");
+            for pair in [c.normal, c.arm_a, c.arm_b, [c.gap, c.friction], c.warm_impulse] {
+                finite(place(), &pair)?;
+            }
+            finite(place(), &[c.rebound])?;
+            for body in [c.body_a, c.body_b].into_iter().flatten() {
+                require((body as usize) < self.bodies.len(), place(), || {
+                    format!("names body {body} of {}", self.bodies.len())
+                })?;
+            }
+            require(c.body_a != c.body_b, place(), || format!("both sides are {:?}", c.body_a))?;
+            let length = c.normal[0].hypot(c.normal[1]);
+            // Normals that come from f32 are unit only to their own precision.
+            require((length - 1.0).abs() < 1e-5, place(), || {
+                format!("the normal has length {length}, must be 1")
+            })?;
+            require(c.friction >= 0.0, place(), || format!("friction is {}, must be ≥ 0", c.friction))?;
+            require(c.rebound >= 0.0, place(), || format!("rebound is {}, must be ≥ 0", c.rebound))?;
+            let g = self.delassus_block(c);
+            require(g[0] > 0.0 && g[1] > 0.0, place(), || "no side answers to impulses".to_string())?;
+            let starts = i == 0 || self.contacts[i - 1].manifold != c.manifold;
+            let p = &self.contacts[i.saturating_sub(1)];
+            let same = p.normal == c.normal && p.body_a == c.body_a && p.body_b == c.body_b;
+            require(starts || same, place(), || {
+                format!("manifold {} has points of different bodies or normals", c.manifold)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Adds M⁻¹ Jᵀ of one contact times `impulse` to the velocities.
+    pub fn apply(&self, contact: &ProblemContact, impulse: Pair, velocities: &mut [Velocity]) {
+        for (body, [n, t]) in contact.sides() {
+            let b = &self.bodies[body];
+            let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+            for k in 0..3 {
+                velocities[body][k] += inverse[k] * (n[k] * impulse[0] + t[k] * impulse[1]);
+            }
+        }
+    }
+
+    /// v⁺ = v* + M⁻¹ Jᵀ λ.
+    pub fn velocities(&self, impulses: &[Pair]) -> Vec<Velocity> {
+        let mut v: Vec<Velocity> = self.bodies.iter().map(|b| b.free_velocity).collect();
+        for (c, &impulse) in self.contacts.iter().zip(impulses) {
+            self.apply(c, impulse, &mut v);
+        }
+        v
+    }
+
+    /// J v: (un, ut) of every contact (m/s).
+    pub fn contact_velocities(&self, velocities: &[Velocity]) -> Vec<Pair> {
+        self.contacts.iter().map(|c| c.velocity(velocities)).collect()
+    }
+
+    /// Jᵀ λ: what the contacts give each body (N·s, N·s, N·m·s). Unlike single impulses of a
+    /// hyperstatic pile, this is determined by the velocities.
+    pub fn body_impulses(&self, impulses: &[Pair]) -> Vec<Velocity> {
+        let mut p = vec![[0.0; 3]; self.bodies.len()];
+        for (c, impulse) in self.contacts.iter().zip(impulses) {
+            for (body, [n, t]) in c.sides() {
+                for k in 0..3 {
+                    p[body][k] += n[k] * impulse[0] + t[k] * impulse[1];
+                }
+            }
+        }
+        p
+    }
+
+    /// G λ = J M⁻¹ Jᵀ λ (m/s).
+    pub fn delassus_product(&self, impulses: &[Pair]) -> Vec<Pair> {
+        let mut v = vec![[0.0; 3]; self.bodies.len()];
+        for (c, &impulse) in self.contacts.iter().zip(impulses) {
+            self.apply(c, impulse, &mut v);
+        }
+        self.contact_velocities(&v)
+    }
+
+    /// Dense G, rows and columns (n₀, t₀, n₁, t₁, …), 1/kg.
+    pub fn delassus(&self) -> Mat<f64> {
+        let mut g = Mat::zeros(2 * self.contacts.len(), 2 * self.contacts.len());
+        let mut v = vec![[0.0; 3]; self.bodies.len()];
+        for (j, c) in self.contacts.iter().enumerate() {
+            for direction in 0..2 {
+                let mut unit = [0.0; 2];
+                unit[direction] = 1.0;
+                c.sides().for_each(|(body, _)| v[body] = [0.0; 3]);
+                self.apply(c, unit, &mut v);
+                for (i, u) in self.contact_velocities(&v).into_iter().enumerate() {
+                    g[(2 * i, 2 * j + direction)] = u[0];
+                    g[(2 * i + 1, 2 * j + direction)] = u[1];
+                }
+            }
+            c.sides().for_each(|(body, _)| v[body] = [0.0; 3]);
+        }
+        g
+    }
+
+    /// (G_nn, G_tt) of one contact (1/kg).
+    fn delassus_block(&self, contact: &ProblemContact) -> Pair {
+        let mut g = [0.0; 2];
+        for (body, block) in contact.sides() {
+            let b = &self.bodies[body];
+            for (g, row) in g.iter_mut().zip(&block) {
+                *g += b.inv_mass * (row[0] * row[0] + row[1] * row[1]) + b.inv_inertia * row[2] * row[2];
+            }
+        }
+        g
+    }
+
+    /// Diagonal of G, a (normal, tangential) pair per contact (1/kg).
+    pub fn delassus_diagonal(&self) -> Vec<Pair> {
+        self.contacts.iter().map(|c| self.delassus_block(c)).collect()
+    }
+
+    /// M (v* − v): what forces give each body during the step (N·s, N·s, N·m·s); zero for
+    /// components of infinite mass.
+    pub fn loads(&self) -> Vec<Velocity> {
+        let change = |b: &ProblemBody| {
+            let m = masses(b);
+            [0, 1, 2].map(|k| m[k] * (b.free_velocity[k] - b.velocity[k]))
+        };
+        self.bodies.iter().map(change).collect()
+    }
+
+    /// h times the sum of weights (N·s): ∑ |m (v* − v)|. Zero without forces.
+    pub fn total_load(&self) -> f64 {
+        self.loads().iter().map(|p| p[0].hypot(p[1])).sum()
+    }
+
+    /// The impulse by which residuals are made dimensionless (N·s): h m g of the heaviest body,
+    /// max |m (v* − v)|; without forces max |m v*|; 1 if nothing moves.
+    pub fn impulse_unit(&self) -> f64 {
+        let largest = |p: Vec<Velocity>| p.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max);
+        let momenta = self.bodies.iter().map(|b| {
+            let m = masses(b);
+            [0, 1, 2].map(|k| m[k] * b.free_velocity[k])
+        });
+        [largest(self.loads()), largest(momenta.collect())].into_iter().find(|&u| u > 0.0).unwrap_or(1.0)
+    }
+
+    /// √(vᵀ M v) over components of finite mass (√J·√2).
+    pub fn mass_norm(&self, velocities: &[Velocity]) -> f64 {
+        let square = |(b, v): (&ProblemBody, &Velocity)| {
+            let m = masses(b);
+            m[0] * v[0] * v[0] + m[1] * v[1] * v[1] + m[2] * v[2] * v[2]
+        };
+        self.bodies.iter().zip(velocities).map(square).sum::<f64>().sqrt()
+    }
+
+    /// ‖v − w‖ in the mass norm, relative to max(‖w‖, ‖v* − v_start‖): the second stands in for
+    /// √m g h, so that a reference at rest does not make every error infinite.
+    pub fn velocity_error(&self, velocities: &[Velocity], reference: &[Velocity]) -> f64 {
+        let minus = |a: &[Velocity], b: &[Velocity]| -> Vec<Velocity> {
+            a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect()
+        };
+        let free: Vec<Velocity> = self.bodies.iter().map(|b| b.free_velocity).collect();
+        let start: Vec<Velocity> = self.bodies.iter().map(|b| b.velocity).collect();
+        let scale = self.mass_norm(reference).max(self.mass_norm(&minus(&free, &start)));
+        let error = self.mass_norm(&minus(velocities, reference));
+        if error == 0.0 { 0.0 } else { error / scale }
+    }
+}
+
+/// Finite masses of a body, zero where infinite: those components cannot change.
+fn masses(b: &ProblemBody) -> Velocity {
+    let inverse = |x: f64| if x > 0.0 { 1.0 / x } else { 0.0 };
+    [inverse(b.inv_mass), inverse(b.inv_mass), inverse(b.inv_inertia)]
+}
+
+fn require(ok: bool, place: impl Into<String>, message: impl FnOnce() -> String) -> Result<(), Error> {
+    if ok { Ok(()) } else { Err(Error::invalid(place, message())) }
+}
+
+fn finite(place: impl Into<String>, values: &[f64]) -> Result<(), Error> {
+    match values.iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(Error::invalid(place, format!("{x} is not a finite number"))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::gallery::{box_pyramid, sliding_box};
+
+    /// Two bodies, one contact at an oblique normal; b of 2 kg and 0.5 kg·m², a of 1 kg, 0.25 kg·m².
+    fn oblique() -> ContactProblem {
+        let body = |inv_mass, inv_inertia, v: Velocity| ProblemBody {
+            inv_mass,
+            inv_inertia,
+            velocity: v,
+            free_velocity: [v[0], v[1] - 1.0, v[2]],
+        };
+        let contact = ProblemContact {
+            body_a: Some(0),
+            body_b: Some(1),
+            manifold: 0,
+            normal: [0.6, 0.8],
+            // r_a = (1, 2): r × n = 0.8 − 1.2 = −0.4, t = (0.8, −0.6), r × t = −0.6 − 1.6 = −2.2.
+            arm_a: [-0.4, -2.2],
+            // r_b = (−1, 1): −0.8 − 0.6 = −1.4, 0.6 − 0.8 = −0.2.
+            arm_b: [-1.4, -0.2],
+            gap: 0.0,
+            friction: 0.5,
+            rebound: 0.0,
+            warm_impulse: [0.0; 2],
+        };
+        let bodies = vec![body(1.0, 4.0, [1.0, 0.0, 2.0]), body(0.5, 2.0, [0.0, 3.0, -1.0])];
+        ContactProblem { name: "oblique".into(), h: 0.1, bodies, contacts: vec![contact] }
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-14, "{a} is not {b}");
+    }
+
+    #[test]
+    fn relative_velocity_by_hand() {
+        let p = oblique();
+        let v: Vec<Velocity> = p.bodies.iter().map(|b| b.velocity).collect();
+        // v at the point: a (1, 0) + 2 (−2, 1) = (−3, 2); b (0, 3) − (−1, −1) = (1, 4); b − a = (4, 2).
+        let [un, ut] = p.contacts[0].velocity(&v);
+        close(un, 0.6 * 4.0 + 0.8 * 2.0);
+        close(ut, 0.8 * 4.0 - 0.6 * 2.0);
+        let [a, b] = p.contacts[0].anchors();
+        [(a, [1.0, 2.0]), (b, [-1.0, 1.0])].iter().for_each(|(x, y)| {
+            close(x[0], y[0]);
+            close(x[1], y[1]);
+        });
+    }
+
+    #[test]
+    fn impulses_and_delassus_by_hand() {
+        let p = oblique();
+        // λ = (1, 0): b gains (0.3, 0.4, −2.8), a loses (0.6, 0.8, −1.6).
+        let v = p.velocities(&[[1.0, 0.0]]);
+        let expected = [[1.0 - 0.6, -1.0 - 0.8, 2.0 + 1.6], [0.3, 2.0 + 0.4, -1.0 - 2.8]];
+        v.iter().flatten().zip(expected.iter().flatten()).for_each(|(a, b)| close(*a, *b));
+        // G_nn = 1 + 4·0.16 + 0.5 + 2·1.96, G_tt = 1 + 4·4.84 + 0.5 + 2·0.04, G_nt = 4·0.88 + 2·0.28.
+        let g = p.delassus();
+        close(g[(0, 0)], 6.06);
+        close(g[(1, 1)], 20.94);
+        close(g[(0, 1)], 4.08);
+        close(g[(1, 0)], 4.08);
+        assert_eq!(p.delassus_diagonal(), [[g[(0, 0)], g[(1, 1)]]]);
+        let impulse = p.body_impulses(&[[1.0, 1.0]]);
+        close(impulse[1][0], 1.4);
+        close(impulse[1][2], -1.6);
+        close(impulse[0][2], 2.6);
+    }
+
+    #[test]
+    fn dense_delassus_equals_its_product() {
+        let p = box_pyramid(3, 0.5);
+        let l: Vec<Pair> =
+            (0..p.contacts.len()).map(|i| [(i as f64).sin(), (2.0 * i as f64).cos()]).collect();
+        let g = p.delassus();
+        for (i, u) in p.delassus_product(&l).iter().enumerate() {
+            for d in 0..2 {
+                let sum: f64 = (0..l.len())
+                    .map(|j| g[(2 * i + d, 2 * j)] * l[j][0] + g[(2 * i + d, 2 * j + 1)] * l[j][1])
+                    .sum();
+                // Sums of some 50 terms of order 1.
+                assert!((sum - u[d]).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn norms_and_scales_by_hand() {
+        let p = oblique();
+        // m = 1, I = 0.25 and m = 2, I = 0.5: 1 + 4·0.25 + 2·9 + 1·0.5 = 20.5.
+        close(p.mass_norm(&[[1.0, 0.0, 2.0], [0.0, 3.0, -1.0]]), 20.5f64.sqrt());
+        assert_eq!(p.loads(), [[0.0, -1.0, 0.0], [0.0, -2.0, 0.0]]);
+        assert_eq!((p.total_load(), p.impulse_unit()), (3.0, 2.0));
+        // ‖v* − v‖ = √3; a reference at rest, an answer off by 1 m/s on the 1 kg body.
+        let rest = [[0.0; 3]; 2];
+        close(p.velocity_error(&[[1.0, 0.0, 0.0], [0.0; 3]], &rest), 1.0 / 3.0f64.sqrt());
+        assert_eq!(p.velocity_error(&rest, &rest), 0.0);
+        let mut floating = p.clone();
+        floating.bodies.iter_mut().for_each(|b| b.free_velocity = b.velocity);
+        assert_eq!((floating.total_load(), floating.impulse_unit()), (0.0, 6.0));
+    }
+
+    #[test]
+    fn bad_problems_are_named() {
+        type Spoil = fn(&mut ContactProblem);
+        let spoils: [(Spoil, &str); 8] = [
+            (|p| p.h = 0.0, "h: the step is 0 s"),
+            (|p| p.bodies[0].velocity[2] = f64::NAN, "bodies[0]: NaN"),
+            (|p| p.bodies[0].inv_mass = -1.0, "bodies[0]: inv_mass is -1"),
+            (|p| p.contacts[1].body_b = Some(3), "contacts[1]: names body 3 of 1"),
+            (|p| p.contacts[1].normal = [0.0, 1.1], "contacts[1]: the normal has length 1.1"),
+            (|p| p.contacts[0].friction = -0.1, "contacts[0]: friction is -0.1"),
+            (|p| p.contacts[0].body_b = None, "contacts[0]: both sides"),
+            (|p| (p.bodies[0].inv_mass, p.bodies[0].inv_inertia) = (0.0, 0.0), "contacts[0]: no side"),
+        ];
+        sliding_box().validate().unwrap();
+        for (spoil, message) in spoils {
+            let mut p = sliding_box();
+            spoil(&mut p);
+            let error = p.validate().unwrap_err().to_string();
+            assert!(error.starts_with(message), "{error}");
+        }
+    }
+}

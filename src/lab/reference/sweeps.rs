@@ -1,0 +1,299 @@
+//! Sweeps over the rows: projected Gauss–Seidel, Jacobi, and Jacobi with mass splitting.
+//!
+//! Every method here changes one row at a time by the impulse that would satisfy it alone,
+//!
+//! ```text
+//! λn' = max(0, λn − un/G_nn),    λt' = clamp(λt − ut/G_tt, −µ λn', µ λn'),
+//! ```
+//!
+//! so its fixed points are the zeros of the natural map. Gauss–Seidel (Catto 2005; NSGS of
+//! Jean & Moreau 1992) applies each change at once. Jacobi applies all changes of a sweep together
+//! and diverges where λ_max(D⁻¹G) > 2. Mass splitting (Tonge et al. 2012) gives each of the k rows
+//! of a body a copy of 1/k of its mass and averages the copies afterwards; a row then sees k times
+//! the inverse mass, and averaging divides the effect of its impulse by k again. So it is Jacobi
+//! with D_i = ∑_sides k J_i M⁻¹ J_iᵀ, and since (∑ᵢ xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G: it
+//! converges.
+
+use super::problem::{ContactProblem, Pair, Velocity};
+use super::residual::{OwnRow, Target, clamp, natural_map, positive};
+
+/// When an iteration ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// Relative natural-map residual to reach (1), see [`ContactProblem::impulse_unit`].
+    pub tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+}
+
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// The residual reached its tolerance.
+    Converged,
+    /// Iterations ran out.
+    Limit,
+    /// The residual left all bounds (10⁶ times its start, or not a number).
+    Diverged,
+    /// No step of the method reduces the residual any more.
+    Stalled,
+}
+
+/// What an iterative method found.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Last impulses (N·s).
+    pub impulses: Vec<Pair>,
+    /// v⁺ that follows from them.
+    pub velocities: Vec<Velocity>,
+    /// Relative natural-map residual: of the start, then after every iteration.
+    pub history: Vec<f64>,
+    /// How it ended.
+    pub status: Status,
+}
+
+/// Constants of all rows.
+pub(super) struct Rows {
+    /// 1/(G_ii + compliance), normal and tangential (kg).
+    inverse: Vec<Pair>,
+    law: Vec<OwnRow>,
+}
+
+impl Rows {
+    pub(super) fn new(problem: &ContactProblem, target: Target) -> Self {
+        Self::with_diagonal(problem, target, &problem.delassus_diagonal())
+    }
+
+    fn with_diagonal(problem: &ContactProblem, target: Target, diagonal: &[Pair]) -> Self {
+        let law: Vec<OwnRow> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
+        let invert = |(g, row): (&Pair, &OwnRow)| [1.0 / (g[0] + row.compliance), 1.0 / g[1]];
+        Rows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
+    }
+
+    /// Normal impulse that would satisfy row `i` alone; NaN stays NaN, so that divergence shows.
+    fn normal(&self, i: usize, vn: f64, ln: f64) -> f64 {
+        let un = vn + self.law[i].bias + self.law[i].compliance * ln;
+        positive(ln - un * self.inverse[i][0])
+    }
+
+    /// Tangential impulse that would satisfy row `i` alone, within ±`radius`.
+    fn tangent(&self, i: usize, ut: f64, lt: f64, radius: f64) -> f64 {
+        clamp(lt - ut * self.inverse[i][1], radius)
+    }
+}
+
+/// One Gauss–Seidel pass in the given order.
+pub(super) fn gauss_seidel(
+    problem: &ContactProblem,
+    rows: &Rows,
+    order: impl Iterator<Item = usize>,
+    impulses: &mut [Pair],
+    velocities: &mut [Velocity],
+) {
+    for i in order {
+        let c = &problem.contacts[i];
+        let [ln, lt] = impulses[i];
+        let normal = rows.normal(i, c.velocity(velocities)[0], ln);
+        problem.apply(c, [normal - ln, 0.0], velocities);
+        impulses[i][0] = normal;
+        if c.friction > 0.0 || lt != 0.0 {
+            let tangent = rows.tangent(i, c.velocity(velocities)[1], lt, c.friction * normal);
+            problem.apply(c, [0.0, tangent - lt], velocities);
+            impulses[i][1] = tangent;
+        }
+    }
+}
+
+/// Direction of Gauss–Seidel sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sweep {
+    /// In the order of the contacts.
+    Forward,
+    /// Forward, then backward; counts as one iteration.
+    Symmetric,
+}
+
+/// Iterates `step` from `start` until `stop`, measuring after every iteration.
+pub(super) fn iterate(
+    problem: &ContactProblem,
+    target: Target,
+    start: &[Pair],
+    stop: Stop,
+    mut step: impl FnMut(&mut Vec<Pair>, &mut Vec<Velocity>),
+) -> Run {
+    let unit = problem.impulse_unit();
+    let mut impulses = start.to_vec();
+    let mut history = Vec::new();
+    loop {
+        // Afresh from the impulses, so that rounding of millions of updates does not add up.
+        let mut velocities = problem.velocities(&impulses);
+        let residual = natural_map(problem, target, &velocities, &impulses) / unit;
+        history.push(residual);
+        let status = if residual <= stop.tolerance {
+            Status::Converged
+        } else if residual.is_nan() || residual > 1e6 * history[0].max(1.0) {
+            Status::Diverged
+        } else if history.len() > stop.iterations {
+            Status::Limit
+        } else {
+            step(&mut impulses, &mut velocities);
+            continue;
+        };
+        return Run { impulses, velocities, history, status };
+    }
+}
+
+/// Projected Gauss–Seidel from `start`.
+pub fn pgs(problem: &ContactProblem, target: Target, start: &[Pair], sweep: Sweep, stop: Stop) -> Run {
+    let rows = Rows::new(problem, target);
+    let n = problem.contacts.len();
+    iterate(problem, target, start, stop, |impulses, velocities| {
+        gauss_seidel(problem, &rows, 0..n, impulses, velocities);
+        if sweep == Sweep::Symmetric {
+            gauss_seidel(problem, &rows, (0..n).rev(), impulses, velocities);
+        }
+    })
+}
+
+/// How Jacobi shares a body among its rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Splitting {
+    /// Every row sees the whole mass; may diverge.
+    Whole,
+    /// Every row sees its share of the mass.
+    Mass,
+}
+
+/// Projected Jacobi from `start`.
+pub fn jacobi(problem: &ContactProblem, target: Target, start: &[Pair], split: Splitting, stop: Stop) -> Run {
+    let diagonal = match split {
+        Splitting::Whole => problem.delassus_diagonal(),
+        Splitting::Mass => split_diagonal(problem),
+    };
+    let rows = Rows::with_diagonal(problem, target, &diagonal);
+    iterate(problem, target, start, stop, |impulses, velocities| {
+        for (i, c) in problem.contacts.iter().enumerate() {
+            let [un, ut] = c.velocity(velocities);
+            let normal = rows.normal(i, un, impulses[i][0]);
+            impulses[i] = [normal, rows.tangent(i, ut, impulses[i][1], c.friction * normal)];
+        }
+    })
+}
+
+/// ∑_sides k J_i M⁻¹ J_iᵀ with k the number of rows on that body: two per contact with friction.
+fn split_diagonal(problem: &ContactProblem) -> Vec<Pair> {
+    let mut count = vec![0.0; problem.bodies.len()];
+    for c in &problem.contacts {
+        for (body, _) in c.sides() {
+            count[body] += if c.friction > 0.0 { 2.0 } else { 1.0 };
+        }
+    }
+    let mut diagonal = vec![[0.0; 2]; problem.contacts.len()];
+    for (c, d) in problem.contacts.iter().zip(&mut diagonal) {
+        for (body, block) in c.sides() {
+            let b = &problem.bodies[body];
+            for (d, row) in d.iter_mut().zip(&block) {
+                let whole =
+                    b.inv_mass * (row[0] * row[0] + row[1] * row[1]) + b.inv_inertia * row[2] * row[2];
+                *d += count[body] * whole;
+            }
+        }
+    }
+    diagonal
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::gallery::*;
+    use crate::lab::reference::rates::rate;
+    use std::f64::consts::PI;
+
+    fn cold(p: &ContactProblem) -> Vec<Pair> {
+        vec![[0.0; 2]; p.contacts.len()]
+    }
+
+    /// Far above the rounding floor, far below the first modes' decay.
+    const DEEP: Stop = Stop { tolerance: 1e-10, iterations: 20_000 };
+
+    #[test]
+    fn gauss_seidel_on_a_column_has_the_rate_of_its_walk() {
+        for n in [5, 10, 15, 20] {
+            let p = disc_column(n);
+            let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Forward, DEEP);
+            assert_eq!(run.status, Status::Converged);
+            let exact = (PI / (2.0 * n as f64)).cos().powi(2);
+            let measured = rate(&run.history).unwrap();
+            // The next mode, cos²(3π/2n), is 10⁹ times smaller when the last decade begins.
+            assert!((measured - exact).abs() < 1e-6, "n {n}: {measured} is not {exact}");
+        }
+    }
+
+    #[test]
+    fn jacobi_on_a_column_has_the_square_root_of_it() {
+        for n in [5, 10] {
+            let p = disc_column(n);
+            let run = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, DEEP);
+            let exact = (PI / (2.0 * n as f64)).cos();
+            let measured = rate(&run.history).unwrap();
+            // Modes ±cos θ alternate, which a fit over a decade averages to a few 10⁻⁴.
+            assert!((measured - exact).abs() < 1e-3, "n {n}: {measured} is not {exact}");
+        }
+    }
+
+    #[test]
+    fn mass_ratio_sets_the_rate_both_ways() {
+        for r in [1.0, 10.0, 100.0, 1000.0] {
+            for (p, exact) in [(heavy_on_light(r), r / (1.0 + r)), (light_on_heavy(r), 1.0 / (1.0 + r))] {
+                let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Forward, DEEP);
+                assert_eq!(run.status, Status::Converged);
+                // Light on heavy gains more than a decade per sweep or two: nothing to fit.
+                if exact > 0.2 {
+                    let measured = rate(&run.history).unwrap();
+                    assert!((measured - exact).abs() < 1e-6, "{}: {measured} is not {exact}", p.name);
+                } else {
+                    assert!(run.history.len() < 15);
+                    assert!((run.history[2] / run.history[1] - exact).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn mass_splitting_cures_jacobi_on_a_plank() {
+        // Three supports close together: λ_max(D⁻¹G) is nearly 3.
+        let p = plank(&[-0.1, 0.0, 0.1], 0.5);
+        let whole = jacobi(
+            &p,
+            Target::Rigid,
+            &cold(&p),
+            Splitting::Whole,
+            Stop { tolerance: 1e-6, iterations: 1000 },
+        );
+        assert_ne!(whole.status, Status::Converged);
+        let split = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Mass, DEEP);
+        assert_eq!(split.status, Status::Converged);
+        // The error in the energy norm falls monotonically; the maximum norm may wobble a little.
+        assert!(split.history.windows(2).all(|w| w[1] <= 1.001 * w[0]), "{:?}", &split.history[..20]);
+        assert!(p.mass_norm(&split.velocities) < 1e-9);
+    }
+
+    #[test]
+    fn symmetric_sweeps_solve_friction() {
+        let p = sliding_box();
+        let run =
+            pgs(&p, Target::Rigid, &cold(&p), Sweep::Symmetric, Stop { tolerance: 1e-14, iterations: 1000 });
+        assert_eq!(run.status, Status::Converged);
+        // 7 N and 13 N times h; the residual bounds the error up to the condition number, some 10.
+        assert!((run.impulses[0][0] - 7.0 * p.h).abs() < 1e-12);
+        assert!((run.impulses[1][1] + 0.3 * 13.0 * p.h).abs() < 1e-12);
+    }
+
+    #[test]
+    fn divergence_is_a_status() {
+        let p = plank(&[0.0; 10], 0.0);
+        let run =
+            jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, Stop { tolerance: 1e-6, iterations: 50 });
+        assert!(matches!(run.status, Status::Limit | Status::Diverged), "{:?}", run.status);
+    }
+}

@@ -1,0 +1,233 @@
+//! The study as `study.csv` and `study.json`.
+
+use super::environment::Environment;
+use crate::engine::params;
+use crate::engine::solvers::Uses;
+use crate::engine::world::{Order, Settings};
+use crate::lab::error::Error;
+use crate::lab::study::ablation::NeedCost;
+use crate::lab::study::{Record, StudyPlan};
+use serde_json::{Value, json};
+
+/// One line of the table file; every number is finite, and what there is not is empty.
+#[derive(serde::Serialize)]
+struct Line<'a> {
+    scene: &'a str,
+    bodies: usize,
+    dt: f64,
+    solver: &'a str,
+    order: Order,
+    lanes: usize,
+    substeps: u32,
+    velocity_iterations: u32,
+    relax_iterations: u32,
+    position_iterations: u32,
+    median_us: Option<f64>,
+    spread_us: Option<f64>,
+    quartile_1_us: Option<f64>,
+    quartile_3_us: Option<f64>,
+    ns_per_row_sweep: Option<f64>,
+    speed_up: Option<f64>,
+    steps: Option<u64>,
+    points: Option<u64>,
+    penetration_max: Option<f64>,
+    penetration_mean: Option<f64>,
+    penetration_rms: Option<f64>,
+    penetration_p99: Option<f64>,
+    penetration_relative: Option<f64>,
+    penetration_excess: Option<f64>,
+    soft_floor: Option<f64>,
+    law_rms: Option<f64>,
+    law_normal_rms: Option<f64>,
+    law_normal_max: Option<f64>,
+    law_tangent_rms: Option<f64>,
+    law_tangent_max: Option<f64>,
+    complementarity: Option<f64>,
+    cone: Option<f64>,
+    dissipation: Option<f64>,
+    own_rms: Option<f64>,
+    own_max: Option<f64>,
+    momentum: Option<f64>,
+    angular_momentum: Option<f64>,
+    energy_change: Option<f64>,
+    energy_created: Option<f64>,
+    friction_loss: Option<f64>,
+    impact_loss: Option<f64>,
+    energy_unexplained: Option<f64>,
+    rest_velocity: Option<f64>,
+    creep: Option<f64>,
+    creep_half_width: Option<f64>,
+    settled: Option<f64>,
+    truth: Option<&'a str>,
+    truth_unit: Option<&'a str>,
+    truth_expected: Option<f64>,
+    truth_error: Option<f64>,
+    contacts: Option<f64>,
+    rows: Option<f64>,
+    sweeps: Option<f64>,
+    colors: Option<usize>,
+    overflow: Option<f64>,
+    occupancy: Option<f64>,
+    bytes_per_contact: Option<f64>,
+    bits_equal: Option<bool>,
+    front_penetration: bool,
+    front_law: bool,
+    front_truth: bool,
+    failed_step: Option<u64>,
+    failed_body: Option<usize>,
+    failed_speed: Option<f32>,
+}
+
+impl<'a> Line<'a> {
+    fn of(r: &'a Record) -> Self {
+        let (lap, errors, truth) = (r.lap.as_ref(), r.errors.as_ref(), r.truth.as_ref());
+        let us = |ns: f64| ns / 1e3;
+        Line {
+            scene: &r.scene,
+            bodies: r.bodies,
+            dt: r.dt,
+            solver: r.solver,
+            order: r.order,
+            lanes: r.lanes,
+            substeps: r.budget.substeps,
+            velocity_iterations: r.budget.velocity_iterations,
+            relax_iterations: r.budget.relax_iterations,
+            position_iterations: r.budget.position_iterations,
+            median_us: lap.map(|l| us(l.median_ns)),
+            spread_us: lap.map(|l| us(l.spread_ns)),
+            quartile_1_us: lap.map(|l| us(l.quartiles_ns[0])),
+            quartile_3_us: lap.map(|l| us(l.quartiles_ns[1])),
+            ns_per_row_sweep: lap.map(|l| l.row_sweep_ns),
+            speed_up: r.speed_up,
+            steps: errors.map(|e| e.steps),
+            points: errors.map(|e| e.points),
+            penetration_max: errors.map(|e| e.penetration_max),
+            penetration_mean: errors.map(|e| e.penetration_mean),
+            penetration_rms: errors.map(|e| e.penetration_rms),
+            penetration_p99: errors.map(|e| e.penetration_p99),
+            penetration_relative: errors.map(|e| e.penetration_relative),
+            penetration_excess: errors.and_then(|e| e.penetration_excess),
+            soft_floor: errors.and_then(|e| e.soft_floor),
+            law_rms: errors.map(|e| e.law_rms),
+            law_normal_rms: errors.map(|e| e.law_normal_rms),
+            law_normal_max: errors.map(|e| e.law_normal_max),
+            law_tangent_rms: errors.map(|e| e.law_tangent_rms),
+            law_tangent_max: errors.map(|e| e.law_tangent_max),
+            complementarity: errors.map(|e| e.complementarity),
+            cone: errors.map(|e| e.cone),
+            dissipation: errors.map(|e| e.dissipation),
+            own_rms: errors.and_then(|e| e.own_rms),
+            own_max: errors.and_then(|e| e.own_max),
+            momentum: errors.map(|e| e.momentum),
+            angular_momentum: errors.map(|e| e.angular_momentum),
+            energy_change: errors.map(|e| e.energy_change),
+            energy_created: errors.map(|e| e.energy_created),
+            friction_loss: errors.map(|e| e.friction_loss),
+            impact_loss: errors.map(|e| e.impact_loss),
+            energy_unexplained: errors.map(|e| e.energy_unexplained),
+            rest_velocity: errors.map(|e| e.rest_velocity),
+            creep: errors.map(|e| e.creep),
+            creep_half_width: errors.map(|e| e.creep_half_width),
+            settled: errors.and_then(|e| e.settled),
+            truth: truth.map(|t| t.quantity),
+            truth_unit: truth.map(|t| t.unit),
+            truth_expected: truth.map(|t| t.expected),
+            truth_error: truth.and_then(|t| t.error),
+            contacts: lap.map(|l| l.load.contacts),
+            rows: lap.map(|l| l.load.rows),
+            sweeps: lap.map(|l| l.load.sweeps),
+            colors: lap.map(|l| l.load.colors),
+            overflow: lap.map(|l| l.load.overflow),
+            occupancy: lap.map(|l| l.load.occupancy),
+            bytes_per_contact: lap.map(|l| l.load.bytes_per_contact),
+            bits_equal: r.bits_equal,
+            front_penetration: r.front.penetration,
+            front_law: r.front.law,
+            front_truth: r.front.truth,
+            failed_step: r.failure.map(|f| f.step),
+            failed_body: r.failure.map(|f| f.body),
+            failed_speed: r.failure.and_then(|f| f.speed),
+        }
+    }
+}
+
+/// `study.csv`: a line per record. Lengths in m, times in µs and ns, shares in 1.
+pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for record in records {
+        writer.serialize(Line::of(record)).map_err(|e| Error::invalid("study.csv", e.to_string()))?;
+    }
+    writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
+}
+
+/// `study.json`: the environment, every setting, the records, and the ablation.
+pub fn json(
+    environment: &Environment,
+    plan: &StudyPlan,
+    records: &[Record],
+    ablation: &[NeedCost],
+) -> Result<Vec<u8>, Error> {
+    let whole = json!({
+        "environment": environment,
+        "settings": settings(plan),
+        "records": records,
+        "ablation": ablation,
+    });
+    serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
+}
+
+/// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
+fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
+/// Everything that was chosen, by the caller or by a constant.
+fn settings(plan: &StudyPlan) -> Value {
+    #[derive(serde::Serialize)]
+    struct Solver {
+        name: &'static str,
+        source: &'static str,
+        standard_budget: params::Budget,
+        uses: Uses,
+    }
+    let solver = |v: &&'static crate::engine::solvers::Variant| Solver {
+        name: v.name,
+        source: v.source,
+        standard_budget: v.budget,
+        uses: v.uses,
+    };
+    let standard = plan.solvers.first().map(|v| {
+        let s = Settings::new(v);
+        json!({
+            "broadphase": format!("{:?}", s.broadphase),
+            "integrator": s.integrator,
+            "rotation": s.rotation,
+            "contact_hertz": decimal(s.contact_hertz),
+        })
+    });
+    json!({
+        "scenes": plan.scenes,
+        "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
+        "lanes": plan.widths.iter().map(|w| w.lanes()).collect::<Vec<_>>(),
+        "orders": plan.orders,
+        "budgets": plan.budgets,
+        "steps": plan.steps,
+        "timing_steps": plan.timing_steps,
+        "repeats": plan.repeats,
+        "contact_hertz": plan.contact_hertz,
+        "seed": plan.seed,
+        "world": standard,
+        "constants": {
+            "linear_slop_m": decimal(params::LINEAR_SLOP),
+            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
+            "aabb_margin_m": decimal(params::AABB_MARGIN),
+            "baumgarte": decimal(params::BAUMGARTE),
+            "contact_hertz_fraction": decimal(params::CONTACT_HERTZ_FRACTION),
+            "contact_damping_ratio": decimal(params::CONTACT_DAMPING_RATIO),
+            "max_push_speed_m_s": decimal(params::MAX_PUSH_SPEED),
+            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
+            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
+            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
+        },
+    })
+}

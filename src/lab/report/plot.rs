@@ -1,0 +1,151 @@
+//! `speed_vs_error.svg`: time against error, a row of panels per scene.
+//!
+//! Both axes are logarithmic. One colour per solver, one curve through its budgets, one
+//! marker shape per budget; every point is the fastest lane width of its setting.
+
+use super::axes::{
+    Area, Drawn, GRID, INK, Scale, color, marker, solver_legend, wrapped, write, write_upwards,
+};
+use super::units::si_short;
+use crate::lab::error::Error;
+use crate::lab::study::Record;
+use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of};
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+const PANEL_WIDTH: i32 = 360;
+const PANEL_HEIGHT: i32 = 222;
+const TITLE_HEIGHT: i32 = 34;
+const LEGEND_HEIGHT: i32 = 66;
+/// Space left of, right of and below a panel, for labels.
+const LEFT: i32 = 78;
+const RIGHT: i32 = 26;
+const BOTTOM: i32 = 58;
+/// Characters of a title that fit under a panel.
+const TITLE_LENGTH: usize = 44;
+
+/// The picture as SVG text.
+pub fn svg(records: &[Record]) -> Result<String, Error> {
+    let mut text = String::new();
+    draw(records, &mut text).map_err(|e| Error::invalid("speed_vs_error.svg", e.to_string()))?;
+    Ok(text)
+}
+
+fn draw(records: &[Record], text: &mut String) -> Drawn {
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let solvers = solvers_of(records);
+    let row_height = TITLE_HEIGHT + PANEL_HEIGHT;
+    let size = (3 * PANEL_WIDTH, LEGEND_HEIGHT + row_height * scenes.len() as i32);
+    let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
+    root.fill(&WHITE)?;
+    legend(&root, &solvers, records)?;
+    for (i, scene) in scenes.iter().enumerate() {
+        let top = LEGEND_HEIGHT + row_height * i as i32;
+        write(&root, &scene[0].scene, (8, top + 18), 17, HPos::Left)?;
+        for (j, axis) in ErrorAxis::ALL.into_iter().enumerate() {
+            let corner = (PANEL_WIDTH * j as i32, top + TITLE_HEIGHT);
+            panel(&root, corner, axis, scene, &solvers)?;
+        }
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
+    write(area, "Time of a step against error: lower left is better", (8, 18), 18, HPos::Left)?;
+    let mut x = solver_legend(area, solvers, 12, 44)?;
+    let budgets = solvers.iter().map(|s| budgets_of(records, s).len()).max().unwrap_or(0);
+    for budget in 0..budgets.min(4) {
+        marker(area, (x + 6, 44), budget, &INK)?;
+        x += 20;
+    }
+    write(area, "budgets, smallest first; fastest lane width of each", (x + 6, 44), 14, HPos::Left)
+}
+
+fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record], solvers: &[&str]) -> Drawn {
+    let curves = curves(records, axis);
+    let samples = || curves.iter().flat_map(|c| &c.samples);
+    let (left, top) = (corner.0 + LEFT, corner.1);
+    let (right, bottom) = (corner.0 + PANEL_WIDTH - RIGHT, corner.1 + PANEL_HEIGHT - BOTTOM);
+    if samples().next().is_none() {
+        let known = axis != ErrorAxis::Truth || records.iter().any(|r| r.truth.is_some());
+        let text = if known { "nothing measured" } else { "no known truth" };
+        return write(area, text, ((left + right) / 2, (top + bottom) / 2), 13, HPos::Center);
+    }
+    let errors = Scale::of(samples().map(|s| s.error), 5);
+    let times = Scale::of(samples().map(|s| s.time), 6);
+    let unit = axis.unit(records);
+    for &tick in &errors.ticks {
+        let x = errors.pixel(tick, left, right);
+        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
+        write(area, &label(tick, unit), (x, bottom + 12), 12, HPos::Center)?;
+    }
+    for &tick in &times.ticks {
+        let y = times.pixel(tick, bottom, top);
+        area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
+        write(area, &si_short(1e-9 * tick, "s"), (left - 6, y), 12, HPos::Right)?;
+    }
+    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
+    write_upwards(area, "time of a step", (corner.0 + 14, (top + bottom) / 2), 12)?;
+    for (i, line) in title(axis, records).iter().enumerate() {
+        write(area, line, ((left + right) / 2, bottom + 29 + 15 * i as i32), 13, HPos::Center)?;
+    }
+    for curve in &curves {
+        let solver = solvers.iter().position(|&s| s == curve.solver).unwrap_or(0);
+        let at = |time, error| (errors.pixel(error, left, right), times.pixel(time, bottom, top));
+        draw_curve(area, curve, &color(solver), at)?;
+    }
+    Ok(())
+}
+
+fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64) -> (i32, i32)) -> Drawn {
+    let line: Vec<(i32, i32)> = curve.samples.iter().map(|s| at(s.time, s.error)).collect();
+    area.draw(&PathElement::new(line, color.stroke_width(2)))?;
+    for sample in &curve.samples {
+        marker(area, at(sample.time, sample.error), sample.budget, color)?;
+    }
+    Ok(())
+}
+
+/// What the horizontal axis is, in lines that fit under the panel.
+fn title(axis: ErrorAxis, records: &[Record]) -> Vec<String> {
+    let truth = records.iter().find_map(|r| r.truth).filter(|_| axis == ErrorAxis::Truth);
+    let title = truth.map_or(axis.name().to_string(), |t| format!("error of {}", t.quantity));
+    wrapped(&title, TITLE_LENGTH)
+}
+
+/// `1 mm` for lengths and the like, `1e-3` for shares and for much.
+fn label(value: f64, unit: &str) -> String {
+    if !unit.is_empty() && unit != "1" && value < 1e3 {
+        return si_short(value, unit);
+    }
+    // 1.5e3 needs its second digit, 1e3 does not.
+    let text = format!("{value:.1e}").replace(".0e", "e");
+    format!("{text} {unit}").trim_end().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::study::TruthError;
+    use crate::lab::study::record::tests::{failed, record};
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!([label(1e-3, "m"), label(1e-3, ""), label(1e4, "N")], ["1 mm", "1e-3", "1e4 N"]);
+        assert_eq!(label(1.5e-3, ""), "1.5e-3");
+    }
+
+    #[test]
+    fn titles_of_truths_are_whole() {
+        let quantity = "ground load while the heavy disc rests on the light one, last second";
+        let truth = TruthError { quantity, unit: "N", expected: 1.0, error: Some(1.0) };
+        let records = [Record { truth: Some(truth), ..record(8, 1, 1.0, 1.0) }];
+        assert_eq!(title(ErrorAxis::Truth, &records).join(" "), format!("error of {quantity}"));
+        assert!(title(ErrorAxis::Truth, &records).iter().all(|l| l.chars().count() <= TITLE_LENGTH));
+        let picture = svg(&records).unwrap();
+        assert!(picture.contains("time of a step") && picture.contains("last second"));
+        // The SVG writer escapes nothing that a scene could be called by; failures draw nothing.
+        assert!(svg(&[failed(8)]).unwrap().contains("nothing measured"));
+    }
+}

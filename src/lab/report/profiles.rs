@@ -1,0 +1,190 @@
+//! `profiles.svg` and the slices: solvers compared over all scenes.
+
+use super::axes::{Area, Drawn, GRID, INK, Scale, color, solver_legend, write, write_upwards};
+use super::table::{finish, table};
+use super::units::{digits, ratio, si, si_short};
+use crate::lab::error::Error;
+use crate::lab::study::Record;
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
+use crate::lab::study::profile::{Profile, TOLERANCES};
+use crate::lab::study::slices::{Slice, equal_error, equal_time};
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+const PANEL_WIDTH: i32 = 360;
+const HEIGHT: i32 = 330;
+const TOP: i32 = 96;
+const LEFT: i32 = 70;
+const RIGHT: i32 = 24;
+const BOTTOM: i32 = 56;
+
+/// Factors of the table; the last column is every scene that the solver solves at all.
+const FACTORS: [f64; 3] = [1.0, 1.5, 4.0];
+
+fn profiles(records: &[Record]) -> Vec<Profile> {
+    let profile = |axis| Profile::of(records, axis, &TOLERANCES);
+    ErrorAxis::ALL.into_iter().map(profile).filter(|p| p.scenes > 0).collect()
+}
+
+/// What counts as solved along an axis.
+fn tolerance(axis: ErrorAxis) -> String {
+    match axis {
+        ErrorAxis::Penetration => format!("{} within {}", axis.name(), si_short(TOLERANCES.penetration, "m")),
+        ErrorAxis::Law => format!("{} within {}", axis.name(), ratio(TOLERANCES.law)),
+        ErrorAxis::Truth => format!("{} within {} %", axis.name(), 100.0 * TOLERANCES.truth),
+    }
+}
+
+/// The picture as SVG text.
+pub fn svg(records: &[Record]) -> Result<String, Error> {
+    let mut text = String::new();
+    draw(records, &mut text).map_err(|e| Error::invalid("profiles.svg", e.to_string()))?;
+    Ok(text)
+}
+
+fn draw(records: &[Record], text: &mut String) -> Drawn {
+    let size = (3 * PANEL_WIDTH as u32, HEIGHT as u32);
+    let root = SVGBackend::with_string(text, size).into_drawing_area();
+    root.fill(&WHITE)?;
+    let heading = "Share of scenes solved within a factor of the fastest solver: upper left is better";
+    write(&root, heading, (8, 18), 18, HPos::Left)?;
+    solver_legend(&root, &solvers_of(records), 12, 44)?;
+    for (i, profile) in profiles(records).iter().enumerate() {
+        panel(&root, PANEL_WIDTH * i as i32, profile)?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
+    let (left, right, top, bottom) = (x + LEFT, x + PANEL_WIDTH - RIGHT, TOP, HEIGHT - BOTTOM);
+    let all = || profile.ratios.iter().flat_map(|(_, r)| r.iter().copied());
+    let most = all().fold(2.0, f64::max);
+    let mut scale = Scale::of([1.0, most].into_iter(), 5);
+    scale.limits[0] = 1.0;
+    let y = |share: f64| bottom - (share * (bottom - top) as f64).round() as i32;
+    for &tick in &scale.ticks {
+        let x = scale.pixel(tick, left, right);
+        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
+        write(area, &format!("{}×", (10.0 * tick).round() / 10.0), (x, bottom + 12), 12, HPos::Center)?;
+    }
+    for quarter in 0..=4 {
+        let share = 0.25 * f64::from(quarter);
+        area.draw(&PathElement::new(vec![(left, y(share)), (right, y(share))], GRID))?;
+        write(area, &format!("{:.0} %", 100.0 * share), (left - 6, y(share)), 12, HPos::Right)?;
+    }
+    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
+    write_upwards(area, &format!("share of {} scenes", profile.scenes), (x + 14, (top + bottom) / 2), 12)?;
+    write(area, "time, in times that of the fastest", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
+    write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
+    for (i, (_, ratios)) in profile.ratios.iter().enumerate() {
+        // Steps that coincide stay visible beside each other.
+        let shift = 2 * i as i32 - profile.ratios.len() as i32;
+        let at = |factor: f64, share: f64| (scale.pixel(factor, left, right), y(share) + shift);
+        let mut line = vec![at(1.0, profile.share(i, 1.0))];
+        for &ratio in ratios.iter().filter(|&&r| r > 1.0) {
+            line.push((at(ratio, 0.0).0, line[line.len() - 1].1));
+            line.push(at(ratio, profile.share(i, ratio)));
+        }
+        line.push((right, line[line.len() - 1].1));
+        area.draw(&PathElement::new(line, color(i).stroke_width(2)))?;
+    }
+    Ok(())
+}
+
+/// The profiles as a table: shares of scenes, a line per solver and error.
+pub fn profile_table(records: &[Record]) -> String {
+    let profiles = profiles(records);
+    let mut rows =
+        table(&["solved if", "scenes", "solver", "fastest or tied", "within 1.5×", "within 4×", "at all"]);
+    for profile in &profiles {
+        for (i, (solver, _)) in profile.ratios.iter().enumerate() {
+            let first = |text: String| if i == 0 { text } else { String::new() };
+            let share = |factor: f64| format!("{:.0} %", 100.0 * profile.share(i, factor));
+            let mut cells = vec![first(tolerance(profile.axis))];
+            cells.extend([first(format!("{} of {}", profile.solvable, profile.scenes)), solver.to_string()]);
+            cells.extend(FACTORS.map(share));
+            cells.push(share(f64::INFINITY));
+            rows.add_row(cells);
+        }
+    }
+    if profiles.is_empty() {
+        return String::new();
+    }
+    "Performance profiles: share of scenes that each solver solves within a factor of the fastest;\n\
+     scenes: how many some solver solves, of how many there are\n"
+        .to_string()
+        + &finish(rows, 3)
+}
+
+/// Equal time and equal error, a line per scene and error.
+pub fn slice_tables(records: &[Record]) -> String {
+    let solvers = solvers_of(records);
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let mut text = String::new();
+    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice>, equal_time: bool| {
+        let mut header = vec!["error", "scene", "at"];
+        header.extend(&solvers);
+        header.push(if equal_time { "least error" } else { "least time" });
+        let mut rows = table(&header);
+        for axis in ErrorAxis::ALL {
+            let slices: Vec<Slice> = scenes.iter().filter_map(|scene| of(scene, axis)).collect();
+            for (i, slice) in slices.iter().enumerate() {
+                rows.add_row(slice_row(slice, if i == 0 { axis.name() } else { "" }, equal_time));
+            }
+        }
+        text += &format!("{heading}\n{}", finish(rows, 2));
+    };
+    add("Equal time: the error that each solver has then (— outside its budgets)", equal_time, true);
+    add(
+        "\nEqual error: µs per step to it (— outside its budgets; = tied within the noise)",
+        equal_error,
+        false,
+    );
+    text
+}
+
+fn slice_row(slice: &Slice, axis: &str, equal_time: bool) -> Vec<String> {
+    let error = |value: f64| match si(value, slice.unit) {
+        text if value <= ERROR_FLOOR => format!("≤ {text}"),
+        text => text,
+    };
+    let time = |ns: f64| digits(1e-3 * ns);
+    let at = if equal_time { format!("{} µs", time(slice.at)) } else { error(slice.at) };
+    let mut cells = vec![axis.to_string(), slice.scene.clone(), at];
+    let show = |[value, _]: [f64; 2]| if equal_time { error(value) } else { time(value) };
+    cells.extend(slice.values.iter().map(|(_, value)| value.map_or("—".to_string(), show)));
+    cells.push(slice.best().join(" = "));
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::study::record::tests::record;
+
+    fn two_solvers() -> Vec<Record> {
+        let soft = |substeps, time, error| Record { solver: "soft_step", ..record(8, substeps, time, error) };
+        vec![record(8, 1, 10.0, 0.1), record(8, 2, 20.0, 0.001), soft(1, 10.1, 0.1), soft(2, 20.2, 0.001)]
+    }
+
+    #[test]
+    fn the_slices_say_who_is_tied() {
+        let text = slice_tables(&two_solvers());
+        let line = |start: &str| text.lines().rfind(|l| l.starts_with(start)).unwrap();
+        // To the same error of 10 mm: between 10 and 20 µs both, within 3 %.
+        assert!(line("deepest penetration").contains("pgs = soft_step"), "{text}");
+        assert!(text.contains("Equal time") && text.contains("—"), "{text}");
+    }
+
+    #[test]
+    fn the_profile_has_its_table_and_its_picture() {
+        let text = profile_table(&two_solvers());
+        assert!(text.contains("deepest penetration within 10 mm") && text.contains("1 of 1"), "{text}");
+        assert_eq!(text.matches("100 %").count(), 16, "{text}");
+        let picture = svg(&two_solvers()).unwrap();
+        assert!(picture.contains("share of 1 scenes") && !picture.to_lowercase().contains("nan"));
+        assert_eq!(profile_table(&[]), "");
+        assert!(svg(&[]).is_ok());
+    }
+}

@@ -1,0 +1,152 @@
+//! A5 and A6: a disc dropped on flat ground.
+//!
+//! Each impact keeps the fraction e of the speed, so the apex after impact k is
+//! H e^(2k). Between impacts semi-implicit Euler keeps
+//! Q = y + v²/(2g) − v h/2 exactly: with v' = v − g h and y' = y + h v',
+//! Q' − Q = h v' + (v'² − v²)/(2g) + g h²/2 = h v − g h² − v h + g h²/2 + g h²/2 = 0.
+//! At rest on top Q is the height, so Q near an apex is the apex, free of
+//! sampling. What is left is the solver's own: when in the step it applies the
+//! restitution, and how much energy that makes or loses.
+
+use super::parts::ground_line;
+use super::truth::{Observer, Truth, View, largest};
+use super::{Entry, Scene, SceneBody, SceneShape};
+use crate::engine::params::{DEFAULT_GRAVITY, RESTITUTION_THRESHOLD};
+use crate::engine::world::World;
+
+/// m/s²
+const G: f64 = -DEFAULT_GRAVITY[1];
+
+/// m
+const RADIUS: f64 = 0.5;
+
+pub(super) const BOUNCE: Entry =
+    Entry::new("bounce", "a disc dropped from 10 m that bounces with e = 0.5 until too slow", |_| {
+        scene("bounce", 10.0, 0.5).steps(300)
+    })
+    .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)));
+
+pub(super) const ELASTIC: Entry =
+    Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces for ever", |_| {
+        // Twenty bounces take 18.3 s, or 20 s if each adds h times its speed to the apex.
+        scene("bounce_elastic", 1.0, 1.0).steps(1320)
+    })
+    .known(|scene, _| truth("apexes of twenty bounces", scene, 1.0, 1.0, 20));
+
+fn scene(name: &str, height: f64, restitution: f64) -> Scene {
+    let disc = SceneShape::disc(RADIUS).restitution(restitution);
+    Scene::new(name, vec![ground_line(10.0), SceneBody::dynamic([0.0, RADIUS + height], disc)])
+}
+
+/// Impacts that bounce: v_k = √(2gH) e^(k−1) at impact k must reach the threshold,
+/// so k < 1 + ln(v_1/threshold)/ln(1/e). From 10 m at e = 0.5: 14.1, 7.1, 3.5 and
+/// 1.8 m/s, but no longer 0.9 m/s.
+fn counted(height: f64, restitution: f64) -> u32 {
+    let impact = (2.0 * G * height).sqrt() / f64::from(RESTITUTION_THRESHOLD);
+    (impact.ln() / restitution.recip().ln()).ceil() as u32
+}
+
+fn truth(quantity: &'static str, scene: &Scene, height: f64, restitution: f64, bounces: u32) -> Truth {
+    let expected = (1..=bounces).map(|k| height * restitution.powi(2 * k as i32)).collect::<Vec<_>>();
+    let first = expected[0];
+    Truth::new(quantity, "m", first, Apexes::new(u64::from(scene.steps), expected))
+}
+
+/// Compares the first apexes with what they should be. A bounce that has not
+/// happened by the last step has apex 0.
+struct Apexes {
+    last_step: u64,
+    expected: Vec<f64>,
+    found: Vec<f64>,
+    rising: bool,
+    step: u64,
+}
+
+impl Apexes {
+    fn new(last_step: u64, expected: Vec<f64>) -> Self {
+        Self { last_step, expected, found: Vec::new(), rising: false, step: 0 }
+    }
+
+    fn see(&mut self, view: &View) {
+        let (v, y) = (view.velocity(1)[1], view.center(1)[1] - RADIUS);
+        // A NaN counts as an apex, so that it is not taken for a bounce that never came.
+        if (self.rising && v <= 0.0) || v.is_nan() {
+            self.found.push(y + v * v / (2.0 * G) - 0.5 * v * view.h());
+        }
+        self.rising = v > 0.0;
+        self.step = view.step;
+    }
+}
+
+impl Observer for Apexes {
+    fn observe(&mut self, world: &World) {
+        self.see(&View::of(world));
+    }
+
+    /// The worst of all apexes; none before the last step.
+    fn error(&self) -> Option<f64> {
+        if self.step < self.last_step {
+            return None;
+        }
+        let found = self.found.iter().copied().chain(std::iter::repeat(0.0));
+        Some(largest(self.expected.iter().zip(found).map(|(e, f)| (f - e).abs())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes::truth::by_hand;
+
+    /// Semi-implicit Euler at 1/256 s, bouncing at the end of a substep below ground.
+    /// The exact variant puts the ball where Q is what e² leaves of it.
+    fn run(height: f64, restitution: f64, steps: u64, exact: bool) -> Apexes {
+        let mut apexes = Apexes::new(
+            steps,
+            (1..=counted(height, restitution)).map(|k| height * restitution.powi(2 * k as i32)).collect(),
+        );
+        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.0]]);
+        let (h, mut y, mut v) = (1.0 / 256.0, height, 0.0_f64);
+        for step in 1..=steps {
+            for _ in 0..4 {
+                v -= G * h;
+                y += h * v;
+                if y <= 0.0 && v < -1.0 {
+                    let q = y + v * v / (2.0 * G) - 0.5 * v * h;
+                    v *= -restitution;
+                    if exact {
+                        y = restitution * restitution * q - v * v / (2.0 * G) + 0.5 * v * h;
+                    }
+                } else if y <= 0.0 {
+                    (y, v) = (0.0, 0.0);
+                }
+            }
+            (bodies.position_y[1], bodies.velocity_y[1]) = ((y + RADIUS) as f32, v as f32);
+            apexes.see(&by_hand::view(&bodies, step));
+        }
+        apexes
+    }
+
+    #[test]
+    fn four_impacts_from_ten_metres_are_fast_enough() {
+        assert_eq!(counted(10.0, 0.5), 4);
+    }
+
+    #[test]
+    fn apexes_that_are_right_have_no_error() {
+        let apexes = run(10.0, 0.5, 320, true);
+        assert_eq!(apexes.found.len(), 4);
+        // y up to 3 m and v²/2g from f32: a few times 1e-7.
+        assert!(apexes.error().unwrap() < 1e-6, "{:?}", apexes.found);
+        assert_eq!(run(10.0, 0.5, 320, false).error().map(|e| e > 1e-3), Some(true));
+    }
+
+    #[test]
+    fn bounces_that_never_come_count_as_zero() {
+        let mut apexes = Apexes::new(1, vec![2.5, 0.625]);
+        assert_eq!(apexes.error(), None);
+        let bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5]]);
+        apexes.see(&by_hand::view(&bodies, 1));
+        assert_eq!(apexes.error(), Some(2.5));
+    }
+}

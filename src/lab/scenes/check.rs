@@ -1,0 +1,191 @@
+//! From a scene to a world: every value checked, geometry rounded to `f32`.
+
+use super::format::{Geometry, Scene, SceneBody, SceneShape};
+use crate::engine::bodies::{BodyDef, BodyKind, ShapeDef};
+use crate::engine::shapes::{MassProperties, Shape, combine};
+use crate::engine::world::{Settings, World};
+use crate::lab::error::Error;
+use glam::Vec2;
+
+/// Most bodies of a scene.
+pub const MAX_BODIES: usize = 1_000_000;
+
+impl Scene {
+    /// Whether a world can be made of this scene.
+    ///
+    /// Errors, naming place and value: an empty name; a number that is not
+    /// finite in `f32`; `dt` ≤ 0; no steps; more than [`MAX_BODIES`]; density
+    /// ≤ 0; negative friction or damping; restitution outside [0, 1]; a shape
+    /// that [`Shape`]'s constructors refuse; a dynamic body without mass.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.check_head()?;
+        self.bodies.iter().enumerate().try_for_each(|(i, body)| body_def(i, body).map(drop))
+    }
+
+    fn check_head(&self) -> Result<(), Error> {
+        if self.name.trim().is_empty() {
+            return Err(Error::invalid("name", format!("must not be empty, is '{}'", self.name)));
+        }
+        finite_pair("gravity", self.gravity)?;
+        positive("dt", self.dt)?;
+        if self.steps == 0 {
+            return Err(Error::invalid("steps", "must be at least 1, is 0"));
+        }
+        if self.bodies.len() > MAX_BODIES {
+            let message = format!("{} bodies, where at most {MAX_BODIES} are possible", self.bodies.len());
+            return Err(Error::invalid("bodies", message));
+        }
+        Ok(())
+    }
+
+    /// The bodies as a world takes them. Errors: as [`Scene::validate`].
+    pub fn body_defs(&self) -> Result<Vec<BodyDef>, Error> {
+        self.check_head()?;
+        self.bodies.iter().enumerate().map(|(i, body)| body_def(i, body)).collect()
+    }
+
+    /// A world with these bodies, in their order; gravity and step are the
+    /// scene's, everything else is that of `settings`. Errors: as [`Scene::validate`].
+    pub fn build(&self, settings: Settings) -> Result<World, Error> {
+        let bodies = self.body_defs()?;
+        let gravity = self.gravity.map(|g| g as f32);
+        let mut world = World::new(Settings { gravity, dt: self.dt as f32, ..settings });
+        for body in &bodies {
+            world.add_body(body);
+        }
+        Ok(world)
+    }
+}
+
+fn body_def(index: usize, body: &SceneBody) -> Result<BodyDef, Error> {
+    let at = |name: &str| format!("bodies[{index}].{name}");
+    finite_pair(&at("position"), body.position)?;
+    finite(&at("angle"), body.angle)?;
+    finite_pair(&at("velocity"), body.velocity)?;
+    finite(&at("angular_velocity"), body.angular_velocity)?;
+    finite(&at("gravity_scale"), body.gravity_scale)?;
+    not_negative(&at("linear_damping"), body.linear_damping)?;
+    not_negative(&at("angular_damping"), body.angular_damping)?;
+    let shapes = body.shapes.iter().enumerate().map(|(k, s)| shape_def(&at(&format!("shapes[{k}]")), s));
+    let def = BodyDef {
+        kind: body.kind,
+        position: body.position,
+        angle: body.angle,
+        velocity: body.velocity,
+        angular_velocity: body.angular_velocity,
+        gravity_scale: body.gravity_scale,
+        linear_damping: body.linear_damping,
+        angular_damping: body.angular_damping,
+        group: body.group,
+        shapes: shapes.collect::<Result<_, _>>()?,
+    };
+    if def.kind == BodyKind::Dynamic {
+        if def.shapes.is_empty() {
+            return Err(Error::invalid(at("shapes"), "a dynamic body needs at least one shape, has 0"));
+        }
+        let MassProperties { mass, inertia, .. } = mass_properties(&def);
+        for (name, value) in [("mass", mass as f32), ("inertia", inertia as f32)] {
+            // The reciprocal is what the solver holds, so it must be a number too.
+            if !(value.is_normal() && value.recip().is_normal()) {
+                let message = format!("the {name} of a dynamic body must be positive and finite, is {value}");
+                return Err(Error::invalid(at("shapes"), message));
+            }
+        }
+    }
+    Ok(def)
+}
+
+/// Mass (kg), centre (m, in the body's frame) and inertia (kg·m²) of all shapes of a body.
+pub(super) fn mass_properties(body: &BodyDef) -> MassProperties {
+    combine(&body.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
+}
+
+fn shape_def(place: &str, shape: &SceneShape) -> Result<ShapeDef, Error> {
+    let at = |name: &str| format!("{place}.{name}");
+    positive(&at("density"), shape.density)?;
+    not_negative(&at("friction"), shape.friction)?;
+    finite(&at("restitution"), shape.restitution)?;
+    if !(0.0..=1.0).contains(&shape.restitution) {
+        return Err(Error::invalid(
+            at("restitution"),
+            format!("must be in [0, 1], is {}", shape.restitution),
+        ));
+    }
+    Ok(ShapeDef {
+        shape: geometry(place, &shape.geometry)?,
+        density: shape.density,
+        friction: shape.friction,
+        restitution: shape.restitution,
+    })
+}
+
+/// The range checks stand in [`Shape`]'s constructors; here only the rounding to
+/// `f32`, which must not make an infinity of a finite number.
+fn geometry(place: &str, geometry: &Geometry) -> Result<Shape, Error> {
+    let at = |name: &str| format!("{place}.{name}");
+    let point = |name: &str, p: [f64; 2]| {
+        finite_pair(&at(name), p)?;
+        Ok::<Vec2, Error>(Vec2::new(p[0] as f32, p[1] as f32))
+    };
+    let number = |name: &str, x: f64| {
+        finite(&at(name), x)?;
+        Ok::<f32, Error>(x as f32)
+    };
+    let shape = match geometry {
+        Geometry::Circle(c) => Shape::circle(
+            &at("circle"),
+            point("circle.center", c.center)?,
+            number("circle.radius", c.radius)?,
+        ),
+        Geometry::Box(b) => Shape::rectangle(
+            &at("box"),
+            point("box.half", b.half)?,
+            point("box.center", b.center)?,
+            number("box.angle", b.angle)?,
+            number("box.radius", b.radius)?,
+        ),
+        Geometry::Polygon(p) => {
+            let points = p.points.iter().enumerate().map(|(i, &v)| point(&format!("polygon.points[{i}]"), v));
+            let points = points.collect::<Result<Vec<_>, _>>()?;
+            Shape::polygon(&at("polygon"), &points, number("polygon.radius", p.radius)?)
+        }
+        Geometry::Capsule(c) => Shape::capsule(
+            &at("capsule"),
+            point("capsule.a", c.a)?,
+            point("capsule.b", c.b)?,
+            number("capsule.radius", c.radius)?,
+        ),
+        Geometry::Segment(s) => {
+            Shape::segment(&at("segment"), point("segment.a", s.a)?, point("segment.b", s.b)?)
+        }
+    }?;
+    Ok(shape)
+}
+
+fn finite(place: &str, value: f64) -> Result<(), Error> {
+    if (value as f32).is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(place, format!("must be finite in 32 bits, is {value:?}")))
+}
+
+fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
+    (0..2).try_for_each(|k| finite(&format!("{place}[{k}]"), value[k]))
+}
+
+fn positive(place: &str, value: f64) -> Result<(), Error> {
+    finite(place, value)?;
+    // Too small for 32 bits is zero.
+    if value as f32 > 0.0 {
+        return Ok(());
+    }
+    Err(Error::invalid(place, format!("must be positive, is {value:?}")))
+}
+
+fn not_negative(place: &str, value: f64) -> Result<(), Error> {
+    finite(place, value)?;
+    if value >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::invalid(place, format!("must not be negative, is {value:?}")))
+}

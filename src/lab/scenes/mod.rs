@@ -1,0 +1,180 @@
+//! Scenes: their file format, a catalogue of them, and what is known about each.
+//!
+//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 or C11
+//! in the scene files are those of the list of hard cases.
+
+mod arch;
+mod bounce;
+mod card_house;
+mod check;
+mod circle_pile;
+mod collision;
+mod column;
+mod compounds;
+mod dominoes;
+mod far;
+mod format;
+mod free;
+mod friction_ramp;
+mod incline;
+mod junkyard;
+mod mass_ratio;
+mod overlap;
+mod parts;
+mod place;
+mod pyramid;
+mod single_box;
+mod sliding;
+mod smash;
+mod truth;
+mod tumbler;
+mod washer;
+
+pub use check::MAX_BODIES;
+pub use format::{
+    Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
+};
+pub use truth::{Observer, Truth};
+
+use crate::lab::error::Error;
+
+/// Every scene of the crate, as the command line lists them.
+pub static CATALOG: &[Entry] = &[
+    free::FALL,
+    free::SPIN,
+    incline::STICK,
+    incline::SLIP,
+    incline::ROLL,
+    incline::SLIPPING_DISC,
+    sliding::STOP,
+    sliding::ROLL,
+    bounce::BOUNCE,
+    bounce::ELASTIC,
+    collision::OBLIQUE,
+    single_box::DROP,
+    column::DISCS,
+    column::BOXES,
+    column::ZIGZAG,
+    column::CIRCLES,
+    far::STACK,
+    mass_ratio::PAIR,
+    mass_ratio::TOPS,
+    mass_ratio::LARGE_ON_SMALL,
+    friction_ramp::RAMP,
+    overlap::RECOVERY,
+    pyramid::PYRAMID,
+    pyramid::LARGE,
+    pyramid::MANY,
+    arch::ARCH,
+    dominoes::DOMINOES,
+    card_house::HOUSE,
+    washer::WASHER,
+    tumbler::TUMBLER,
+    smash::SMASH,
+    junkyard::JUNKYARD,
+    compounds::COMPOUNDS,
+    circle_pile::PILE,
+];
+
+/// A row of [`CATALOG`].
+#[derive(Debug)]
+pub struct Entry {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// One line for lists.
+    pub summary: &'static str,
+    /// The number after the colon, for scenes that have one.
+    pub size: Option<Size>,
+    /// Makes the scene; a size is within its range, and 0 where there is none.
+    pub build: fn(u32) -> Scene,
+    /// Makes it from a size and a seed, for scenes with chance in them.
+    pub seeded: Option<fn(u32, u64) -> Scene>,
+    /// What is known about the scene of that size, for a run of its `steps` at its `dt`.
+    pub truth: Option<fn(&Scene, u32) -> Truth>,
+}
+
+/// A whole number that a scene is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Where none is given.
+    pub default: u32,
+    /// Least.
+    pub min: u32,
+    /// Greatest.
+    pub max: u32,
+    /// What it counts.
+    pub meaning: &'static str,
+}
+
+impl Entry {
+    const fn new(name: &'static str, summary: &'static str, build: fn(u32) -> Scene) -> Self {
+        Self { name, summary, size: None, build, seeded: None, truth: None }
+    }
+
+    const fn sized(self, default: u32, min: u32, max: u32, meaning: &'static str) -> Self {
+        Self { size: Some(Size { default, min, max, meaning }), ..self }
+    }
+
+    const fn seeded(self, seeded: fn(u32, u64) -> Scene) -> Self {
+        Self { seeded: Some(seeded), ..self }
+    }
+
+    const fn known(self, truth: fn(&Scene, u32) -> Truth) -> Self {
+        Self { truth: Some(truth), ..self }
+    }
+
+    /// The size that `text` asks for.
+    fn parse_size(&self, text: Option<&str>) -> Result<u32, Error> {
+        let refuse = |message| Err(Error::invalid(format!("scene '{}'", self.name), message));
+        match (self.size, text) {
+            (None, None) => Ok(0),
+            (Some(size), None) => Ok(size.default),
+            (None, Some(text)) => refuse(format!("has no size, got '{text}'")),
+            (Some(Size { min, max, meaning, .. }), Some(text)) => match text.parse() {
+                Ok(value) if (min..=max).contains(&value) => Ok(value),
+                _ => refuse(format!("size '{text}' is not a whole number from {min} to {max} ({meaning})")),
+            },
+        }
+    }
+}
+
+/// A scene of the catalogue, and what is known about it.
+pub struct Loaded {
+    /// Ready to build.
+    pub scene: Scene,
+    /// None where nothing is known.
+    pub truth: Option<Truth>,
+}
+
+/// A scene by its name, with its size after a colon: `arch`, `stack`, `stack:40`.
+///
+/// Errors: a name that is not in [`CATALOG`]; a size that is none, or out of its range.
+pub fn load(name: &str) -> Result<Loaded, Error> {
+    load_with(name, None)
+}
+
+/// As [`load`], with a seed for what is random in the scene. The same seed
+/// gives the same scene; a scene without chance in it ignores the seed.
+pub fn load_with_seed(name: &str, seed: u64) -> Result<Loaded, Error> {
+    load_with(name, Some(seed))
+}
+
+fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
+    let (stem, size) = match name.split_once(':') {
+        Some((stem, size)) => (stem, Some(size)),
+        None => (name, None),
+    };
+    let Some(entry) = CATALOG.iter().find(|e| e.name == stem) else {
+        return Err(Error::unknown("scene", stem, CATALOG.iter().map(|e| e.name)));
+    };
+    let size = entry.parse_size(size)?;
+    let mut scene = match (entry.seeded, seed) {
+        (Some(build), Some(seed)) => build(size, seed),
+        _ => (entry.build)(size),
+    };
+    if entry.size.is_some() {
+        scene.name = format!("{stem}:{size}");
+    }
+    let truth = entry.truth.map(|truth| truth(&scene, size));
+    Ok(Loaded { scene, truth })
+}

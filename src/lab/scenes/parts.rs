@@ -1,0 +1,152 @@
+//! Words that scenes are written in.
+
+use super::format::*;
+use super::truth::View;
+use crate::engine::bodies::BodyKind;
+use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
+
+impl Scene {
+    /// A scene with default gravity, step and length.
+    pub fn new(name: impl Into<String>, bodies: Vec<SceneBody>) -> Self {
+        Self { name: name.into(), gravity: DEFAULT_GRAVITY, dt: DEFAULT_DT, steps: DEFAULT_STEPS, bodies }
+    }
+
+    /// The same scene, run for `steps` steps.
+    pub fn steps(self, steps: u32) -> Self {
+        Self { steps, ..self }
+    }
+
+    /// The same scene without gravity.
+    pub fn weightless(self) -> Self {
+        Self { gravity: [0.0, 0.0], ..self }
+    }
+}
+
+impl SceneBody {
+    /// A body at rest with one shape, its frame's origin at `position` (m).
+    pub fn new(kind: BodyKind, position: [f64; 2], shape: SceneShape) -> Self {
+        Self {
+            kind,
+            position,
+            angle: 0.0,
+            velocity: [0.0, 0.0],
+            angular_velocity: 0.0,
+            gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            group: 0,
+            shapes: vec![shape],
+        }
+    }
+
+    /// A body that never moves.
+    pub fn fixed(position: [f64; 2], shape: SceneShape) -> Self {
+        Self::new(BodyKind::Static, position, shape)
+    }
+
+    /// A body that forces move.
+    pub fn dynamic(position: [f64; 2], shape: SceneShape) -> Self {
+        Self::new(BodyKind::Dynamic, position, shape)
+    }
+
+    /// The same body at an angle (rad).
+    pub fn turned(self, angle: f64) -> Self {
+        Self { angle, ..self }
+    }
+
+    /// The same body with a velocity (m/s) and a spin (rad/s).
+    pub fn moving(self, velocity: [f64; 2], angular_velocity: f64) -> Self {
+        Self { velocity, angular_velocity, ..self }
+    }
+}
+
+impl SceneShape {
+    /// A shape with the default surface.
+    pub fn new(geometry: Geometry) -> Self {
+        Self { geometry, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
+    }
+
+    /// A disc about the origin (m).
+    pub fn disc(radius: f64) -> Self {
+        Self::new(Geometry::Circle(Circle { center: [0.0, 0.0], radius }))
+    }
+
+    /// A rectangle about the origin with half extents (m).
+    pub fn rectangle(half_width: f64, half_height: f64) -> Self {
+        Self::rectangle_at([half_width, half_height], [0.0, 0.0])
+    }
+
+    /// A rectangle with half extents about `center` (m).
+    pub fn rectangle_at(half: [f64; 2], center: [f64; 2]) -> Self {
+        Self::new(Geometry::Box(Rectangle { half, center, angle: 0.0, radius: 0.0 }))
+    }
+
+    /// A convex polygon (m).
+    pub fn polygon(points: Vec<[f64; 2]>) -> Self {
+        Self::new(Geometry::Polygon(Polygon { points, radius: 0.0 }))
+    }
+
+    /// A horizontal line of half length `half` (m) through the origin.
+    pub fn line(half: f64) -> Self {
+        Self::new(Geometry::Segment(Segment { a: [-half, 0.0], b: [half, 0.0] }))
+    }
+
+    /// The same shape with a density (kg/m²).
+    pub fn density(self, density: f64) -> Self {
+        Self { density, ..self }
+    }
+
+    /// The same shape with a friction coefficient (1).
+    pub fn friction(self, friction: f64) -> Self {
+        Self { friction, ..self }
+    }
+
+    /// The same shape with a restitution (1).
+    pub fn restitution(self, restitution: f64) -> Self {
+        Self { restitution, ..self }
+    }
+}
+
+/// Ground at height 0: a line of half length `half` (m).
+pub(super) fn ground_line(half: f64) -> SceneBody {
+    SceneBody::fixed([0.0, 0.0], SceneShape::line(half))
+}
+
+/// Ground with its top at height 0: a box of half extents (`half`, 1) (m).
+pub(super) fn ground_box(half: f64) -> SceneBody {
+    SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(half, 1.0))
+}
+
+/// A yard with its floor's middle at height 0: metre blocks from −`half` to `half`, and walls
+/// `height` of them high at both ends. Blocks overlap by 0.1 m, so that nothing slips through.
+pub(super) fn yard(half: i32, height: i32) -> SceneBody {
+    let (half_width, mut shapes) = (f64::from(half), Vec::new());
+    for x in -half..=half {
+        shapes.push(SceneShape::rectangle_at([0.55, 0.5], [f64::from(x), 0.0]));
+    }
+    for y in 1..=height {
+        for x in [-half_width, half_width] {
+            shapes.push(SceneShape::rectangle_at([0.5, 0.55], [x, f64::from(y)]));
+        }
+    }
+    SceneBody { shapes, ..SceneBody::fixed([0.0, 0.0], SceneShape::line(1.0)) }
+}
+
+/// Bodies whose centre is below the middle of a floor at height 0; NaN counts.
+pub(super) fn below_floor(view: &View) -> usize {
+    let above = |&i: &usize| !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0;
+    view.bodies.len() - (0..view.bodies.len()).filter(above).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes::truth::by_hand;
+
+    #[test]
+    fn below_the_floor_are_dynamic_bodies_and_nan() {
+        let mut bodies = by_hand::bodies(&[[0.0, -1.0], [0.0, 0.5], [0.0, -0.1], [0.0, f32::NAN]]);
+        bodies.kind[0] = BodyKind::Static;
+        assert_eq!(below_floor(&by_hand::view(&bodies, 1)), 2);
+    }
+}

@@ -1,0 +1,332 @@
+//! Known truths, and observers that measure how far a world is from them.
+//!
+//! An observer sees a world after each step and nothing else: not which solver
+//! ran, nor how long it took. It reads the `f32` state and computes in `f64`.
+//! Where the truth of a semi-implicit Euler scheme with n substeps is known
+//! exactly, the observer compares with that, so that a correct solver's error is
+//! rounding, not discretisation.
+
+use super::check::mass_properties;
+use super::format::Scene;
+use crate::engine::bodies::{Bodies, BodyKind};
+use crate::engine::contacts::Contact;
+use crate::engine::world::World;
+
+/// Measures one number along a run.
+pub trait Observer {
+    /// Looks at `world` after one more step.
+    fn observe(&mut self, world: &World);
+
+    /// Distance to the truth so far; none while there is nothing to compare yet,
+    /// infinite after a number that is not one, or where the truth has become unreachable.
+    fn error(&self) -> Option<f64>;
+}
+
+/// Something known about a scene, and who measures it.
+pub struct Truth {
+    /// What is measured.
+    pub quantity: &'static str,
+    /// Of `expected` and of the error.
+    pub unit: &'static str,
+    /// The value that the exact rigid bodies have (in the limit of small steps).
+    pub expected: f64,
+    /// Its error is the distance to the truth, in `unit`.
+    pub observer: Box<dyn Observer>,
+}
+
+impl Truth {
+    pub(super) fn new(
+        quantity: &'static str,
+        unit: &'static str,
+        expected: f64,
+        observer: impl Observer + 'static,
+    ) -> Self {
+        Self { quantity, unit, expected, observer: Box::new(observer) }
+    }
+}
+
+/// What observers may see of a world: plain state, so that tests make it by hand.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub bodies: &'a Bodies,
+    pub contacts: &'a [Contact],
+    /// Steps taken.
+    pub step: u64,
+    /// s
+    pub dt: f64,
+    /// Substeps per step.
+    pub substeps: u32,
+    /// Whether `Contact::step_impulse` is kept.
+    pub impulses: bool,
+}
+
+impl<'a> View<'a> {
+    pub fn of(world: &'a World) -> Self {
+        Self {
+            bodies: &world.bodies,
+            contacts: &world.contacts,
+            step: world.step_index,
+            dt: f64::from(world.settings.dt),
+            substeps: world.settings.budget.substeps.max(1),
+            impulses: world.settings.record_impulses,
+        }
+    }
+
+    /// s
+    pub fn time(&self) -> f64 {
+        self.step as f64 * self.dt
+    }
+
+    /// Substeps taken.
+    pub fn n(&self) -> f64 {
+        self.step as f64 * f64::from(self.substeps)
+    }
+
+    /// Substep (s).
+    pub fn h(&self) -> f64 {
+        self.dt / f64::from(self.substeps)
+    }
+
+    /// Distance covered from rest under the constant acceleration `a` (m/s²).
+    ///
+    /// Semi-implicit Euler: v_j = j a h and x_n = h Σ v_j = a h² n(n+1)/2. With
+    /// t = n h that is a t²/2 (1 + 1/n): exact, for every n.
+    pub fn accelerated(&self, a: f64) -> f64 {
+        let (t, n) = (self.time(), self.n());
+        if n == 0.0 { 0.0 } else { 0.5 * a * t * t * (1.0 + 1.0 / n) }
+    }
+
+    /// Centre of mass of body `i` (m).
+    pub fn center(&self, i: usize) -> [f64; 2] {
+        self.bodies.center(i)
+    }
+
+    /// m/s
+    pub fn velocity(&self, i: usize) -> [f64; 2] {
+        [f64::from(self.bodies.velocity_x[i]), f64::from(self.bodies.velocity_y[i])]
+    }
+}
+
+/// The largest of distances and 0. A NaN, which `f64::max` would drop, is infinite.
+pub(super) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
+    distances.into_iter().fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })
+}
+
+/// A measurement of one view: the distance to the truth, if it can be told.
+pub(super) type Distance = Box<dyn FnMut(&View) -> Option<f64>>;
+
+/// The worst distance to the truth over all steps from `from` on.
+pub(super) struct Worst {
+    from: u64,
+    distance: Distance,
+    worst: Option<f64>,
+}
+
+impl Worst {
+    /// Looks at every step from number `from` (the first is 1) on.
+    pub fn from_step(from: u64, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
+        Self { from, distance: Box::new(distance), worst: None }
+    }
+
+    /// Looks at the last second of `scene`, or at all of it if it is shorter.
+    pub fn last_second(scene: &Scene, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
+        let second = (1.0 / scene.dt).round() as u64;
+        Self::from_step(u64::from(scene.steps).saturating_sub(second) + 1, distance)
+    }
+
+    /// Looks at time `t` (s) and later.
+    pub fn from_time(scene: &Scene, t: f64, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
+        Self::from_step((t / scene.dt).round() as u64, distance)
+    }
+
+    pub fn see(&mut self, view: &View) {
+        if view.step < self.from {
+            return;
+        }
+        if let Some(distance) = (self.distance)(view) {
+            self.worst = Some(largest([distance.abs(), self.worst.unwrap_or(0.0)]));
+        }
+    }
+}
+
+impl Observer for Worst {
+    fn observe(&mut self, world: &World) {
+        self.see(&View::of(world));
+    }
+
+    fn error(&self) -> Option<f64> {
+        self.worst
+    }
+}
+
+/// Upward load on all static bodies over the last step (N): the impulse that
+/// reaches dynamic bodies through contacts with them, against gravity.
+///
+/// In a contact with a static body, that body is a and the normal points from it.
+/// Friction counts nothing where static surfaces under load are horizontal, which
+/// is so in every scene that uses this.
+pub(super) fn ground_load(view: &View) -> Option<f64> {
+    if !view.impulses {
+        return None;
+    }
+    let on_ground = |c: &&Contact| view.bodies.kind[c.body_a as usize] == BodyKind::Static;
+    let upward = |c: &Contact| {
+        let count = (c.manifold.count as usize).min(2);
+        let normal: f64 = c.step_impulse[..count].iter().map(|i| f64::from(i[0])).sum();
+        normal * f64::from(c.manifold.normal.y)
+    };
+    Some(view.contacts.iter().filter(on_ground).map(upward).sum::<f64>() / view.dt)
+}
+
+/// Weight of all dynamic bodies (N): Σ m g.
+pub(super) fn weight(scene: &Scene) -> f64 {
+    let defs = scene.body_defs().unwrap_or_default();
+    let dynamic = defs.iter().filter(|b| b.kind == BodyKind::Dynamic);
+    let masses = dynamic.map(|b| mass_properties(b).mass * b.gravity_scale);
+    -scene.gravity[1] * masses.sum::<f64>()
+}
+
+/// Centres of mass at the start (m), by body.
+pub(super) fn start_centers(scene: &Scene) -> Vec<[f64; 2]> {
+    let center = |b: &crate::engine::bodies::BodyDef| {
+        let [x, y] = mass_properties(b).center;
+        let (sin, cos) = b.angle.sin_cos();
+        [b.position[0] + cos * x - sin * y, b.position[1] + sin * x + cos * y]
+    };
+    scene.body_defs().unwrap_or_default().iter().map(center).collect()
+}
+
+/// The sum rule of a pile at rest: momentum does not change, so the ground
+/// carries the weight, however the pile shares it out.
+pub(super) fn rests_on_ground(scene: &Scene) -> Truth {
+    let weight = weight(scene);
+    let off = move |view: &View| Some(ground_load(view)? - weight);
+    Truth::new("ground load, last second", "N", weight, Worst::last_second(scene, off))
+}
+
+/// A body that ends at rest with its centre at `height` (m).
+pub(super) fn rests_at(scene: &Scene, body: usize, height: f64) -> Truth {
+    let off = move |view: &View| Some(view.center(body)[1] - height);
+    Truth::new("resting height, last second", "m", height, Worst::last_second(scene, off))
+}
+
+/// A structure that stands: nothing falls. The error is the greatest drop of any
+/// dynamic body's centre below its start, over the whole run.
+pub(super) fn stands(scene: &Scene) -> Truth {
+    let start = start_centers(scene);
+    let drop = move |view: &View| Some(greatest_drop(view, &start));
+    Truth::new("greatest drop of a body", "m", 0.0, Worst::from_step(1, drop))
+}
+
+fn greatest_drop(view: &View, start: &[[f64; 2]]) -> f64 {
+    let dynamic = (0..view.bodies.len()).filter(|&i| view.bodies.is_dynamic(i));
+    largest(dynamic.map(|i| start[i][1] - view.center(i)[1]))
+}
+
+#[cfg(test)]
+pub(super) mod by_hand {
+    //! States made by hand, for tests of observers.
+
+    use super::*;
+
+    /// Dynamic bodies at centres (m), at rest.
+    pub fn bodies(centers: &[[f32; 2]]) -> Bodies {
+        let mut bodies = Bodies::default();
+        for &[x, y] in centers {
+            bodies.position_x.push(x);
+            bodies.position_y.push(y);
+            bodies.position_x_lo.push(0.0);
+            bodies.position_y_lo.push(0.0);
+            bodies.rotation_cos.push(1.0);
+            bodies.rotation_sin.push(0.0);
+            bodies.velocity_x.push(0.0);
+            bodies.velocity_y.push(0.0);
+            bodies.angular_velocity.push(0.0);
+            bodies.kind.push(BodyKind::Dynamic);
+        }
+        bodies
+    }
+
+    /// Step `step` of a run at 1/64 s, exact in binary, with four substeps.
+    pub fn view(bodies: &Bodies, step: u64) -> View<'_> {
+        View { bodies, contacts: &[], step, dt: 1.0 / 64.0, substeps: 4, impulses: true }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::contacts::Manifold;
+    use glam::Vec2;
+
+    #[test]
+    fn the_discrete_distance_is_the_sum_of_the_velocities() {
+        let none = Bodies::default();
+        let (mut x, mut v) = (0.0, 0.0);
+        for step in 0..50 {
+            let view = by_hand::view(&none, step);
+            // Sums of multiples of 2⁻¹⁶ and their exact products: no rounding to allow for but one.
+            assert!((view.accelerated(2.0) - x).abs() <= 1e-15, "step {step}");
+            for _ in 0..4 {
+                v += 2.0 * view.h();
+                x += v * view.h();
+            }
+        }
+        assert!(
+            (by_hand::view(&none, 50).accelerated(2.0) - by_hand::view(&none, 50).time().powi(2)).abs()
+                > 1e-3
+        );
+    }
+
+    #[test]
+    fn the_worst_counts_from_its_first_step_and_keeps_nan() {
+        let none = Bodies::default();
+        let mut worst = Worst::from_step(3, |view| match view.step {
+            9 => Some(f64::NAN),
+            5 => None,
+            step => Some(10.0 - step as f64),
+        });
+        let mut after = |step| {
+            worst.see(&by_hand::view(&none, step));
+            worst.error()
+        };
+        assert_eq!(after(1), None);
+        assert_eq!(after(2), None);
+        assert_eq!(after(3), Some(7.0));
+        assert_eq!(after(5), Some(7.0));
+        assert_eq!(after(20), Some(10.0));
+        assert_eq!(after(9), Some(f64::INFINITY));
+        assert_eq!(after(10), Some(f64::INFINITY));
+    }
+
+    #[test]
+    fn the_ground_load_sums_points_on_static_bodies_only() {
+        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5], [0.0, 1.5]]);
+        bodies.kind[0] = BodyKind::Static;
+        let contact = |body_a, body_b, count, impulses: [f32; 2]| Contact {
+            body_a,
+            body_b,
+            manifold: Manifold { normal: Vec2::Y, count, ..Default::default() },
+            step_impulse: impulses.map(|i| [i, 100.0]),
+            ..Default::default()
+        };
+        // 0.25 N·s in 1/64 s is 16 N; an unused point and a dynamic pair do not count.
+        let contacts =
+            [contact(0, 1, 2, [0.125, 0.125]), contact(0, 2, 1, [0.5, 9.0]), contact(1, 2, 2, [7.0, 7.0])];
+        let view = View { contacts: &contacts, ..by_hand::view(&bodies, 1) };
+        assert_eq!(ground_load(&view), Some(48.0));
+        assert_eq!(ground_load(&View { impulses: false, ..view }), None);
+    }
+
+    #[test]
+    fn only_falling_is_a_drop() {
+        let start = [[0.0, 1.0], [3.0, 2.0]];
+        let drop = |a: f32, b: f32| {
+            greatest_drop(&by_hand::view(&by_hand::bodies(&[[0.5, a], [3.0, b]]), 1), &start)
+        };
+        assert_eq!(drop(1.0, 2.0), 0.0);
+        assert_eq!(drop(1.5, 2.0), 0.0);
+        assert_eq!(drop(1.5, 1.75), 0.25);
+        assert_eq!(drop(f32::NAN, 2.0), f64::INFINITY);
+    }
+}

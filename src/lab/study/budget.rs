@@ -1,0 +1,161 @@
+//! Which budgets a study tries, and which are impossible.
+
+use crate::engine::params::Budget;
+use crate::engine::solvers::Variant;
+use crate::lab::error::Error;
+
+/// Most that any field of a budget may be: a slip of the finger should not run for a year.
+pub const LARGEST: u32 = 10_000;
+
+/// Values to try for each field of a [`Budget`]; where a list is empty, the solver's own.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct BudgetGrid {
+    /// [`Budget::substeps`]
+    pub substeps: Vec<u32>,
+    /// [`Budget::velocity_iterations`]
+    pub velocity_iterations: Vec<u32>,
+    /// [`Budget::relax_iterations`]
+    pub relax_iterations: Vec<u32>,
+    /// [`Budget::position_iterations`]
+    pub position_iterations: Vec<u32>,
+}
+
+impl BudgetGrid {
+    /// Every combination for `variant`, without those that differ only in what it ignores.
+    /// An empty grid gives half the solver's standard budget, that budget, and its double.
+    pub fn budgets(&self, variant: &Variant) -> Result<Vec<Budget>, Error> {
+        if *self == BudgetGrid::default() {
+            return Ok(halved_and_doubled(variant).to_vec());
+        }
+        let standard = variant.budget;
+        let or = |list: &[u32], used: bool, own: u32| {
+            if used && !list.is_empty() { list.to_vec() } else { vec![own] }
+        };
+        let uses = variant.uses;
+        let mut budgets = Vec::new();
+        for &substeps in &or(&self.substeps, true, standard.substeps) {
+            for &velocity_iterations in
+                &or(&self.velocity_iterations, uses.velocity, standard.velocity_iterations)
+            {
+                for &relax_iterations in &or(&self.relax_iterations, uses.relax, standard.relax_iterations) {
+                    for &position_iterations in
+                        &or(&self.position_iterations, uses.position, standard.position_iterations)
+                    {
+                        let budget =
+                            Budget { substeps, velocity_iterations, relax_iterations, position_iterations };
+                        check(&budget, variant)?;
+                        if !budgets.contains(&budget) {
+                            budgets.push(budget);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(budgets)
+    }
+}
+
+/// Scales substeps where the solver takes several, else its sweeps.
+fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
+    let standard = variant.budget;
+    [(1, 2), (1, 1), (2, 1)].map(|(times, over)| {
+        let scaled = |n: u32| if n == 0 { 0 } else { (n * times / over).max(1) };
+        if standard.substeps > 1 {
+            Budget { substeps: scaled(standard.substeps), ..standard }
+        } else {
+            Budget {
+                velocity_iterations: scaled(standard.velocity_iterations),
+                position_iterations: scaled(standard.position_iterations),
+                ..standard
+            }
+        }
+    })
+}
+
+/// Refuses a budget that `variant` cannot work with.
+pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
+    let fields = [
+        ("substeps", budget.substeps, true),
+        ("velocity_iterations", budget.velocity_iterations, variant.uses.velocity),
+        ("relax_iterations", budget.relax_iterations, false),
+        ("position_iterations", budget.position_iterations, false),
+    ];
+    for (name, value, needed) in fields {
+        if value == 0 && needed {
+            return Err(Error::invalid(name, format!("0 is too few: {} needs at least 1", variant.name)));
+        }
+        if value > LARGEST {
+            return Err(Error::invalid(name, format!("{value} is more than {LARGEST}")));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a contact stiffness (Hz) that no spring has.
+pub fn check_hertz(hertz: f32) -> Result<(), Error> {
+    if hertz > 0.0 && hertz.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::invalid("contact_hertz", format!("{hertz} is not a positive number")))
+    }
+}
+
+/// A budget in few letters, with the fields that `variant` reads: `4 sub · 1 vel · 1 rel`.
+pub fn brief(budget: &Budget, variant: &Variant) -> String {
+    let mut text = format!("{} sub", budget.substeps);
+    let fields = [
+        ("vel", budget.velocity_iterations, variant.uses.velocity),
+        ("rel", budget.relax_iterations, variant.uses.relax),
+        ("pos", budget.position_iterations, variant.uses.position),
+    ];
+    for (name, value, used) in fields {
+        if used {
+            text += &format!(" {value} {name}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::{VARIANTS, find};
+
+    #[test]
+    fn an_empty_grid_is_half_standard_and_double() {
+        let soft = find("soft_step").unwrap();
+        let substeps: Vec<_> =
+            BudgetGrid::default().budgets(soft).unwrap().iter().map(|b| b.substeps).collect();
+        assert_eq!(substeps, [2, 4, 8]);
+        for variant in &VARIANTS {
+            let budgets = BudgetGrid::default().budgets(variant).unwrap();
+            assert_eq!(budgets[1], variant.budget);
+            assert!(budgets.iter().all(|b| check(b, variant).is_ok()));
+        }
+    }
+
+    #[test]
+    fn what_a_solver_ignores_does_not_multiply_its_budgets() {
+        let grid = BudgetGrid {
+            substeps: vec![1, 2],
+            relax_iterations: vec![1, 2, 3],
+            position_iterations: vec![0, 5],
+            ..BudgetGrid::default()
+        };
+        assert_eq!(grid.budgets(find("pgs").unwrap()).unwrap().len(), 2);
+        assert_eq!(grid.budgets(find("soft_step").unwrap()).unwrap().len(), 6);
+        assert_eq!(grid.budgets(find("projection").unwrap()).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn impossible_budgets_name_the_field_and_the_value() {
+        let pgs = find("pgs").unwrap();
+        let message = |b: Budget| check(&b, pgs).unwrap_err().to_string();
+        assert!(message(Budget { substeps: 0, ..pgs.budget }).starts_with("substeps: 0"));
+        assert!(
+            message(Budget { velocity_iterations: 0, ..pgs.budget }).starts_with("velocity_iterations: 0")
+        );
+        assert!(message(Budget { position_iterations: 10_001, ..pgs.budget }).contains("10001"));
+        assert!(check(&Budget { position_iterations: 3, ..pgs.budget }, pgs).is_ok());
+    }
+}

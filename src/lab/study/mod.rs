@@ -1,0 +1,361 @@
+//! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
+//!
+//! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
+//! all cores at once, because no clock is read. *Times* come from a [race](mod@race) of the same
+//! setting in natural order and at every lane width, alone on the machine. All coloured
+//! widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
+
+pub mod ablation;
+pub mod budget;
+pub mod curve;
+pub mod interleave;
+pub mod pareto;
+pub mod profile;
+pub mod record;
+pub mod slices;
+
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::solvers::{VARIANTS, Variant};
+use crate::engine::world::{Divergence, Order, Settings};
+use crate::lab::error::Error;
+use crate::lab::metrics::{Errors, Observation};
+use crate::lab::scenes::{self, Loaded, Scene};
+use budget::BudgetGrid;
+use interleave::{race, speed_up};
+pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Scenes of the default study: each shows something that the others do not.
+pub const DEFAULT_SCENES: [&str; 11] = [
+    "incline_slip",
+    "bounce",
+    "disc_column:10",
+    "mass_ratio:100",
+    "stack:20",
+    "far_stack",
+    "friction_ramp",
+    "arch",
+    "card_house",
+    "pyramid:40",
+    "circle_pile:500",
+];
+
+/// What a study tries.
+#[derive(Clone, Debug)]
+pub struct StudyPlan {
+    /// Names of the catalogue, with sizes, or `.json` files.
+    pub scenes: Vec<String>,
+    /// Rows of [`VARIANTS`].
+    pub solvers: Vec<&'static Variant>,
+    /// Lane widths of coloured runs.
+    pub widths: Vec<LaneWidth>,
+    /// Constraint orders; natural order has one lane.
+    pub orders: Vec<Order>,
+    /// Work per step.
+    pub budgets: BudgetGrid,
+    /// Stiffness of soft contacts (Hz), for solvers that have them.
+    pub contact_hertz: f32,
+    /// Steps of an error run; where none, the scene's own.
+    pub steps: Option<u32>,
+    /// Most steps of a timing run.
+    pub timing_steps: u32,
+    /// Timing runs of each setting.
+    pub repeats: u32,
+    /// Shuffles the timing runs, and lays out scenes that have chance in them.
+    pub seed: u64,
+}
+
+impl Default for StudyPlan {
+    fn default() -> Self {
+        StudyPlan {
+            scenes: DEFAULT_SCENES.map(String::from).to_vec(),
+            solvers: VARIANTS.iter().collect(),
+            widths: LaneWidth::ALL.to_vec(),
+            orders: vec![Order::Natural, Order::Colored],
+            budgets: BudgetGrid::default(),
+            contact_hertz: CONTACT_HERTZ,
+            steps: None,
+            timing_steps: 200,
+            repeats: 3,
+            seed: 1,
+        }
+    }
+}
+
+impl StudyPlan {
+    /// A look at everything, in seconds: short runs, nothing repeated.
+    pub fn quick() -> Self {
+        StudyPlan { steps: Some(60), timing_steps: 20, repeats: 1, ..StudyPlan::default() }
+    }
+
+    /// Refuses what cannot be run, before anything is.
+    pub fn check(&self) -> Result<(), Error> {
+        let empty = [
+            ("scenes", self.scenes.is_empty()),
+            ("solvers", self.solvers.is_empty()),
+            ("lanes", self.widths.is_empty()),
+            ("orders", self.orders.is_empty()),
+        ];
+        if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
+            return Err(Error::invalid(name, "none given"));
+        }
+        budget::check_hertz(self.contact_hertz)?;
+        let counts = [("steps", self.steps.unwrap_or(1)), ("repeats", self.repeats)];
+        if let Some((name, _)) = counts.into_iter().find(|c| c.1 == 0) {
+            return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
+        }
+        for solver in &self.solvers {
+            self.budgets.budgets(solver)?;
+        }
+        let mut names = Vec::new();
+        for name in &self.scenes {
+            let scene = self.open(name)?.scene;
+            scene.validate()?;
+            if names.contains(&scene.name) {
+                return Err(Error::invalid("scenes", format!("two are called '{}'", scene.name)));
+            }
+            names.push(scene.name);
+        }
+        Ok(())
+    }
+
+    fn open(&self, name: &str) -> Result<Loaded, Error> {
+        open_scene(name, Some(self.seed), self.steps, None)
+    }
+}
+
+/// Whether a name means a file: it ends in `.json` or has a separator.
+pub fn is_path(name: &str) -> bool {
+    name.ends_with(".json") || name.contains(['/', '\\'])
+}
+
+/// A scene of the catalogue or of a file (a name with a separator, or that ends in `.json`), for
+/// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
+pub fn open_scene(
+    name: &str,
+    seed: Option<u64>,
+    steps: Option<u32>,
+    dt: Option<f64>,
+) -> Result<Loaded, Error> {
+    let mut loaded = if is_path(name) {
+        Loaded { scene: Scene::from_file(name)?, truth: None }
+    } else {
+        match seed {
+            Some(seed) => scenes::load_with_seed(name, seed)?,
+            None => scenes::load(name)?,
+        }
+    };
+    let scene = &mut loaded.scene;
+    let (own_steps, own_dt) = (scene.steps, scene.dt);
+    scene.steps = steps.unwrap_or(own_steps);
+    scene.dt = dt.unwrap_or(own_dt);
+    scene.validate()?;
+    if loaded.truth.is_some() && (scene.steps, scene.dt) != (own_steps, own_dt) {
+        let (stem, size) = name.split_once(':').unwrap_or((name, ""));
+        let entry = scenes::CATALOG.iter().find(|e| e.name == stem);
+        let size = size.parse().ok().or(entry.and_then(|e| e.size).map(|s| s.default));
+        loaded.truth = entry.and_then(|e| e.truth).map(|truth| truth(scene, size.unwrap_or(0)));
+    }
+    Ok(loaded)
+}
+
+/// What a study is at, for a progress bar.
+#[derive(Clone, Debug)]
+pub struct Progress {
+    /// Runs begun before this one.
+    pub done: usize,
+    /// Runs in all.
+    pub total: usize,
+    /// What runs now.
+    pub what: String,
+}
+
+/// The settings that share an error run and a race.
+struct Cell<'a> {
+    scene: usize,
+    name: &'a str,
+    solver: &'static Variant,
+    budget: Budget,
+}
+
+/// What an error run found.
+#[derive(Clone)]
+pub struct Outcome {
+    /// Those of the whole run; where it failed, by what.
+    pub errors: Result<Errors, Divergence>,
+    /// Distance to what is known about the scene.
+    pub truth: Option<TruthError>,
+    /// Hash after the steps of a timing run.
+    pub hash: u64,
+}
+
+/// Runs the plan; one record per scene, solver, budget, order and width, in that order.
+///
+/// Errors: what [`StudyPlan::check`] refuses. A run that diverges is a record, not an error.
+pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Record>, Error> {
+    plan.check()?;
+    let scenes: Vec<Scene> =
+        plan.scenes.iter().map(|n| Ok(plan.open(n)?.scene)).collect::<Result<_, Error>>()?;
+    let mut cells = Vec::new();
+    for (scene, name) in plan.scenes.iter().enumerate() {
+        for &solver in &plan.solvers {
+            for budget in plan.budgets.budgets(solver)? {
+                cells.push(Cell { scene, name, solver, budget });
+            }
+        }
+    }
+    let done = AtomicUsize::new(0);
+    let total = cells.len() * (plan.orders.len() + 1);
+    let tell = |verb: &str, cell: &Cell| {
+        let done = done.fetch_add(1, Ordering::Relaxed);
+        let budget = budget::brief(&cell.budget, cell.solver);
+        progress(Progress {
+            done,
+            total,
+            what: format!("{verb} {} · {} · {budget}", cell.name, cell.solver.name),
+        });
+    };
+    let outcomes = error_runs(plan, &cells, &tell)?;
+    let mut records = Vec::new();
+    for (cell, outcomes) in cells.iter().zip(&outcomes) {
+        tell("times", cell);
+        records.extend(timed_records(plan, &scenes[cell.scene], cell, outcomes)?);
+    }
+    mark_fronts(&mut records);
+    Ok(records)
+}
+
+/// Settings of a cell in one order at one width.
+fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
+    let contact_hertz = plan.contact_hertz;
+    Settings { width, order, budget: cell.budget, contact_hertz, ..Settings::new(cell.solver) }
+}
+
+/// Steps of a timing run.
+fn timing_steps(plan: &StudyPlan, scene: &Scene) -> u32 {
+    scene.steps.min(plan.timing_steps)
+}
+
+/// Every cell in every order, on all cores; `[cell][order]`.
+fn error_runs(
+    plan: &StudyPlan,
+    cells: &[Cell],
+    tell: &(dyn Fn(&str, &Cell) + Sync),
+) -> Result<Vec<Vec<Outcome>>, Error> {
+    let jobs: Vec<(usize, Order)> =
+        (0..cells.len()).flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
+    let next = AtomicUsize::new(0);
+    let found = Mutex::new(vec![None; jobs.len()]);
+    let work = || {
+        loop {
+            let job = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&(cell, order)) = jobs.get(job) else { return Ok::<(), Error>(()) };
+            tell("errors", &cells[cell]);
+            let outcome = error_run(plan, &cells[cell], order)?;
+            if let Ok(mut found) = found.lock() {
+                found[job] = Some(outcome);
+            }
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(jobs.len());
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers
+            .into_iter()
+            .try_for_each(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })?;
+    let found = found.into_inner().unwrap_or_default();
+    let outcomes: Vec<Outcome> = found.into_iter().flatten().collect();
+    Ok(outcomes.chunks(plan.orders.len()).map(<[Outcome]>::to_vec).collect())
+}
+
+fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Error> {
+    let loaded = plan.open(cell.name)?;
+    let width = match order {
+        Order::Natural => LaneWidth::W1,
+        Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
+    };
+    let timed = timing_steps(plan, &loaded.scene);
+    observe(loaded, settings(plan, cell, order, width), timed)
+}
+
+/// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
+pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
+    let Loaded { scene, mut truth } = loaded;
+    let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
+    let mut observation = Observation::new(&world);
+    let mut hash = 0;
+    for step in 1..=scene.steps {
+        if let Err(divergence) = world.step() {
+            return Ok(Outcome { errors: Err(divergence), truth: None, hash });
+        }
+        observation.observe(&world);
+        if let Some(blow_up) = observation.blown_up() {
+            return Ok(Outcome { errors: Err(blow_up), truth: None, hash });
+        }
+        if let Some(truth) = &mut truth {
+            truth.observer.observe(&world);
+        }
+        if step == hash_at {
+            hash = world.state_hash();
+        }
+    }
+    Ok(Outcome { errors: Ok(observation.errors()), truth: truth.as_ref().map(TruthError::of), hash })
+}
+
+/// Races a cell's orders and widths, those that did not diverge.
+fn timed_records(
+    plan: &StudyPlan,
+    scene: &Scene,
+    cell: &Cell,
+    outcomes: &[Outcome],
+) -> Result<Vec<Record>, Error> {
+    let mut rows = Vec::new();
+    for (&order, outcome) in plan.orders.iter().zip(outcomes) {
+        match order {
+            Order::Natural => rows.push((order, LaneWidth::W1, outcome)),
+            Order::Colored => rows.extend(plan.widths.iter().map(|&w| (order, w, outcome))),
+        }
+    }
+    let racing: Vec<Settings> = rows
+        .iter()
+        .filter(|row| row.2.errors.is_ok())
+        .map(|&(order, width, _)| settings(plan, cell, order, width))
+        .collect();
+    let mut laps = race(scene, &racing, timing_steps(plan, scene), plan.repeats, plan.seed)?.into_iter();
+    let mut records: Vec<Record> = Vec::new();
+    for (order, width, outcome) in rows {
+        let lap = match outcome.errors {
+            Ok(_) => laps.next().unwrap_or(Err(Divergence { step: 0, body: 0, speed: 0.0 })),
+            Err(divergence) => Err(divergence),
+        };
+        let failure = lap.as_ref().err().map(|&d| Failure::from(d));
+        let lap = lap.ok();
+        records.push(Record {
+            scene: scene.name.clone(),
+            bodies: scene.bodies.len(),
+            dt: scene.dt,
+            solver: cell.solver.name,
+            order,
+            lanes: width.lanes(),
+            budget: cell.budget,
+            budget_text: budget::brief(&cell.budget, cell.solver),
+            speed_up: None,
+            errors: outcome.errors.ok().filter(|_| failure.is_none()),
+            truth: outcome.truth,
+            bits_equal: lap.as_ref().map(|lap| lap.hash == outcome.hash),
+            front: Fronts::default(),
+            lap,
+            failure,
+        });
+    }
+    let one_lane = records.iter().find(|r| r.order == Order::Colored && r.lanes == 1);
+    if let Some(one_lane) = one_lane.and_then(|r| r.lap.clone()) {
+        for record in &mut records {
+            record.speed_up = record.lap.as_ref().and_then(|lap| speed_up(lap, &one_lane));
+        }
+    }
+    Ok(records)
+}

@@ -1,0 +1,205 @@
+//! What a study finds: a record per setting, and which records are on a front.
+
+use super::interleave::Sample;
+use super::pareto::{self, Point};
+use crate::engine::params::Budget;
+use crate::engine::world::{Divergence, Order};
+use crate::lab::metrics::Errors;
+use crate::lab::scenes::Truth;
+
+/// One row of the study: a scene, a solver, a budget, an order and a lane width.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Record {
+    /// Name with size.
+    pub scene: String,
+    /// Bodies in it.
+    pub bodies: usize,
+    /// Step (s).
+    pub dt: f64,
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Constraint order.
+    pub order: Order,
+    /// Lanes per instruction.
+    pub lanes: usize,
+    /// Work per step.
+    pub budget: Budget,
+    /// The same, for tables.
+    pub budget_text: String,
+    /// Times and counts; none if the run failed.
+    pub lap: Option<Sample>,
+    /// Times faster than one coloured lane; none without that run.
+    pub speed_up: Option<f64>,
+    /// Errors, the same for all widths; none if the run failed.
+    pub errors: Option<Errors>,
+    /// Distance to what is known about the scene.
+    pub truth: Option<TruthError>,
+    /// Whether this width ended in the same bits as the error run.
+    pub bits_equal: Option<bool>,
+    /// Fronts that the setting is on; only its fastest width is.
+    pub front: Fronts,
+    /// Why there is no result.
+    pub failure: Option<Failure>,
+}
+
+/// How far a run was from a known truth.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct TruthError {
+    /// What is known.
+    pub quantity: &'static str,
+    /// Of both numbers.
+    pub unit: &'static str,
+    /// The truth.
+    pub expected: f64,
+    /// Distance to it; none where the run never came to it.
+    pub error: Option<f64>,
+}
+
+impl TruthError {
+    /// What the observer found; an infinite distance is none.
+    pub fn of(truth: &Truth) -> Self {
+        let error = truth.observer.error().filter(|e| e.is_finite());
+        TruthError { quantity: truth.quantity, unit: truth.unit, expected: truth.expected, error }
+    }
+}
+
+/// Membership in the fronts of time against three errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Fronts {
+    /// Against the deepest penetration.
+    pub penetration: bool,
+    /// Against the contact-law residual (root mean square).
+    pub law: bool,
+    /// Against the distance to the truth.
+    pub truth: bool,
+}
+
+/// Where and when a run left all bounds.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Failure {
+    /// Step, from 1.
+    pub step: u64,
+    /// Body index.
+    pub body: usize,
+    /// m/s or rad/s; none where it is not a finite number.
+    pub speed: Option<f32>,
+}
+
+impl From<Divergence> for Failure {
+    fn from(d: Divergence) -> Self {
+        Failure { step: d.step, body: d.body, speed: Some(d.speed).filter(|s| s.is_finite()) }
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
+        match self.speed {
+            Some(speed) => write!(f, "moves at {speed:.3e} m/s"),
+            None => write!(f, "has no finite speed"),
+        }
+    }
+}
+
+/// Marks, scene by scene, the settings on each front. A setting is a solver, a budget and
+/// an order, at its fastest width.
+pub fn mark_fronts(records: &mut [Record]) {
+    for group in records.chunk_by_mut(|a, b| a.scene == b.scene) {
+        let fastest: Vec<usize> = (0..group.len()).filter(|&i| is_fastest(group, i)).collect();
+        let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
+            let (indices, points): (Vec<usize>, Vec<Point>) = fastest
+                .iter()
+                .filter_map(|&i| {
+                    let (lap, error) = (group[i].lap.as_ref()?, error(&group[i])?);
+                    Some((i, Point { time: lap.median_ns, spread: lap.spread_ns, error }))
+                })
+                .unzip();
+            for (i, on_front) in indices.into_iter().zip(pareto::front(&points)) {
+                *flag(&mut group[i].front) = on_front;
+            }
+        };
+        mark(|r| Some(r.errors?.penetration_max), |f| &mut f.penetration);
+        mark(|r| Some(r.errors?.law_rms), |f| &mut f.law);
+        mark(|r| r.truth?.error, |f| &mut f.truth);
+    }
+}
+
+/// Whether record `i` is the fastest width of its setting.
+fn is_fastest(group: &[Record], i: usize) -> bool {
+    let own = &group[i];
+    let time = |r: &Record| r.lap.as_ref().map(|lap| lap.median_ns);
+    let Some(own_time) = time(own) else { return false };
+    let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
+    group.iter().enumerate().all(|(j, r)| {
+        let faster = time(r).is_some_and(|t| t < own_time || (t == own_time && j < i));
+        !(same(r) && faster)
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::lab::study::interleave::Load;
+
+    /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
+    pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
+        let lap = Sample {
+            median_ns: 1e3 * time,
+            spread_ns: 0.0,
+            quartiles_ns: [0.0; 2],
+            phase_ns: Default::default(),
+            row_sweep_ns: 1.0,
+            load: Load::default(),
+            steps_ns: Vec::new(),
+            hash: 0,
+        };
+        Record {
+            scene: "stack:2".to_string(),
+            bodies: 3,
+            dt: 0.01,
+            solver: "pgs",
+            order: Order::Colored,
+            lanes,
+            budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+            budget_text: format!("{substeps} sub"),
+            lap: Some(lap),
+            speed_up: None,
+            errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),
+            truth: None,
+            bits_equal: Some(true),
+            front: Fronts::default(),
+            failure: None,
+        }
+    }
+
+    pub fn failed(lanes: usize) -> Record {
+        let failure = Failure { step: 7, body: 2, speed: None };
+        Record { lap: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
+    }
+
+    #[test]
+    fn only_the_fastest_width_of_a_setting_is_on_a_front() {
+        let mut records = vec![
+            record(1, 1, 20.0, 0.5),
+            record(8, 1, 10.0, 0.5),
+            record(1, 2, 30.0, 0.1),
+            record(8, 2, 15.0, 0.1),
+            record(8, 4, 40.0, 0.2),
+            failed(8),
+        ];
+        mark_fronts(&mut records);
+        let marked: Vec<bool> = records.iter().map(|r| r.front.penetration).collect();
+        assert_eq!(marked, [false, true, false, true, false, false]);
+        // All residuals are zero: only time counts. There is no truth.
+        let marked: Vec<bool> = records.iter().map(|r| r.front.law).collect();
+        assert_eq!(marked, [false, true, false, false, false, false]);
+        assert!(records.iter().all(|r| !r.front.truth));
+    }
+
+    #[test]
+    fn a_failure_without_a_finite_speed_says_so() {
+        let of = |speed| Failure::from(Divergence { step: 3, body: 1, speed }).to_string();
+        assert_eq!(of(f32::NAN), "diverged at step 3: body 1 has no finite speed");
+        assert_eq!(of(2e5), "diverged at step 3: body 1 moves at 2.000e5 m/s");
+    }
+}

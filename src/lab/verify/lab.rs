@@ -1,0 +1,357 @@
+//! Where cases are run: worlds of one solver, and readings of their state in `f64`.
+
+use super::{Failure, Finding, Sweep, SweepRow};
+use crate::engine::bodies::BodyKind;
+use crate::engine::contacts::Contact;
+use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP};
+use crate::engine::solvers::Variant;
+use crate::engine::world::{Settings, World};
+use crate::lab::scenes::{self, Scene, SceneBody, SceneShape};
+use std::f64::consts::TAU;
+
+/// Gravity of every case that has some (m/s²).
+pub(super) const G: f64 = -DEFAULT_GRAVITY[1];
+
+/// Overlap that position correction may leave (m).
+pub(super) const SLOP: f64 = LINEAR_SLOP as f64;
+
+/// Speed below which a pile counts as at rest (m/s): the jitter limit of case B5.
+pub(super) const REST: f64 = 1e-4;
+
+/// A solver to be judged, at its standard budget.
+pub struct Lab {
+    pub(super) settings: Settings,
+    change: Option<fn(&mut Scene)>,
+}
+
+impl Lab {
+    /// A laboratory for `solver` with its standard settings.
+    pub fn new(solver: &'static Variant) -> Self {
+        Lab { settings: Settings { record_impulses: true, ..Settings::new(solver) }, change: None }
+    }
+
+    /// The same laboratory, in which every scene is changed before it is built: to see that
+    /// wrong physics fails. The truths stay those of the unchanged scenes.
+    pub fn changing(self, change: fn(&mut Scene)) -> Self {
+        Lab { change: Some(change), ..self }
+    }
+
+    /// A world of `scene`.
+    pub(super) fn world(&self, mut scene: Scene) -> Result<World, Failure> {
+        if let Some(change) = self.change {
+            change(&mut scene);
+        }
+        Ok(scene.build(self.settings.clone())?)
+    }
+
+    /// Runs `scene` for `seconds` and looks at every step.
+    pub(super) fn run(
+        &self,
+        scene: Scene,
+        seconds: f64,
+        mut look: impl FnMut(&World),
+    ) -> Result<World, Failure> {
+        let mut world = self.world(scene)?;
+        for _ in 0..steps(&world, seconds) {
+            world.step()?;
+            look(&world);
+        }
+        Ok(world)
+    }
+
+    /// Runs a scene of the catalogue over its own length; the measured value is the error that
+    /// its truth's observer sees.
+    pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Result<Finding, Failure> {
+        let loaded = scenes::load(name)?;
+        let mut truth = loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no truth")))?;
+        let seconds = f64::from(loaded.scene.steps) * loaded.scene.dt;
+        self.run(loaded.scene, seconds, |world| truth.observer.observe(world))?;
+        let error = truth.observer.error().ok_or_else(|| Failure::Unmeasured("nothing observed".into()))?;
+        Ok(Finding::new(error, 0.0, tolerance))
+    }
+
+    /// A scene of the catalogue, to be watched by a case's own eyes.
+    pub(super) fn scene(&self, name: &str) -> Result<Scene, Failure> {
+        Ok(scenes::load(name)?.scene)
+    }
+
+    /// Substeps per step.
+    pub(super) fn substeps(&self) -> f64 {
+        f64::from(self.settings.budget.substeps.max(1))
+    }
+}
+
+/// Depth (m) at which a standard soft contact bears `load` (N) with the effective mass `mass` (kg): the
+/// spring's m ω² s = F, with twice the frequency on static bodies. Every solver is held to it, whatever
+/// its contacts are.
+pub(super) fn soft_depth(load: f64, mass: f64, on_static: bool) -> f64 {
+    let omega = TAU * f64::from(CONTACT_HERTZ) * if on_static { 2.0 } else { 1.0 };
+    load / (mass * omega * omega)
+}
+
+/// Whole steps in `seconds`.
+pub(super) fn steps(world: &World, seconds: f64) -> u64 {
+    (seconds / f64::from(world.settings.dt)).round() as u64
+}
+
+/// s
+pub(super) fn time(world: &World) -> f64 {
+    world.step_index as f64 * f64::from(world.settings.dt)
+}
+
+/// Centre of mass of body `i` (m).
+pub(super) fn center(world: &World, i: usize) -> [f64; 2] {
+    world.bodies.center(i)
+}
+
+/// m/s
+pub(super) fn velocity(world: &World, i: usize) -> [f64; 2] {
+    [f64::from(world.bodies.velocity_x[i]), f64::from(world.bodies.velocity_y[i])]
+}
+
+/// rad/s
+pub(super) fn spin(world: &World, i: usize) -> f64 {
+    f64::from(world.bodies.angular_velocity[i])
+}
+
+/// Component down a slope that falls to the right by `angle` (rad).
+pub(super) fn downhill([x, y]: [f64; 2], angle: f64) -> f64 {
+    x * angle.cos() - y * angle.sin()
+}
+
+/// Dynamic bodies: index, mass (kg), moment of inertia (kg·m²).
+pub(super) fn dynamic(world: &World) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
+    let b = &world.bodies;
+    let inverse = |x: f32| if x > 0.0 { 1.0 / f64::from(x) } else { 0.0 };
+    (0..b.len())
+        .filter(|&i| b.is_dynamic(i))
+        .map(move |i| (i, inverse(b.inv_mass[i]), inverse(b.inv_inertia[i])))
+}
+
+/// J
+pub(super) fn kinetic_energy(world: &World) -> f64 {
+    let of = |(i, m, inertia): (usize, f64, f64)| {
+        let ([x, y], w) = (velocity(world, i), spin(world, i));
+        0.5 * (m * (x * x + y * y) + inertia * w * w)
+    };
+    dynamic(world).map(of).sum()
+}
+
+/// kg
+pub(super) fn mass(world: &World) -> f64 {
+    dynamic(world).map(|(_, m, _)| m).sum()
+}
+
+/// √(2 E/m) (m/s).
+pub(super) fn rms_speed(world: &World) -> f64 {
+    (2.0 * kinetic_energy(world) / mass(world)).sqrt()
+}
+
+/// Normal impulse of a contact over the last step (N·s).
+pub(super) fn normal_impulse(contact: &Contact) -> f64 {
+    contact.step_impulse[..contact.manifold.points().len()].iter().map(|p| f64::from(p[0])).sum()
+}
+
+/// Impulse of a contact on its body b over the last step (N·s), along n and t = (n_y, −n_x).
+pub(super) fn impulse(contact: &Contact) -> [f64; 2] {
+    let n = contact.manifold.normal;
+    let (nx, ny) = (f64::from(n.x), f64::from(n.y));
+    let normal = normal_impulse(contact);
+    let points = contact.manifold.points().len();
+    let tangent: f64 = contact.step_impulse[..points].iter().map(|p| f64::from(p[1])).sum();
+    [normal * nx + tangent * ny, normal * ny - tangent * nx]
+}
+
+/// Upward load on static bodies over the last step (N).
+pub(super) fn ground_load(world: &World) -> f64 {
+    let on_ground = |c: &&Contact| world.bodies.kind[c.body_a as usize] == BodyKind::Static;
+    let sum: f64 = world.contacts.iter().filter(on_ground).map(|c| impulse(c)[1]).sum();
+    sum / f64::from(world.settings.dt)
+}
+
+/// How far the load under bodies of `mass` (kg) that rest as well as [`REST`] asks may be from their
+/// weight (N): in a step, no velocity may change by more than 2 · [`REST`].
+pub(super) fn load_tolerance(mass: f64, dt: f64) -> f64 {
+    2.0 * REST * mass / dt
+}
+
+/// Of every contact point: its two bodies, its depth (m, negative for a gap), and the depth at which a
+/// standard soft contact would bear the load that it bore over the last step (m).
+pub(super) fn depths(world: &World) -> Vec<([u32; 2], f64, f64)> {
+    let b = &world.bodies;
+    let dt = f64::from(world.settings.dt);
+    let mut all = Vec::new();
+    for c in &world.contacts {
+        let n = [f64::from(c.manifold.normal.x), f64::from(c.manifold.normal.y)];
+        let on_static = !b.is_dynamic(c.body_a as usize);
+        for (p, point) in c.manifold.points().iter().enumerate() {
+            let side = |body: u32, r: glam::Vec2| {
+                let arm = f64::from(r.x) * n[1] - f64::from(r.y) * n[0];
+                let i = body as usize;
+                f64::from(b.inv_mass[i]) + f64::from(b.inv_inertia[i]) * arm * arm
+            };
+            let k = side(c.body_a, point.anchor_a) + side(c.body_b, point.anchor_b);
+            let load = f64::from(c.step_impulse[p][0]) / dt;
+            let depth = -f64::from(point.separation);
+            all.push(([c.body_a, c.body_b], depth, soft_depth(load, 1.0 / k, on_static)));
+        }
+    }
+    all
+}
+
+/// The worst overlap in units of what is allowed: the slop, or the soft contact's depth under the
+/// load it bears, whichever is more.
+pub(super) fn overlap_ratio(world: &World) -> f64 {
+    largest(depths(world).into_iter().map(|(_, depth, soft)| depth.max(0.0) / soft.max(SLOP)))
+}
+
+/// The largest of `values` and 0; infinite if one is not a number.
+pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
+}
+
+/// Slope of the least-squares line through (t, x); NaN for fewer than two times.
+pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (mt, mx) = points.iter().fold((0.0, 0.0), |(a, b), (t, x)| (a + t / n, b + x / n));
+    let (tt, tx) =
+        points.iter().fold((0.0, 0.0), |(a, b), (t, x)| (a + (t - mt).powi(2), b + (t - mt) * (x - mx)));
+    tx / tt
+}
+
+/// Where in [`low`, `high`] `above` turns from false to true, to 2⁻¹⁸ of the interval; an end of it where
+/// it does not turn.
+pub(super) fn bisect(
+    mut low: f64,
+    mut high: f64,
+    mut above: impl FnMut(f64) -> Result<bool, Failure>,
+) -> Result<f64, Failure> {
+    if above(low)? {
+        return Ok(low);
+    }
+    if !above(high)? {
+        return Ok(high);
+    }
+    for _ in 0..18 {
+        let middle = 0.5 * (low + high);
+        *(if above(middle)? { &mut high } else { &mut low }) = middle;
+    }
+    Ok(0.5 * (low + high))
+}
+
+/// Tries a growing parameter; what is measured is the last value before the first that fails (0 if the
+/// first does), what is wanted is the last of all. `hold` gives a number for the table and whether it
+/// is good enough; a run that diverges does not hold.
+pub(super) fn sweep(
+    parameter: &'static str,
+    values: &[f64],
+    mut hold: impl FnMut(f64) -> Result<(f64, bool), Failure>,
+) -> Result<Finding, Failure> {
+    let mut rows = Vec::new();
+    for &value in values {
+        let (measured, holds) = match hold(value) {
+            Err(Failure::Diverged(_)) => (f64::INFINITY, false),
+            other => other?,
+        };
+        rows.push(SweepRow { value, measured, holds });
+    }
+    let held = rows.iter().take_while(|row| row.holds).last().map_or(0.0, |row| row.value);
+    let all = values.last().copied().unwrap_or(0.0);
+    Ok(Finding { sweep: Some(Sweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
+}
+
+/// Ground at height 0 of friction µ: a line of half length `half` (m).
+pub(super) fn ground(half: f64, friction: f64) -> SceneBody {
+    SceneBody::fixed([0.0, 0.0], SceneShape::line(half).friction(friction))
+}
+
+/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its centre
+/// `height` above it (m).
+pub(super) fn on_slope(angle: f64, friction: f64, shape: SceneShape, height: f64) -> Scene {
+    let (sin, cos) = angle.sin_cos();
+    let plank = SceneShape::rectangle(40.0, 0.5).friction(friction);
+    Scene::new(
+        "slope",
+        vec![
+            SceneBody::fixed([-0.5 * sin, -0.5 * cos], plank).turned(-angle),
+            SceneBody::dynamic([height * sin, height * cos], shape.friction(friction)).turned(-angle),
+        ],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::contacts::Manifold;
+    use crate::engine::solvers;
+    use glam::Vec2;
+
+    #[test]
+    fn slopes_thresholds_and_sweeps_by_hand() {
+        assert_eq!(slope(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]), 2.0);
+        assert_eq!(slope(&[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]), 0.0);
+        assert!((bisect(0.0, 1.0, |x| Ok(x > 0.3)).unwrap() - 0.3).abs() < 4e-6);
+        assert_eq!(bisect(0.0, 1.0, |_| Ok(true)).unwrap(), 0.0);
+        assert_eq!(bisect(0.0, 1.0, |_| Ok(false)).unwrap(), 1.0);
+        let found = |limit: f64| sweep("x", &[1.0, 2.0, 4.0], |x| Ok((2.0 * x, x < limit))).unwrap();
+        assert_eq!((found(3.0).measured, found(0.0).measured, found(9.0).measured), (2.0, 0.0, 4.0));
+        assert!(found(9.0).passed() && !found(3.0).passed());
+        assert_eq!(largest([1.0, f64::NAN]), f64::INFINITY);
+        assert_eq!(largest([]), 0.0);
+    }
+
+    #[test]
+    fn impulses_turn_into_the_frame_of_the_contact() {
+        let mut c = Contact { step_impulse: [[3.0, 1.0], [9.0, 9.0]], ..Default::default() };
+        c.manifold = Manifold { normal: Vec2::Y, count: 1, ..Default::default() };
+        // n = (0, 1), t = (1, 0).
+        assert_eq!(impulse(&c), [1.0, 3.0]);
+        c.manifold.normal = Vec2::X;
+        // n = (1, 0), t = (0, −1).
+        assert_eq!(impulse(&c), [3.0, -1.0]);
+        c.manifold.count = 2;
+        assert_eq!(impulse(&c), [12.0, -10.0]);
+    }
+
+    #[test]
+    fn a_disc_on_the_ground_sinks_by_g_over_omega_squared() {
+        assert!((soft_depth(10.0, 1.0, true) - 7.0362e-5).abs() < 1e-9);
+        assert!((soft_depth(10.0, 1.0, false) - 4.0 * 7.0362e-5).abs() < 4e-9);
+        assert!((soft_depth(140.0, 0.5, false) - 7.8805e-3).abs() < 1e-7);
+    }
+
+    #[test]
+    fn readings_of_a_world_made_by_hand() {
+        let lab = Lab::new(solvers::find("pgs").unwrap());
+        let shape = || SceneShape::rectangle(0.5, 0.5).density(2.0);
+        let body = SceneBody::dynamic([0.0, 0.49], shape()).moving([3.0, 4.0], 6.0);
+        let mut world = lab.world(Scene::new("one", vec![ground(5.0, 0.5), body])).unwrap();
+        // m = 2, I = 2/6: ½ 2 25 + ½ (1/3) 36.
+        assert!((kinetic_energy(&world) - 31.0).abs() < 1e-5);
+        assert_eq!(mass(&world), 2.0);
+        assert!((rms_speed(&world) - 31f64.sqrt()).abs() < 1e-6);
+        let points = [crate::engine::contacts::ManifoldPoint {
+            anchor_a: Vec2::ZERO,
+            anchor_b: Vec2::new(0.5, -0.5),
+            separation: -0.01,
+            ..Default::default()
+        }; 2];
+        let manifold = Manifold { normal: Vec2::Y, count: 1, points };
+        // 0.25 N·s in 1/60 s are 15 N.
+        let step_impulse = [[0.25, 0.0]; 2];
+        world.contacts = vec![Contact { body_a: 0, body_b: 1, manifold, step_impulse, ..Default::default() }];
+        assert!((ground_load(&world) - 15.0).abs() < 1e-5);
+        // k = 1/2 + 3/4, at 60 Hz.
+        let [(bodies, depth, soft)] = depths(&world)[..] else { panic!() };
+        assert_eq!(bodies, [0, 1]);
+        assert!((depth - 0.01).abs() < 1e-9);
+        assert!((soft - 15.0 * 1.25 / (TAU * 60.0).powi(2)).abs() < 1e-8);
+        assert_eq!(overlap_ratio(&world), depth / SLOP.max(soft));
+    }
+
+    #[test]
+    fn downhill_is_along_the_plank() {
+        assert!((downhill([2.0 * 0.3f64.cos(), -2.0 * 0.3f64.sin()], 0.3) - 2.0).abs() < 1e-15);
+        assert_eq!(downhill([0.3f64.sin(), 0.3f64.cos()], 0.3), 0.0);
+    }
+}

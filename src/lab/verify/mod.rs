@@ -1,0 +1,200 @@
+//! Hard cases: set-ups whose truth is known on paper, run against every solver.
+//!
+//! A case runs a scene, reads one number from the state in `f64` and compares it with the
+//! truth. It does not know which solver ran. A new case is one function in the file of its
+//! family and one row in [`CASES`]; ids such as A5 or B12 are those of the list of hard cases.
+//!
+//! # Tolerances
+//!
+//! They come from the list of hard cases or from a derivation that stands in the row, never from
+//! what passes. What fails is shown as failing.
+//!
+//! # What is required
+//!
+//! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], soft contacts in
+//! substeps) is required to pass, and which promise of its mathematics that rests on, or which it
+//! lacks. The exit code of `simpulse verify` asks for exactly those.
+//!
+//! | promise | because |
+//! |---|---|
+//! | free motion is exact on its discrete formula | semi-implicit Euler |
+//! | one body slides, sticks and rolls by Coulomb's law once loads are warm | friction rows are rigid, solved last |
+//! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
+//! | piles whose Gauss–Seidel rate leaves no error within the run come to rest | cos²(π/2N) and R/(1+R) per sweep |
+//! | overlap is pushed apart no faster than 3 m/s | the cap |
+//! | the distance from the origin and the length of a step do not matter | positions keep what their sums round away |
+//! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
+//! | discs roll without lifting off | their contact points do not turn with them |
+//!
+//! It does not promise:
+//!
+//! - Bounces among several bodies at once, which one pass per step cannot settle; one solution where
+//!   the sweeps of a step have not converged.
+//! - Heavy loads on light bodies: the depth F/(m ω²) itself exceeds the body.
+//! - **High stacks.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
+//!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
+//!   column of N links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam
+//!   does, at q N³ = 7.837 K: N = 14.1. More iterations or substeps do not help; a higher frequency does.
+//! - **Friction in the first substep.** A box on a slope has contact points ½ m below its centre:
+//!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
+//!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
+//!   that exceeds tan θ by little takes long to stop that.
+//! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
+//!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
+
+mod far;
+mod impacts;
+mod lab;
+mod motion;
+mod overlap;
+mod paradox;
+mod ratios;
+mod runner;
+mod sliding;
+mod stacks;
+mod table;
+
+pub use lab::Lab;
+pub use runner::{Cell, Matrix, Progress, run, select};
+pub use table::{CASES, NEEDS_JOINTS};
+
+use crate::engine::world::Divergence;
+use crate::lab::error::Error;
+
+/// A row of [`CASES`].
+pub struct Case {
+    /// Family and name: `A1.stick`.
+    pub id: &'static str,
+    /// What is measured.
+    pub summary: &'static str,
+    /// Of the measured value, the truth and the tolerance.
+    pub unit: &'static str,
+    /// Where the tolerance is from.
+    pub tolerance: &'static str,
+    /// Whether the default solver must pass, and why.
+    pub required: Required,
+    /// The solvers whose own law the truth is; empty where it is everyone's.
+    pub law_of: &'static [&'static str],
+    /// Runs it.
+    pub measure: fn(&Lab) -> Result<Finding, Failure>,
+}
+
+/// Whether the mathematics of the default solver promises a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Required {
+    /// It does, because …
+    Yes(&'static str),
+    /// It does not, because …
+    No(&'static str),
+}
+
+impl Required {
+    /// Whether the exit code asks for it.
+    pub fn is_required(self) -> bool {
+        matches!(self, Required::Yes(_))
+    }
+}
+
+/// What a case measured.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Finding {
+    /// As read from the run.
+    pub measured: f64,
+    /// What it should have been.
+    pub truth: f64,
+    /// How far off it may be, ≥ 0.
+    pub tolerance: f64,
+    /// What else is worth knowing; often empty.
+    pub note: String,
+    /// Where the truth is a threshold, how it was found.
+    pub sweep: Option<Sweep>,
+}
+
+/// A parameter tried value by value.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Sweep {
+    /// Its name, with its unit.
+    pub parameter: &'static str,
+    /// In the order tried.
+    pub rows: Vec<SweepRow>,
+}
+
+/// A row of a [`Sweep`].
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct SweepRow {
+    /// Of the parameter.
+    pub value: f64,
+    /// What was measured there; infinite if the run diverged.
+    pub measured: f64,
+    /// Whether it is good enough.
+    pub holds: bool,
+}
+
+impl Finding {
+    /// A number beside its truth.
+    pub fn new(measured: f64, truth: f64, tolerance: f64) -> Self {
+        Finding { measured, truth, tolerance, note: String::new(), sweep: None }
+    }
+
+    /// The same with a remark.
+    pub fn note(self, note: impl Into<String>) -> Self {
+        Finding { note: note.into(), ..self }
+    }
+
+    /// Distance to the truth; infinite if the measured value is not a number.
+    pub fn error(&self) -> f64 {
+        let error = (self.measured - self.truth).abs();
+        if error.is_nan() { f64::INFINITY } else { error }
+    }
+
+    /// Error in tolerances: 0 is exact, up to 1 passes. Where nothing is tolerated, 0 or infinite.
+    pub fn margin(&self) -> f64 {
+        match (self.error(), self.tolerance) {
+            (0.0, _) => 0.0,
+            (error, tolerance) => error / tolerance,
+        }
+    }
+
+    /// Whether the error is within the tolerance.
+    pub fn passed(&self) -> bool {
+        self.margin() <= 1.0
+    }
+}
+
+/// Why a case has no number.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The simulation left all bounds.
+    #[error("{0}")]
+    Diverged(Divergence),
+    /// What should have been measured never happened.
+    #[error("not measured: {0}")]
+    Unmeasured(String),
+    /// The case itself is wrong.
+    #[error(transparent)]
+    Refused(#[from] Error),
+}
+
+impl From<Divergence> for Failure {
+    fn from(divergence: Divergence) -> Self {
+        Failure::Diverged(divergence)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn margins_are_errors_in_tolerances() {
+        let margin = |measured, truth, tolerance| Finding::new(measured, truth, tolerance).margin();
+        assert_eq!(margin(1.5, 1.0, 2.0), 0.25);
+        assert_eq!(margin(0.5, 1.0, 0.5), 1.0);
+        assert_eq!(margin(1.0, 1.0, 0.0), 0.0);
+        assert_eq!(margin(1.1, 1.0, 0.0), f64::INFINITY);
+        assert_eq!(margin(f64::NAN, 1.0, 1.0), f64::INFINITY);
+        assert_eq!(margin(f64::INFINITY, 1.0, 1.0), f64::INFINITY);
+        assert!(Finding::new(0.5, 1.0, 0.5).passed() && !Finding::new(0.4, 1.0, 0.5).passed());
+        assert!(!Finding::new(f64::NAN, 0.0, 1e9).passed());
+    }
+}

@@ -1,0 +1,136 @@
+//! B3 and B19: bodies that start in each other.
+
+use super::lab::*;
+use super::{Failure, Finding, Lab};
+use crate::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ, MAX_PUSH_SPEED};
+use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneShape};
+use std::f64::consts::TAU;
+
+/// B3. A disc a quarter of a metre deep in the ground: the worst difference from the soft contact's own
+/// recovery over half a second, which a substep advances by d' = d − h min(γ β d, v_max) + γ_i g h²
+/// with ω = 2π 60 Hz, ζ = 10. Positions are read at 0.25 to 0.5 m, where `f32`s are 2⁻²⁵ m apart: 30
+/// steps may be half of that off each.
+pub(super) fn soft_recovery(lab: &Lab) -> Result<Finding, Failure> {
+    let disc = SceneBody::dynamic([0.0, 0.25], SceneShape::disc(0.5));
+    let scene = Scene::new("recovery", vec![ground(20.0, 0.6), disc]);
+    let h = scene.dt / lab.substeps();
+    let (mut depth, mut worst) = (0.25, 0.0);
+    lab.run(scene, 0.5, |world| {
+        depth = (0..lab.settings.budget.substeps).fold(depth, |d, _| recovered(d, h));
+        worst = largest([worst, (0.5 - center(world, 1)[1] - depth).abs()]);
+    })?;
+    Ok(Finding::new(worst, 0.0, 30.0 * 2f64.powi(-26)))
+}
+
+/// The depth one substep later.
+fn recovered(depth: f64, h: f64) -> f64 {
+    let omega = TAU * 2.0 * f64::from(CONTACT_HERTZ);
+    let damping = 2.0 * f64::from(CONTACT_DAMPING_RATIO) + h * omega;
+    let a = h * omega * damping;
+    let push = (a / (1.0 + a) * omega / damping * depth).min(f64::from(MAX_PUSH_SPEED));
+    depth - h * push + G * h * h / (1.0 + a)
+}
+
+/// B3. A pile of ten boxes that start a quarter deep in each other ends at rest on the ground, whose
+/// load is the weight.
+pub(super) fn pile(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("overlap_recovery", load_tolerance(10.0, 1.0 / 60.0))
+}
+
+/// What the over-full box did.
+struct Confined {
+    /// Greatest rms speed (m/s).
+    peak: f64,
+    /// Of the last second.
+    end: f64,
+    /// Greatest overlap over the mean overlap, at the end.
+    share: f64,
+}
+
+/// B19. 625 discs in a box with room for less than 450: 491 m² of discs in 390 m², where 0.9069 is the
+/// densest packing. No gravity.
+fn confined(lab: &Lab) -> Result<Confined, Failure> {
+    let corners = [[-10.5, 0.0], [10.5, 0.0], [10.5, 20.5], [-10.5, 20.5]];
+    let mut bodies: Vec<_> = (0..4)
+        .map(|i| {
+            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+            let wall = crate::lab::scenes::Capsule { a, b, radius: 0.5 };
+            SceneBody::fixed([0.0, 0.0], SceneShape::new(Geometry::Capsule(wall)))
+        })
+        .collect();
+    for row in 0..25 {
+        for column in 0..25 {
+            let position = [-8.75 + 0.72 * f64::from(column), 1.5 + 0.72 * f64::from(row)];
+            bodies.push(SceneBody::dynamic(position, SceneShape::disc(0.5)));
+        }
+    }
+    let mut found = Confined { peak: 0.0, end: 0.0, share: f64::INFINITY };
+    let world = lab.run(Scene::new("confined", bodies).weightless(), 10.0, |world| {
+        let speed = rms_speed(world);
+        found.peak = largest([found.peak, speed]);
+        if time(world) > 9.0 {
+            found.end = largest([found.end, speed]);
+        }
+    })?;
+    found.share = share(depths(&world).into_iter().map(|(_, depth, _)| depth));
+    Ok(found)
+}
+
+/// Largest over mean of the positive ones; infinite where there are none.
+fn share(depths: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count, most) = depths
+        .filter(|d| *d > 0.0)
+        .fold((0.0, 0.0, 0.0), |(sum, count, most), d| (sum + d, count + 1.0, f64::max(most, d)));
+    if sum > 0.0 { most / (sum / count) } else { f64::INFINITY }
+}
+
+/// B19. Kinetic energy is bounded: if each of the 12 contacts between the centre and a wall opens at
+/// the cap of 3 m/s, speeds grow from 0 to 36 m/s along x and y, √(2/3) of that in the mean.
+pub(super) fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
+    let bound = (2.0f64 / 3.0).sqrt() * 12.0 * f64::from(MAX_PUSH_SPEED);
+    Ok(Finding::new(confined(lab)?.peak, 0.0, bound))
+}
+
+/// B19. It decays: the rms speed of the last of ten seconds is below a tenth of the peak, the energy
+/// below a hundredth.
+pub(super) fn confined_decay(lab: &Lab) -> Result<Finding, Failure> {
+    let found = confined(lab)?;
+    // What never moved has nothing left.
+    let left = if found.peak == 0.0 { 0.0 } else { found.end / found.peak };
+    Ok(Finding::new(left, 0.0, 0.1).note(format!("{:.1e} m/s at the end", found.end)))
+}
+
+/// B19. The overlap is shared.
+pub(super) fn confined_share(lab: &Lab) -> Result<Finding, Failure> {
+    Ok(Finding::new(confined(lab)?.share, 1.0, 2.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recovery_has_the_rate_and_the_time_of_the_list() {
+        let h = 1.0 / 240.0;
+        // Without weight's share, the factor is 0.929267 below the cap, which is reached at 0.17672 m.
+        let rate = |d: f64| (recovered(d, h) - recovered(0.0, h)) / d;
+        assert!((rate(0.1) - 0.929267).abs() < 1e-6);
+        assert!((rate(0.1767) - 0.929267).abs() < 1e-6 && rate(0.1768) > 0.92928);
+        let mut substeps = 0;
+        let mut depth = 0.25;
+        while depth > 0.005 {
+            depth = recovered(depth, h);
+            substeps += 1;
+        }
+        assert_eq!(substeps, 55);
+        // At rest it is g/ω².
+        let rest = (0..1000).fold(depth, |d, _| recovered(d, h));
+        assert!((rest - soft_depth(G, 1.0, true)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn shares_count_overlaps_only() {
+        assert_eq!(share([0.1, 0.3, -5.0, 0.2].into_iter()), 0.3 / (0.6000000000000001 / 3.0));
+        assert_eq!(share([-1.0].into_iter()), f64::INFINITY);
+    }
+}

@@ -1,0 +1,50 @@
+//! B4: heavy discs on light ones, and light ones on heavy.
+
+use super::lab::*;
+use super::{Failure, Finding, Lab};
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+use std::f64::consts::PI;
+
+/// B4. A heavy disc of 100 kg on one of 1 kg, ground load in the last second.
+pub(super) fn hundred(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("mass_ratio:100", load_tolerance(101.0, 1.0 / 60.0))
+}
+
+/// B4. The greatest ratio, heavy on light, that rests after ten seconds.
+pub(super) fn heavy_on_light(lab: &Lab) -> Result<Finding, Failure> {
+    sweep("mass ratio", RATIOS, |ratio| rests(lab, [1.0, ratio]))
+}
+
+/// B4. The same, light on heavy.
+pub(super) fn light_on_heavy(lab: &Lab) -> Result<Finding, Failure> {
+    sweep("mass ratio", RATIOS, |ratio| rests(lab, [ratio, 1.0]))
+}
+
+const RATIOS: &[f64] = &[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
+
+/// Two discs of these masses (kg), lower first. At rest means: in order, no deeper than the slop or a
+/// soft contact under its load, kinetic energy below 1e-6 J per kg. The table shows the depth of the
+/// upper contact.
+fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
+    let disc = |i: usize| {
+        let shape = SceneShape::disc(0.5).density(4.0 * masses[i] / PI);
+        SceneBody::dynamic([0.0, 0.5 + i as f64], shape)
+    };
+    let scene = Scene::new("pair", vec![ground(20.0, 0.6), disc(0), disc(1)]);
+    let mut energy = 0.0;
+    let world = lab.run(scene, 10.0, |world| {
+        if time(world) > 9.0 {
+            energy = largest([energy, kinetic_energy(world) / mass(world)]);
+        }
+    })?;
+    let [low, high] = [center(&world, 1), center(&world, 2)];
+    let upper = 1.0 - (high[1] - low[1]);
+    let reduced = masses[0] * masses[1] / (masses[0] + masses[1]);
+    let allowed = [
+        soft_depth((masses[0] + masses[1]) * G, masses[0], true).max(SLOP),
+        soft_depth(masses[1] * G, reduced, false).max(SLOP),
+    ];
+    // A hundredth for what is left of the approach to the fixed point.
+    let shallow = 0.5 - low[1] <= 1.01 * allowed[0] && upper <= 1.01 * allowed[1];
+    Ok((upper, upper < 0.5 && high[0].abs() < 0.5 && shallow && energy < 1e-6))
+}

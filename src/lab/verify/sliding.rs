@@ -1,0 +1,185 @@
+//! A1–A4, A8 and B13: one body on a surface with friction.
+
+use super::lab::*;
+use super::{Failure, Finding, Lab};
+use crate::engine::bodies::BodyKind;
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+/// rad
+const SLOPE: f64 = 0.25;
+
+/// A1. µ = 0.26 > tan 0.25 = 0.2553: the worst drift in a minute.
+pub(super) fn stick(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("incline_stick", 1e-4)
+}
+
+/// A1. The same, its speed from 30 s on.
+pub(super) fn creep(lab: &Lab) -> Result<Finding, Failure> {
+    let scene = lab.scene("incline_stick")?;
+    let mut path = Vec::new();
+    lab.run(scene, 60.0, |world| {
+        if time(world) >= 30.0 {
+            path.push((time(world), downhill(center(world, 1), SLOPE)));
+        }
+    })?;
+    Ok(Finding::new(slope(&path), 0.0, 1e-6))
+}
+
+/// A1. µ = 0.24: 1 % of the distance a t²/2 = 0.297 m in two seconds.
+pub(super) fn slip(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("incline_slip", 0.01 * 0.2973)
+}
+
+/// A1. The slope from which a unit box accelerates is atan µ, whatever speed it starts with: it slides
+/// if after two seconds it is faster than after one. Beyond the threshold by ε it gains µ g cos θ ε in
+/// that second: a gain of 5e-5 m/s tells the threshold to 1e-4 or better for µ ≥ 0.1.
+pub(super) fn slope_threshold(lab: &Lab) -> Result<Finding, Failure> {
+    let mut found = sweep("µ", &[0.1, 0.3, 0.6], |friction| {
+        let tangent = bisect(0.0, 2.0 * friction, |tangent: f64| {
+            let angle = tangent.atan();
+            let scene = on_slope(angle, friction, SceneShape::rectangle(0.5, 0.5), 0.5);
+            let mut speeds = [0.0; 2];
+            lab.run(scene, 2.0, |world| {
+                let half = usize::from(time(world) > 1.0);
+                speeds[half] = downhill(velocity(world, 1), angle);
+            })?;
+            Ok(speeds[1] - speeds[0] > 5e-5)
+        })?;
+        let off = tangent.atan() / friction.atan() - 1.0;
+        Ok((off, off.abs() < 1e-3))
+    })?;
+    (found.measured, found.truth, found.tolerance) = (worst(&found), 0.0, 1e-3);
+    Ok(found)
+}
+
+/// Largest absolute value in a sweep's table.
+fn worst(found: &Finding) -> f64 {
+    largest(found.sweep.iter().flat_map(|sweep| &sweep.rows).map(|row| row.measured.abs()))
+}
+
+/// A1. A box of 2 kg and side 1 that slides on the flat with µ = 0.3 leans forward: moments about its
+/// centre give N = m g/2 (1 ± µ H/w), 13 N in front.
+pub(super) fn split(lab: &Lab) -> Result<Finding, Failure> {
+    let (mass, friction) = (2.0, 0.3);
+    let shape = SceneShape::rectangle(0.5, 0.5).density(mass).friction(friction);
+    let body = SceneBody::dynamic([0.0, 0.5], shape).moving([5.0, 0.0], 0.0);
+    let scene = Scene::new("slide", vec![ground(50.0, friction), body]);
+    let (mut sum, mut count) = (0.0, 0.0);
+    lab.run(scene, 1.0, |world| {
+        if time(world) > 0.5 {
+            let points = world.contacts.iter().flat_map(|c| c.manifold.points().iter().zip(&c.step_impulse));
+            let front = points.filter(|(point, _)| point.anchor_b.x > 0.0).map(|(_, p)| f64::from(p[0]));
+            sum += front.sum::<f64>() / f64::from(world.settings.dt);
+            count += 1.0;
+        }
+    })?;
+    let truth = 0.5 * mass * G * (1.0 + friction);
+    Ok(Finding::new(sum / count, truth, 0.01 * truth))
+}
+
+/// A2. Against the discrete sum, over 1.5 m.
+pub(super) fn stop(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("sliding_stop", 0.01 * 1.5)
+}
+
+/// A3. 0.5 % of the 3.299 m that a = 2/3 g sin θ makes in two seconds.
+pub(super) fn roll(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("rolling_incline", 0.005 * 3.299)
+}
+
+/// A3. 0.5 % of 3.979 m.
+pub(super) fn slipping_disc(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("slipping_disc", 0.005 * 3.979)
+}
+
+/// A3. Speed of the rolling disc's contact point, from half a second on.
+pub(super) fn slip_speed(lab: &Lab) -> Result<Finding, Failure> {
+    let mut fastest = 0.0;
+    lab.run(lab.scene("rolling_incline")?, 2.0, |world| {
+        if time(world) >= 0.5 {
+            fastest = largest([fastest, disc_slip(world).abs()]);
+        }
+    })?;
+    Ok(Finding::new(fastest, 0.0, 1e-4))
+}
+
+/// Downhill to the right is clockwise: v + ω r, with ω < 0.
+fn disc_slip(world: &crate::engine::world::World) -> f64 {
+    downhill(velocity(world, 1), SLOPE) + 0.5 * spin(world, 1)
+}
+
+/// A3. The friction that rolling needs is tan θ/3. Below it by ε the contact slips by g sin θ ε t: 5e-4
+/// m/s after 2 s tell 1e-4.
+pub(super) fn roll_threshold(lab: &Lab) -> Result<Finding, Failure> {
+    let truth = SLOPE.tan() / 3.0;
+    let friction = bisect(0.0, 2.0 * truth, |friction| {
+        let world = lab.run(on_slope(SLOPE, friction, SceneShape::disc(0.5), 0.5), 2.0, |_| ())?;
+        Ok(disc_slip(&world) < 5e-4)
+    })?;
+    Ok(Finding::new(friction, truth, 1e-3 * truth))
+}
+
+/// m/s
+const START: f64 = 5.0;
+
+/// A4. Sliding turns into rolling at 2/3 v0 whatever µ is, because angular momentum about the line of
+/// contact is kept. What can be off is the arm: overlap by up to the slop shortens it by half of that,
+/// δ, and with v = v0/(1 + r²/(2 a²)), a = r − δ, the speed falls by 2/3 δ/r v0 … of first order; here
+/// r = 0.5 m.
+pub(super) fn slide_to_roll(lab: &Lab) -> Result<Finding, Failure> {
+    let mut found = sweep("µ", &[0.05, 0.2, 0.6, 2.0], |friction| {
+        let speed = rolling_speed(lab, friction, 0.0)?;
+        Ok((speed, (speed - 2.0 / 3.0 * START).abs() <= 4.0 / 9.0 * ARM * START))
+    })?;
+    let speeds = found.sweep.iter().flat_map(|sweep| &sweep.rows).map(|row| row.measured);
+    let truth = 2.0 / 3.0 * START;
+    found.measured =
+        speeds.fold(truth, |w: f64, v| if (v - truth).abs() > (w - truth).abs() { v } else { w });
+    (found.truth, found.tolerance) = (truth, 4.0 / 9.0 * ARM * START);
+    Ok(found)
+}
+
+/// δ/r with δ half a slop and r = 0.5 m.
+const ARM: f64 = 0.5 * SLOP / 0.5;
+
+/// A4. With back-spin w0 the speed becomes (2 v0 − r w0)/3: for r w0 = 3 v0 it comes back at v0/3. The
+/// shorter arm a = r − δ gives v = (v0 − r² w0/(2a))/(1 + r²/(2a²)): off by 7/9 δ/r v0.
+pub(super) fn back_spin(lab: &Lab) -> Result<Finding, Failure> {
+    let speed = rolling_speed(lab, 0.5, 3.0 * START / 0.5)?;
+    Ok(Finding::new(speed, -START / 3.0, 7.0 / 9.0 * ARM * START))
+}
+
+/// Speed at 2 v0/(µ g), twice as late as sliding could last.
+fn rolling_speed(lab: &Lab, friction: f64, back_spin: f64) -> Result<f64, Failure> {
+    let disc = SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5).friction(friction));
+    let bodies = vec![ground(100.0, friction), disc.moving([START, 0.0], back_spin)];
+    let world = lab.run(Scene::new("roll", bodies), 2.0 * START / (friction * G), |_| ())?;
+    Ok(velocity(&world, 1)[0])
+}
+
+/// A8. A box laid on a belt of speed V slips on it by Σ (V − j µ g h) h until it has caught up:
+/// V²/(2 µ g) − V h/2.
+pub(super) fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
+    let (speed, friction) = (2.0, 0.5);
+    let belt = SceneShape::rectangle(50.0, 0.5).friction(friction);
+    let belt = SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], belt).moving([speed, 0.0], 0.0);
+    let body = SceneBody::dynamic([0.0, 0.5], SceneShape::rectangle(0.5, 0.5).friction(friction));
+    let world = lab.run(Scene::new("conveyor", vec![belt, body]), 1.0, |_| ())?;
+    let h = f64::from(world.settings.dt) / lab.substeps();
+    let slipped = center(&world, 0)[0] - center(&world, 1)[0];
+    let truth = speed * speed / (2.0 * friction * G);
+    Ok(Finding::new(slipped, truth - 0.5 * speed * h, 0.01 * truth))
+}
+
+/// B13. A box that slides with µ = 0.5 stays on the ground. The convex relaxation of Coulomb's law has
+/// un = µ |ut| instead and lifts it: at 2 m/s by 3.3 cm.
+pub(super) fn hop(lab: &Lab) -> Result<Finding, Failure> {
+    let friction = 0.5;
+    let shape = SceneShape::rectangle(0.5, 0.25).friction(friction);
+    let body = SceneBody::dynamic([0.0, 0.25], shape).moving([2.0, 0.0], 0.0);
+    let mut highest = 0.0;
+    lab.run(Scene::new("hop", vec![ground(50.0, friction), body]), 1.0, |world| {
+        highest = largest([highest, center(world, 1)[1] - 0.25]);
+    })?;
+    Ok(Finding::new(highest, 0.0, SLOP))
+}

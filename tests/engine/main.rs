@@ -1,0 +1,8 @@
+//! Laws of the engine, a file each.
+
+mod coloring;
+mod kernel;
+mod motion;
+mod narrow_batches;
+mod narrowphase;
+mod shapes;

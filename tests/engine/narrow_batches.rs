@@ -1,0 +1,259 @@
+//! Law: the narrow phase in lanes finds what `collide` finds pair by pair, to the bit, at every
+//! width; and a contact keeps the impulses of the points whose features go on.
+
+use glam::Vec2;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use simpulse::engine::contacts::{Contact, Manifold};
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::narrowphase::batch::{Class, Input, Jobs, Kind, NO_CONTACT, Shapes, update};
+use simpulse::engine::narrowphase::collide;
+use simpulse::engine::narrowphase::lanes::PoseRow;
+use simpulse::engine::shapes::{Pose, Shape};
+
+const SPECULATIVE: f32 = 0.1;
+
+fn v(x: f32, y: f32) -> Vec2 {
+    Vec2::new(x, y)
+}
+
+/// Pairs of one kind, body and shape 2i against 2i + 1, and what remembers their contacts.
+struct Scene {
+    kind: Kind,
+    shapes: Vec<Shape>,
+    numbers: Vec<u32>,
+    rows: Shapes,
+    /// Per pair, its place in `contacts`.
+    contact: Vec<u32>,
+    contacts: Vec<Contact>,
+}
+
+impl Scene {
+    fn new(kind: Kind, shapes: Vec<Shape>) -> Self {
+        let mut rows = Shapes::default();
+        let numbers = shapes.iter().map(|shape| rows.push(shape).1).collect();
+        let contact = vec![NO_CONTACT; shapes.len() / 2];
+        Scene { kind, shapes, numbers, rows, contact, contacts: Vec::new() }
+    }
+
+    /// One step at `width`; returns the pairs that began or ended, in the order of the calls.
+    fn step(&mut self, width: LaneWidth, poses: &[Pose]) -> Vec<u32> {
+        let poses: Vec<PoseRow> = poses.iter().map(PoseRow::new).collect();
+        let names: Vec<u32> = (0..self.contact.len() as u32).collect();
+        let mut jobs = Jobs::default();
+        jobs.list(&names, |i| {
+            let (a, b) = (2 * i as usize, 2 * i as usize + 1);
+            (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
+        });
+        let input = Input { poses: &poses, shapes: &self.rows, speculative: SPECULATIVE };
+        let (mut changed, mut fresh) = (vec![], vec![]);
+        let points = update(self.kind, width, &jobs, input, &mut self.contacts, |name, contact| {
+            changed.push(name);
+            fresh.push(*contact);
+        });
+        for (&name, contact) in changed.iter().zip(&fresh) {
+            self.contact[name as usize] = match contact.manifold.count {
+                0 => NO_CONTACT,
+                _ => {
+                    self.contacts.push(*contact);
+                    self.contacts.len() as u32 - 1
+                }
+            };
+        }
+        assert_eq!(points, (0..names.len()).map(|i| self.manifold(i).count as usize).sum::<usize>());
+        changed
+    }
+
+    fn manifold(&self, pair: usize) -> Manifold {
+        match self.contact[pair] {
+            NO_CONTACT => Manifold::default(),
+            contact => self.contacts[contact as usize].manifold,
+        }
+    }
+
+    /// What the step should have found, with the impulses of `old` where features go on.
+    fn expected(&self, pair: usize, poses: &[Pose], old: &Manifold) -> Manifold {
+        let (a, b) = (2 * pair, 2 * pair + 1);
+        let mut m = collide(&self.shapes[a], &poses[a], &self.shapes[b], &poses[b], SPECULATIVE);
+        for point in &mut m.points[..m.count as usize] {
+            if let Some(same) = old.points().iter().find(|p| p.feature_id == point.feature_id) {
+                (point.normal_impulse, point.tangent_impulse) = (same.normal_impulse, same.tangent_impulse);
+            }
+        }
+        m
+    }
+}
+
+/// The bits of all that is in use. An unused second point holds what the lanes left there.
+fn bits(m: &Manifold) -> Vec<u32> {
+    let mut bits = vec![m.count];
+    if m.count > 0 {
+        bits.extend([m.normal.x, m.normal.y].map(f32::to_bits));
+    }
+    for p in m.points() {
+        let floats = [p.anchor_a.x, p.anchor_a.y, p.anchor_b.x, p.anchor_b.y, p.separation];
+        bits.extend(floats.map(f32::to_bits));
+        bits.extend([p.feature_id, p.normal_impulse.to_bits(), p.tangent_impulse.to_bits()]);
+    }
+    bits
+}
+
+fn coordinate(limit: f32) -> impl Strategy<Value = f32> {
+    (-(1i32 << 20)..=1 << 20).prop_map(move |k| limit * k as f32 / (1 << 20) as f32)
+}
+
+fn point(limit: f32) -> impl Strategy<Value = Vec2> {
+    (coordinate(limit), coordinate(limit)).prop_map(|(x, y)| v(x, y))
+}
+
+fn rounding() -> impl Strategy<Value = f32> {
+    prop_oneof![Just(0.0f32), 0.01f32..0.3]
+}
+
+fn rectangle() -> impl Strategy<Value = Shape> {
+    (0.05f32..1.5, 0.05f32..1.5, point(0.5), coordinate(3.0), rounding()).prop_map(
+        |(hx, hy, center, angle, r)| Shape::rectangle("b", v(hx, hy), center, angle, r).expect("valid"),
+    )
+}
+
+fn circle() -> impl Strategy<Value = Shape> {
+    (point(0.5), 0.05f32..1.0).prop_map(|(c, r)| Shape::circle("c", c, r).expect("valid"))
+}
+
+/// Polygons of 3 to 8 vertices and capsules.
+fn hull() -> impl Strategy<Value = Shape> {
+    let angles = prop::collection::vec(0.0f32..std::f32::consts::TAU, 3..=8);
+    prop_oneof![
+        3 => (angles, 0.1f32..1.5, 0.1f32..1.5, point(0.5), rounding()).prop_filter_map(
+            "valid polygon",
+            |(mut angles, rx, ry, center, radius)| {
+                angles.sort_by(f32::total_cmp);
+                let corner = |&t: &f32| center + v(rx, ry) * Vec2::from_angle(t);
+                Shape::polygon("polygon", &angles.iter().map(corner).collect::<Vec<_>>(), radius).ok()
+            },
+        ),
+        1 => (point(1.0), point(1.0), 0.01f32..0.5)
+            .prop_filter_map("long enough", |(a, b, r)| Shape::capsule("c", a, b, r).ok()),
+    ]
+}
+
+/// Segments, and the other straight shapes of which each kind may be one of the two.
+fn straight() -> impl Strategy<Value = Shape> {
+    prop_oneof![
+        1 => (point(1.5), point(1.5)).prop_filter_map("long enough", |(a, b)| Shape::segment("s", a, b).ok()),
+        1 => rectangle(),
+        2 => hull(),
+    ]
+}
+
+/// Shapes of some pairs of one kind: enough for a whole batch and a part of one, or less.
+fn pairs() -> impl Strategy<Value = (Kind, Vec<Shape>)> {
+    fn list(
+        kind: Kind,
+        a: impl Strategy<Value = Shape> + 'static,
+        b: impl Strategy<Value = Shape> + 'static,
+    ) -> BoxedStrategy<(Kind, Vec<Shape>)> {
+        prop::collection::vec((a, b), 1..40)
+            .prop_map(move |pairs| (kind, pairs.into_iter().flat_map(|(a, b)| [a, b]).collect()))
+            .boxed()
+    }
+    prop_oneof![
+        1 => list(Kind::Rectangles, rectangle(), rectangle()),
+        1 => list(Kind::Circles, circle(), circle()),
+        3 => list(Kind::Hulls, straight(), hull()),
+        1 => list(Kind::Hulls, hull(), straight()),
+        1 => list(Kind::HullCircle, straight(), circle()),
+        1 => list(Kind::CircleHull, circle(), straight()),
+        // All of one shape: the batch reads a single row.
+        1 => (hull(), 1usize..40).prop_map(|(shape, count)| (Kind::Hulls, vec![shape; 2 * count])),
+    ]
+}
+
+fn poses() -> impl Strategy<Value = Vec<Pose>> {
+    let angle =
+        prop_oneof![4 => coordinate(3.2), 1 => (-2..3).prop_map(|k| k as f32 * std::f32::consts::FRAC_PI_2)];
+    let pose = (point(1.5), angle).prop_map(|(position, angle)| Pose::new(position, angle));
+    prop::collection::vec(pose, 80)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 600, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
+
+    /// Three steps: all pairs new; moved a little, so that most features go on; anywhere else, so
+    /// that contacts begin and end.
+    #[test]
+    fn every_width_finds_what_single_pairs_find(
+        (kind, shapes) in pairs(), start in poses(), other in poses(),
+        drift in point(0.02), turn in coordinate(0.02),
+    ) {
+        let drifted: Vec<Pose> = start.iter().enumerate().map(|(i, p)| {
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            Pose {
+                position: p.position + sign * drift,
+                rotation: Vec2::from_angle(sign * turn).rotate(p.rotation),
+            }
+        }).collect();
+        for width in LaneWidth::ALL {
+            let mut scene = Scene::new(kind, shapes.clone());
+            for poses in [&start, &drifted, &other] {
+                // Impulses that tell pair and point.
+                let old: Vec<Manifold> = (0..scene.contact.len()).map(|pair| {
+                    if let Some(contact) = scene.contacts.get_mut(scene.contact[pair] as usize) {
+                        for (k, point) in contact.manifold.points.iter_mut().enumerate() {
+                            point.normal_impulse = 1.0 + pair as f32 + 0.25 * k as f32;
+                            point.tangent_impulse = -point.normal_impulse;
+                        }
+                    }
+                    scene.manifold(pair)
+                }).collect();
+                let changed = scene.step(width, poses);
+                for (pair, old) in old.iter().enumerate() {
+                    let (found, expected) = (scene.manifold(pair), scene.expected(pair, poses, old));
+                    prop_assert_eq!(bits(&found), bits(&expected), "{:?} {:?} pair {}", kind, width, pair);
+                    let began_or_ended = (old.count > 0) != (found.count > 0);
+                    prop_assert_eq!(changed.contains(&(pair as u32)), began_or_ended);
+                }
+                prop_assert!(changed.is_sorted());
+            }
+        }
+    }
+
+    #[test]
+    fn a_rectangle_is_known_by_its_corners(
+        hx in 0.05f32..1.5, hy in 0.05f32..1.5, center in point(0.5), angle in coordinate(3.0), r in rounding(),
+        other in straight(), a in poses(),
+    ) {
+        let shape = Shape::rectangle("b", v(hx, hy), center, angle, r).expect("valid");
+        let mut corners = vec![];
+        shape.for_each_vertex(|v| corners.push(v));
+        let polygon = Shape::polygon("p", &corners, r).expect("valid");
+        prop_assert_eq!(Shapes::default().push(&polygon).0, Class::Rectangle);
+        // Its normals come from corners rounded to 1e-7 m, along sides of 0.1 m and more: 2e-6 rad, over
+        // distances of up to 5 m. Flush faces (0.01 rad) may tie, and then either one is right.
+        let (m, n) = (collide(&shape, &a[0], &other, &a[1], 10.0), collide(&polygon, &a[0], &other, &a[1], 10.0));
+        let depth = |m: &Manifold| m.points().iter().map(|p| p.separation).fold(f32::INFINITY, f32::min);
+        prop_assert!((depth(&m) - depth(&n)).abs() < 1e-5 + 5e-4);
+    }
+}
+
+#[test]
+fn alike_shapes_share_a_number_and_others_do_not() {
+    let mut shapes = Shapes::default();
+    let square = |x: f32| Shape::rectangle("b", v(0.5, 0.5), v(x, 0.0), 0.0, 0.0).expect("valid");
+    let first = shapes.push(&square(0.0));
+    assert_eq!(first.0, Class::Rectangle);
+    let moved = shapes.push(&square(1.0));
+    assert_ne!(first.1, moved.1);
+    assert_eq!(shapes.push(&square(0.0)), first);
+    // Same numbers in another shape.
+    let ball = Shape::circle("c", Vec2::ZERO, 0.5).expect("valid");
+    assert!(![first.1, moved.1].contains(&shapes.push(&ball).1));
+}
+
+#[test]
+fn two_segments_have_no_kernel() {
+    assert_eq!(Kind::of(Class::Segment, Class::Segment), None);
+    let classes = [Class::Rectangle, Class::Circle, Class::Hull, Class::Segment];
+    let kernels = classes.iter().flat_map(|&a| classes.map(|b| Kind::of(a, b))).flatten().count();
+    assert_eq!(kernels, 15);
+}

@@ -1,0 +1,47 @@
+//! What several test files share.
+#![allow(dead_code)]
+
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::Variant;
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::scenes::{self, Scene};
+
+/// Standard settings of a solver.
+pub fn settings(variant: &'static Variant) -> Settings {
+    Settings::new(variant)
+}
+
+/// Standard settings of a solver at one width.
+pub fn with_width(variant: &'static Variant, width: LaneWidth) -> Settings {
+    let mut settings = Settings::new(variant);
+    settings.width = width;
+    settings
+}
+
+/// A scene of the catalogue, or `crowded_plate`: one dynamic plate under more bodies than
+/// there are colours, so that contacts overflow, on a kinematic plate that moves sideways.
+pub fn scene(name: &str) -> Scene {
+    if name != "crowded_plate" {
+        return scenes::load(name).unwrap().scene;
+    }
+    let mut bodies = String::from(
+        r#"{"type":"kinematic","position":[0,-1],"velocity":[0.3,0],"shapes":[{"box":{"half":[60,1]}}]},
+           {"type":"dynamic","position":[0,0.5],"shapes":[{"box":{"half":[50,0.5]}}]}"#,
+    );
+    for i in 0..90 {
+        let shape = if i % 3 == 0 { r#"{"circle":{"radius":0.4}}"# } else { r#"{"box":{"half":[0.4,0.4]}}"# };
+        let x = i as f64 - 44.5;
+        bodies += &format!(r#",{{"type":"dynamic","position":[{x},1.41],"shapes":[{shape}]}}"#);
+    }
+    let text = format!(r#"{{"name":"crowded_plate","bodies":[{bodies}]}}"#);
+    Scene::from_json(&text, "crowded_plate.json".as_ref()).unwrap()
+}
+
+/// Steps a scene; panics if it diverges.
+pub fn run(scene: &Scene, settings: Settings, steps: u32) -> World {
+    let mut world = scene.build(settings).unwrap();
+    for _ in 0..steps {
+        world.step().unwrap();
+    }
+    world
+}

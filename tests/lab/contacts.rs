@@ -1,0 +1,101 @@
+//! Law: contacts that are kept and updated in place are those that a fresh look finds.
+
+use simpulse::engine::broadphase::{Proxy, all_pairs};
+use simpulse::engine::contacts::Contact;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::narrowphase::collide;
+use simpulse::engine::params::SPECULATIVE_DISTANCE;
+use simpulse::engine::solvers::find;
+use simpulse::engine::world::World;
+
+/// The contacts of the coming step from nothing: every pair of shapes, collided one by one, with
+/// the impulses of `last` by feature.
+fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
+    let bodies = &world.bodies;
+    let proxies: Vec<Proxy> = world
+        .shapes
+        .iter()
+        .zip(&world.shape_body)
+        .map(|(shape, &body)| Proxy {
+            aabb: shape.aabb(&bodies.pose(body as usize)).grown(SPECULATIVE_DISTANCE),
+            body,
+            group: bodies.group[body as usize],
+            dynamic: bodies.is_dynamic(body as usize),
+        })
+        .collect();
+    let mut pairs = Vec::new();
+    all_pairs(&proxies, &mut pairs);
+    let mut contacts = Vec::new();
+    for [i, j] in pairs {
+        let (a, b) = if proxies[j as usize].dynamic { (i, j) } else { (j, i) };
+        let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
+        let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);
+        let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes[shape as usize]);
+        let mut manifold = collide(shape_a, &pose_a, shape_b, &pose_b, SPECULATIVE_DISTANCE);
+        if manifold.count == 0 {
+            continue;
+        }
+        if let Some(old) = last.iter().find(|c| (c.shape_a, c.shape_b) == (a, b)) {
+            for point in &mut manifold.points[..manifold.count as usize] {
+                if let Some(same) = old.manifold.points().iter().find(|p| p.feature_id == point.feature_id) {
+                    point.normal_impulse = same.normal_impulse;
+                    point.tangent_impulse = same.tangent_impulse;
+                }
+            }
+        }
+        contacts.push(Contact { shape_a: a, shape_b: b, body_a, body_b, manifold, ..Contact::default() });
+    }
+    contacts
+}
+
+/// Scenes in which contacts begin, end and slide, of every kind of pair.
+const SCENES: &[(&str, u32)] = &[
+    ("crowded_plate", 60),
+    ("circle_pile:60", 120),
+    ("card_house", 60),
+    ("friction_ramp", 90),
+    ("arch", 30),
+];
+
+#[test]
+fn kept_contacts_are_those_of_a_fresh_look() {
+    for width in [LaneWidth::W1, LaneWidth::W16] {
+        for &(name, steps) in SCENES {
+            let scene = crate::common::scene(name);
+            let mut world =
+                scene.build(crate::common::with_width(find("soft_step").unwrap(), width)).unwrap();
+            let mut met = 0;
+            for step in 0..steps {
+                let last = world.contacts.clone();
+                world.find_contacts();
+                let fresh = from_nothing(&world, &last);
+                let names = |c: &Contact| (c.shape_a, c.shape_b, c.body_a, c.body_b);
+                assert_eq!(
+                    world.contacts.iter().map(names).collect::<Vec<_>>(),
+                    fresh.iter().map(names).collect::<Vec<_>>(),
+                    "{name}, step {step}, {width:?}"
+                );
+                for (kept, fresh) in world.contacts.iter().zip(&fresh) {
+                    let (kept, fresh) = (&kept.manifold, &fresh.manifold);
+                    assert_eq!(kept.normal, fresh.normal, "{name}, step {step}, {width:?}");
+                    assert_eq!(kept.points(), fresh.points(), "{name}, step {step}, {width:?}");
+                    met += 1;
+                }
+                world.step().unwrap();
+            }
+            assert!(met > 100, "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_list_that_somebody_else_cut_is_found_anew() {
+    let settings = crate::common::with_width(find("soft_step").unwrap(), LaneWidth::W8);
+    let mut world = crate::common::run(&crate::common::scene("pyramid:5"), settings, 30);
+    let count = world.contacts.len();
+    world.contacts.truncate(3);
+    world.find_contacts();
+    assert_eq!(world.contacts.len(), count);
+    assert!(world.contacts.iter().all(|c| c.manifold.points().iter().all(|p| p.normal_impulse == 0.0)));
+    world.step().unwrap();
+}

@@ -1,0 +1,370 @@
+//! Solvers on frozen problems: exact rates, the floor of f32, capture and replay.
+
+use simpulse::cli::{capture as capture_command, converge as converge_command};
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::params::{Budget, CONTACT_HERTZ};
+use simpulse::engine::solvers::{self, VARIANTS, Variant};
+use simpulse::engine::world::{Order, World};
+use simpulse::lab::capture::capture;
+use simpulse::lab::converge::replay::{Outcome, Replay, Sequence, Start};
+use simpulse::lab::converge::{Curve, Options, Report, converge, plot, table};
+use simpulse::lab::reference::certify::{Uniqueness, reference};
+use simpulse::lab::reference::frozen::Frozen;
+use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, sliding_box};
+use simpulse::lab::reference::residual::{Target, natural_map};
+use simpulse::lab::reference::sweeps::{Stop, Sweep, pgs};
+use simpulse::lab::reference::{ContactProblem, Velocity};
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+fn frozen_files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/frozen");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 7);
+    files
+}
+
+/// Untimed runs of these solvers.
+fn options(solvers: &[&str]) -> Options {
+    let solvers = solvers.iter().map(|name| solvers::find(name).unwrap()).collect();
+    Options { solvers, rounds: 0, ..Options::default() }
+}
+
+fn run(problem: &ContactProblem, solvers: &[&str]) -> Report {
+    converge(problem, Some(&reference(problem).unwrap()), &options(solvers)).unwrap()
+}
+
+/// Rates are fitted over one decade that ends 100 times above the rounding floor. There rounding
+/// may change a residual by 1 %; a line through a decade, its ends pulling 1.5 times as much as
+/// their share, then errs by 1.5 · 0.01/ln 10 = 0.7 % of ln ρ, some 0.7 % of 1 − ρ.
+fn assert_rate(curve: &Curve, exact: f64) {
+    let measured = curve.rigid.rate.unwrap();
+    let (solver, order) = (&curve.solver, curve.order);
+    assert!((measured - exact).abs() < 0.007 * (1.0 - exact), "{solver} {order}: {measured} is not {exact}");
+}
+
+#[test]
+fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
+    // The graph of a column is a tree: all orders are consistent, so all have the same rate.
+    for n in [5, 10, 15, 20] {
+        let report = run(&disc_column(n), &["pgs"]);
+        let curves: Vec<&Curve> = report.curves.iter().filter(|c| c.arithmetic == "f32").collect();
+        assert_eq!(curves.len(), 3);
+        for curve in curves {
+            assert_rate(curve, (PI / (2 * n) as f64).cos().powi(2));
+            // The same to the iteration as f64 in the same order, as long as f32 is exact enough.
+            let scalar = report.curves.iter().find(|c| c.solver == "Gauss-Seidel").unwrap();
+            for tolerance in 0..3 {
+                let count = |c: &Curve| c.points[c.rigid.first[tolerance].unwrap()].iterations;
+                assert!(count(curve).abs_diff(count(scalar)) <= 1, "n {n}, {}", curve.order);
+            }
+        }
+    }
+}
+
+#[test]
+fn heavy_on_light_converges_at_the_mass_ratio_over_one_more() {
+    for ratio in [10.0, 30.0, 100.0] {
+        let report = run(&heavy_on_light(ratio), &["pgs"]);
+        for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
+            assert_rate(curve, ratio / (1.0 + ratio));
+        }
+    }
+}
+
+#[test]
+fn mass_splitting_on_a_column_is_a_lazy_walk() {
+    // Rows x ← x/2 + (neighbours)/4 inside, x₀/2 + x₁/2 at the ground, x/3 + x₋₁/3 at the top,
+    // where the last disc has one contact only. Modes are cos iθ with the eigenvalue
+    // (1 + cos θ)/2, and the top row asks for tan((n − 1)θ) tan(θ/2) = 1/2.
+    let n = 10;
+    let excess = |theta: f64| ((n - 1) as f64 * theta).tan() * (theta / 2.0).tan() - 0.5;
+    let (mut low, mut high) = (0.0, PI / 2.0 / (n - 1) as f64);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if excess(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    let exact = (1.0 + low.cos()) / 2.0;
+    let report = run(&disc_column(n), &["pgs"]);
+    let rate = |name: &str| report.curves.iter().find(|c| c.solver == name).unwrap().rigid.rate.unwrap();
+    // The next modes still hold some 1e-3 of the residual over the first thousand iterations.
+    assert!((rate("Jacobi, mass splitting") - exact).abs() < 2e-5, "{exact}");
+    assert!((rate("Jacobi") - (PI / (2 * n) as f64).cos()).abs() < 1e-3);
+}
+
+#[test]
+fn files_converge_to_the_floor_and_to_their_certified_velocities() {
+    for file in frozen_files() {
+        let Frozen { problem, reference } = Frozen::read(&file).unwrap();
+        let reference = reference.unwrap();
+        assert!(matches!(reference.certificate.uniqueness, Uniqueness::Proven | Uniqueness::Agreed));
+        // Rounding of the largest impulse, in units of the residual.
+        let unit = problem.impulse_unit();
+        let largest = reference.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
+        let floor = 6e-8 * (largest / unit).max(1.0);
+        let settings = Options { max_iterations: 2000, ..options(&["pgs"]) };
+        let report = converge(&problem, Some(&reference), &settings).unwrap();
+        for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
+            let last = curve.points.last().unwrap();
+            // A row sums a handful of products of that size; 20 roundings are generous.
+            assert!(last.rigid < 20.0 * floor, "{}: {} {:e}", file.display(), curve.order, last.rigid);
+            // A residual r that falls by ρ per sweep is followed by r (1 + ρ + ρ² + …) of change:
+            // r/(1 − ρ) is what is left of the error. Two bodies answer to each row, and where a
+            // rate could not be fitted, a decade took fewer than four sweeps: ρ < 0.6.
+            let rate = curve.rigid.rate.unwrap_or(0.6);
+            let bound = 2.0 * (last.rigid + floor) / (1.0 - rate);
+            let error = last.velocity_error.unwrap();
+            assert!(error < bound, "{}: {} {error:e} not within {bound:e}", file.display(), curve.order);
+            assert!(bound < 1e-3, "a bound that says something: {bound:e}");
+        }
+    }
+}
+
+fn replay<'a>(problem: &'a ContactProblem, order: Sequence) -> Replay<'a> {
+    Replay::new(problem, order, LaneWidth::W8, CONTACT_HERTZ).unwrap()
+}
+
+fn sweeps(k: u32) -> Budget {
+    Budget { substeps: 1, velocity_iterations: k, relax_iterations: 0, position_iterations: 0 }
+}
+
+fn pgs_velocities(problem: &ContactProblem, order: Sequence, k: u32) -> Vec<Velocity> {
+    replay(problem, order).run(solvers::find("pgs").unwrap(), sweeps(k), Start::Cold).velocities
+}
+
+#[test]
+fn order_matters_until_convergence() {
+    let file = frozen_files().into_iter().find(|f| f.ends_with("box-pyramid-5.frozen")).unwrap();
+    let Frozen { problem, .. } = Frozen::read(&file).unwrap();
+    let spread = |k: u32| {
+        let natural = pgs_velocities(&problem, Sequence::Natural, k);
+        let error =
+            |seed| problem.velocity_error(&pgs_velocities(&problem, Sequence::Shuffled(seed), k), &natural);
+        (0..32).map(error).fold(0.0, f64::max)
+    };
+    let (early, converged) = (spread(4), spread(600));
+    assert!(early > 0.05, "{early}");
+    // Where velocities are unique nothing but rounding is left: 6e-8 per operation, gained 1/(1 − ρ)
+    // = 30 times.
+    assert!(converged < 2e-6, "{converged}");
+}
+
+#[test]
+fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
+    // Overlapping, touching and open contacts; the bottom one is against a static body.
+    let mut problem = column(&[1.0, 2.0, 1.0, 3.0]);
+    for (contact, gap) in problem.contacts.iter_mut().zip([-0.01, 0.0, 1e-4, -2e-4]) {
+        contact.gap = gap;
+    }
+    let variant = solvers::find("soft_step").unwrap();
+    let outcome = replay(&problem, Sequence::Natural).run(variant, sweeps(400), Start::Cold);
+    let own = outcome.own.as_ref().unwrap();
+    let target = Target::Own(&own.rows);
+    let unit = problem.impulse_unit();
+    let residual = |target| natural_map(&problem, target, &outcome.velocities, &outcome.impulses) / unit;
+    // A handful of roundings of the largest impulse: in the sweep, and in the law's coefficients.
+    let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
+    let floor = 6e-8 * largest / unit;
+    assert!(residual(target) < 5.0 * floor && residual(Target::Rigid) > 0.1, "{:e}", residual(target));
+    // f64, by the law alone: the same velocities.
+    let cold = vec![[0.0; 2]; problem.contacts.len()];
+    let stop = Stop { tolerance: 1e-13, iterations: 10_000 };
+    let exact = pgs(&problem, target, &cold, Sweep::Forward, stop).velocities;
+    // The coefficients are known to a few roundings of f32.
+    let error = problem.velocity_error(&outcome.velocities, &exact);
+    assert!(error < 2e-6, "{error:e}");
+    let report = converge(&problem, None, &options(&["soft_step"])).unwrap();
+    let soft = report.curves.iter().find(|c| c.solver == "soft_step without relaxing").unwrap();
+    assert!(!soft.own_is_rigid && soft.own.first[5].is_some() && soft.rigid.first[1].is_none());
+    assert!(soft.rigid.smallest > 0.05 && soft.points[0].own.is_none());
+}
+
+#[test]
+fn every_solver_reaches_its_own_law_on_a_pyramid() {
+    let file = frozen_files().into_iter().find(|f| f.ends_with("box-pyramid-5.frozen")).unwrap();
+    let Frozen { problem, reference } = Frozen::read(&file).unwrap();
+    let names: Vec<&str> = VARIANTS.iter().map(|v| v.name).collect();
+    let settings = Options { max_iterations: 4000, ..options(&names) };
+    let report = converge(&problem, reference.as_ref(), &settings).unwrap();
+    for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
+        assert!(curve.own.first[5].is_some(), "{} {} {:?}", curve.solver, curve.order, curve.own);
+        // The first k within a tolerance is the first indeed.
+        for (first, tolerance) in curve.own.first.iter().zip(report.tolerances) {
+            let at = curve.points[first.unwrap()];
+            assert!(at.own.unwrap() <= tolerance);
+            let before = curve.points[..first.unwrap()].last().unwrap();
+            assert_eq!(before.iterations + 1, at.iterations, "{} {}", curve.solver, curve.order);
+        }
+    }
+}
+
+#[test]
+fn exchanged_sides_are_the_same_problem() {
+    let problem = sliding_box();
+    let mut exchanged = problem.clone();
+    for c in &mut exchanged.contacts {
+        (c.body_a, c.body_b) = (c.body_b, c.body_a);
+        c.normal = c.normal.map(|x| -x);
+        (c.arm_a, c.arm_b) = (c.arm_b.map(|x| -x), c.arm_a.map(|x| -x));
+    }
+    for variant in &VARIANTS {
+        let outcome = |p: &ContactProblem| replay(p, Sequence::Natural).run(variant, sweeps(5), Start::Cold);
+        let (one, other) = (outcome(&problem), outcome(&exchanged));
+        assert_eq!((one.velocities, one.impulses), (other.velocities, other.impulses), "{}", variant.name);
+    }
+}
+
+/// A scene some steps on.
+fn world(name: &str, variant: &'static Variant, budget: Budget, order: Order, steps: u32) -> World {
+    let mut settings = crate::common::settings(variant);
+    (settings.budget, settings.order) = (budget, order);
+    if order == Order::Natural {
+        settings.width = LaneWidth::W1;
+    }
+    crate::common::run(&crate::common::scene(name), settings, steps)
+}
+
+#[test]
+fn capture_looks_and_does_not_touch() {
+    let standard = solvers::find("soft_step").unwrap();
+    let make = || world("pyramid:5", standard, standard.budget, Order::Colored, 40);
+    let (mut looked_at, mut left_alone) = (make(), make());
+    let problem = capture(&mut looked_at, "pyramid");
+    assert_eq!(capture(&mut looked_at, "pyramid"), problem);
+    looked_at.step().unwrap();
+    left_alone.step().unwrap();
+    assert_eq!(looked_at.state_hash(), left_alone.state_hash());
+
+    problem.validate().unwrap();
+    assert_eq!(problem.bodies.len(), 15);
+    assert_eq!(problem.h, f64::from(1.0_f32 / 60.0));
+    let dynamic: Vec<usize> =
+        (0..left_alone.bodies.len()).filter(|&i| left_alone.bodies.is_dynamic(i)).collect();
+    for (body, &i) in problem.bodies.iter().zip(&dynamic) {
+        assert_eq!(body.inv_mass, f64::from(left_alone.bodies.inv_mass[i]));
+        assert_eq!(body.inv_inertia, f64::from(left_alone.bodies.inv_inertia[i]));
+        assert_eq!(body.free_velocity[1], body.velocity[1] - 10.0 * problem.h);
+    }
+    // At rest the warm-start impulses of the whole step carry the weight: 15 m g h on the ground.
+    let on_ground: f64 =
+        problem.contacts.iter().filter(|c| c.body_a.is_none()).map(|c| c.warm_impulse[0]).sum();
+    let weight = problem.total_load();
+    assert!((on_ground / weight - 1.0).abs() < 0.02, "{on_ground} carries {weight}");
+}
+
+#[test]
+fn what_is_written_is_what_is_read() {
+    let variant = solvers::find("pgs").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["pyramid:4", "friction_ramp", "circle_pile:30"] {
+        let mut world = world(name, variant, variant.budget, Order::Colored, 60);
+        let problem = capture(&mut world, name);
+        let frozen = Frozen { reference: reference(&problem).ok(), problem };
+        let path = folder.path().join("problem.frozen");
+        frozen.write(&path).unwrap();
+        assert_eq!(Frozen::read(&path).unwrap(), frozen, "{name}");
+    }
+}
+
+#[test]
+fn a_replayed_problem_is_the_step_of_the_world() {
+    for name in ["pyramid:5", "disc_column:8", "card_house"] {
+        for variant in &VARIANTS {
+            let budget = Budget { substeps: 1, ..variant.budget };
+            for (order, sequence) in
+                [(Order::Natural, Sequence::Natural), (Order::Colored, Sequence::Colored)]
+            {
+                let mut world = world(name, variant, budget, order, 20);
+                let problem = capture(&mut world, name);
+                let Outcome { velocities, sweeps, .. } =
+                    replay(&problem, sequence).run(variant, budget, Start::Warm);
+                world.frozen_step();
+                assert_eq!(sweeps, world.counts.sweeps);
+                let moves: Vec<usize> =
+                    (0..world.bodies.len()).filter(|&i| world.bodies.is_dynamic(i)).collect();
+                let rows = &world.workspace().rows;
+                for (replayed, &i) in velocities.iter().zip(&moves) {
+                    for (replayed, stepped) in replayed.iter().zip(rows[i].velocity) {
+                        let difference = (replayed - f64::from(stepped)).abs();
+                        // Arms and v* differ in their last bits, 6e-8 of numbers near 1; a step
+                        // makes of that a few 1e-7 per sweep.
+                        assert!(difference < 1e-5, "{name} {} {order:?}, {i}: {difference:e}", variant.name);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn reports_say_what_was_measured() {
+    let problem = disc_column(4);
+    let report = run(&problem, &["pgs", "soft_step"]);
+    let text = table::text(&report);
+    assert!(text.contains("unique (no friction)") && text.contains("every start is cold"), "{text}");
+    assert!(text.contains('—') && !text.contains("Time to"), "{text}");
+    let csv = table::csv(&report).unwrap();
+    let points: usize = report.curves.iter().map(|c| c.points.len()).sum();
+    assert_eq!(csv.lines().count(), points + 1);
+    let json: serde_json::Value = serde_json::from_str(&table::json(&report).unwrap()).unwrap();
+    assert_eq!(json["curves"].as_array().unwrap().len(), report.curves.len());
+    assert_eq!(json["contacts"], 4);
+    let svg = plot::svg(&report).unwrap();
+    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"));
+
+    // Warm rows appear where there is something to start from, and only for solvers that do.
+    let mut warm = problem;
+    warm.contacts.iter_mut().for_each(|c| c.warm_impulse = [0.1, 0.0]);
+    let report = run(&warm, &["pgs", "projection"]);
+    let warm = |name: &str| report.curves.iter().any(|c| c.solver == name && c.start == Start::Warm);
+    assert!(warm("pgs") && !warm("projection"));
+}
+
+#[test]
+fn bad_input_is_refused_with_its_value() {
+    let empty = ContactProblem { name: "void".into(), h: 0.01, bodies: Vec::new(), contacts: Vec::new() };
+    let refusal =
+        |problem: &ContactProblem| converge(problem, None, &options(&["pgs"])).unwrap_err().to_string();
+    assert!(refusal(&empty).contains("'void' has none"));
+    let mut huge = disc_column(2);
+    huge.bodies[1].free_velocity[0] = 1e200;
+    assert!(refusal(&huge).contains("bodies[1]"));
+    let wrong = reference(&disc_column(3)).unwrap();
+    assert!(converge(&disc_column(2), Some(&wrong), &options(&["pgs"])).is_err());
+}
+
+#[test]
+fn commands_freeze_and_converge() {
+    use clap::Parser;
+    #[derive(Parser)]
+    enum Cli {
+        Capture(capture_command::CaptureArgs),
+        Converge(converge_command::ConvergeArgs),
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("stack.frozen");
+    let run = |words: &[&str]| -> Result<(), String> {
+        let words = ["simpulse"].iter().chain(words);
+        match Cli::try_parse_from(words).map_err(|e| e.to_string())? {
+            Cli::Capture(args) => capture_command::run(&args),
+            Cli::Converge(args) => converge_command::run(&args),
+        }
+        .map(|_| ())
+        .map_err(|e| e.to_string())
+    };
+    let (path, out) = (file.to_str().unwrap(), folder.path().join("out"));
+    run(&["capture", "stack:3", "--step", "30", "-o", path, "--solver", "pgs"]).unwrap();
+    assert!(Frozen::read(&file).unwrap().reference.is_some());
+    run(&["converge", path, "--out", out.to_str().unwrap(), "--rounds", "1", "--solvers", "pgs"]).unwrap();
+    for name in ["converge.csv", "converge.json", "converge.svg"] {
+        assert!(std::fs::metadata(out.join(name)).unwrap().len() > 1000, "{name}");
+    }
+    let refusal = |words: &[&str]| run(words).unwrap_err();
+    assert!(refusal(&["converge", path, "--solvers", "pgd"]).contains("did you mean 'pgs'"));
+    assert!(refusal(&["converge", "no/such.frozen"]).contains("no/such.frozen"));
+    assert!(refusal(&["converge", path, "--width", "3"]).contains("is 3"));
+    assert!(refusal(&["capture", "stakc:3", "-o", path]).contains("did you mean 'stack'"));
+    assert!(refusal(&["capture", "stack:3", "--step", "0", "-o", path]).contains('0'));
+    assert!(refusal(&["capture", "free_fall", "--step", "2", "-o", path]).contains("no contacts"));
+}

@@ -1,0 +1,84 @@
+//! Law: what a scene does not need costs nothing, and leaving it out changes nothing.
+
+use simpulse::engine::constraints::{Features, Layout, OppositeKind};
+use simpulse::engine::solvers::VARIANTS;
+
+/// Scenes, what each needs, and what it does without.
+fn scenes() -> [(&'static str, Features); 5] {
+    let none = Features::NONE;
+    [
+        ("frictionless_discs", none),
+        ("bouncing_discs", Features { restitution: true, ..none }),
+        ("disc_pile", Features { rotation: true, friction: true, ..none }),
+        ("sliding_boxes", Features { rotation: true, two_points: true, ..none }),
+        ("stack:6", Features { rotation: true, friction: true, two_points: true, ..none }),
+    ]
+}
+
+fn scene(name: &str) -> simpulse::lab::scenes::Scene {
+    let shape = match name {
+        "frictionless_discs" | "disc_pile" => r#""circle":{"radius":0.37}"#,
+        "bouncing_discs" => r#""circle":{"radius":0.37},"restitution":0.7"#,
+        "sliding_boxes" => r#""box":{"half":[0.4,0.3]}"#,
+        _ => return crate::common::scene(name),
+    };
+    let friction = if name == "disc_pile" { 0.6 } else { 0.0 };
+    let wall = |x: f64, y: f64, hx: f64, hy: f64| {
+        format!(r#"{{"type":"static","position":[{x},{y}],"shapes":[{{"box":{{"half":[{hx},{hy}]}}}}]}},"#)
+    };
+    let mut bodies = wall(0.0, -1.0, 6.0, 1.0) + &wall(-6.0, 5.0, 1.0, 7.0) + &wall(6.0, 5.0, 1.0, 7.0);
+    for i in 0..40 {
+        let (x, y) = ((i % 8) as f64 * 1.1 - 3.9 + 0.013 * i as f64, (i / 8) as f64 * 1.05 + 0.5);
+        bodies += &format!(
+            r#"{{"type":"dynamic","position":[{x},{y}],"shapes":[{{{shape},"friction":{friction}}}]}},"#
+        );
+    }
+    let bodies = bodies.trim_end_matches(',');
+    let text = format!(r#"{{"name":"{name}","bodies":[{bodies}]}}"#);
+    simpulse::lab::scenes::Scene::from_json(&text, "test.json".as_ref()).unwrap()
+}
+
+#[test]
+fn needs_are_read_off_the_scene() {
+    for (name, features) in scenes() {
+        let world = scene(name).build(crate::common::settings(&VARIANTS[0])).unwrap();
+        assert_eq!(world.features(), features, "{name}");
+    }
+}
+
+#[test]
+fn the_specialised_and_the_full_kernel_give_the_same_bits() {
+    for (name, _) in scenes() {
+        for variant in &VARIANTS {
+            let mut special = scene(name).build(crate::common::settings(variant)).unwrap();
+            let mut settings = crate::common::settings(variant);
+            settings.extra_features = Features::FULL;
+            let mut full = scene(name).build(settings).unwrap();
+            for step in 1..=200 {
+                special.step().unwrap();
+                full.step().unwrap();
+                assert_eq!(special.state_hash(), full.state_hash(), "{name} {} step {step}", variant.name);
+            }
+            assert!(special.counts.contacts > 4, "{name}: only {} contacts", special.counts.contacts);
+            let bytes = (special.counts.constraint_bytes, full.counts.constraint_bytes);
+            assert!(bytes.0 < bytes.1, "{name} {}: {bytes:?}", variant.name);
+        }
+    }
+}
+
+#[test]
+fn every_need_has_a_price_in_bytes() {
+    let bytes = |features: Features| {
+        Layout::for_features(&features, OppositeKind::Dynamic).bytes(OppositeKind::Dynamic)
+    };
+    let mut features = Features::NONE;
+    let mut last = bytes(features);
+    features.rotation = true;
+    assert_eq!(bytes(features) - last, 16, "four arms");
+    last = bytes(features);
+    features.friction = true;
+    assert_eq!(bytes(features) - last, 12, "coefficient, tangential mass and impulse");
+    last = bytes(features);
+    features.two_points = true;
+    assert_eq!(bytes(features) - last, 36, "a second point");
+}

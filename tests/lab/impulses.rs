@@ -1,0 +1,88 @@
+//! Laws of impulses: they push and do not pull, rub within the cone, and come in pairs.
+
+use proptest::prelude::*;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::lab::scenes::Scene;
+
+#[test]
+fn normal_impulses_push_and_friction_stays_in_its_cone() {
+    for name in ["pyramid:8", "circle_pile:60", "card_house", "friction_ramp"] {
+        for variant in &VARIANTS {
+            let mut world = crate::common::scene(name).build(crate::common::settings(variant)).unwrap();
+            let mut largest = 0.0_f32;
+            for _ in 0..150 {
+                world.step().unwrap();
+                for contact in &world.contacts {
+                    for point in contact.manifold.points() {
+                        let (normal, tangent) = (point.normal_impulse, point.tangent_impulse);
+                        assert!(normal >= 0.0, "{name} {}: {point:?}", variant.name);
+                        assert!(tangent.abs() <= contact.friction * normal, "{name} {}", variant.name);
+                        largest = largest.max(normal);
+                    }
+                }
+            }
+            assert!(largest > 0.0, "{name} {}: nothing was ever pushed", variant.name);
+        }
+    }
+}
+
+/// Discs and boxes flying into one another in empty space.
+fn cloud(seed: &[(f64, f64, f64, f64, f64)]) -> Scene {
+    let bodies: Vec<String> = seed
+        .iter()
+        .enumerate()
+        .map(|(i, (x, y, vx, vy, w))| {
+            let shape = if i % 2 == 0 { r#""circle":{"radius":0.5}"# } else { r#""box":{"half":[0.6,0.4]}"# };
+            let (cx, cy) = ((i % 5) as f64 * 1.2, (i / 5) as f64 * 1.2);
+            format!(
+                r#"{{"type":"dynamic","position":[{},{}],"velocity":[{vx},{vy}],"angular_velocity":{w},
+                    "shapes":[{{{shape},"restitution":0.3}}]}}"#,
+                cx + x,
+                cy + y
+            )
+        })
+        .collect();
+    let text = format!(r#"{{"name":"cloud","gravity":[0,0],"bodies":[{}]}}"#, bodies.join(","));
+    Scene::from_json(&text, "cloud.json".as_ref()).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Impulses come in equal and opposite pairs: linear momentum is kept to rounding. Each body
+    /// collects at most `sweeps × contacts` roundings of half an ulp of its speed; the bound
+    /// below allows 64 ulp of the sum of |m v| per step, and a scatter that lost one impulse of
+    /// typical size would break it by three orders of magnitude.
+    #[test]
+    fn momentum_is_kept(seed in prop::collection::vec(
+        (-0.1..0.1, -0.1..0.1, -3.0..3.0, -3.0..3.0, -4.0..4.0), 25), width in 0..4_usize) {
+        for variant in &VARIANTS {
+            let settings = crate::common::with_width(variant, LaneWidth::ALL[width]);
+            let mut world = cloud(&seed).build(settings).unwrap();
+            let momentum = |world: &simpulse::engine::world::World| {
+                let b = &world.bodies;
+                let mut sum = [0.0_f64; 3];
+                for i in 0..b.len() {
+                    let m = 1.0 / b.inv_mass[i] as f64;
+                    let v = b.velocity(i);
+                    sum[0] += m * v.x as f64;
+                    sum[1] += m * v.y as f64;
+                    sum[2] += m * (v.x.abs() + v.y.abs()) as f64;
+                }
+                sum
+            };
+            let before = momentum(&world);
+            let mut touched = 0;
+            for _ in 0..60 {
+                world.step().unwrap();
+                touched += world.contacts.len();
+            }
+            let after = momentum(&world);
+            let bound = 60.0 * 64.0 * f32::EPSILON as f64 * before[2];
+            prop_assert!(touched > 0);
+            prop_assert!((after[0] - before[0]).abs() < bound, "{} {before:?} {after:?}", variant.name);
+            prop_assert!((after[1] - before[1]).abs() < bound, "{} {before:?} {after:?}", variant.name);
+        }
+    }
+}

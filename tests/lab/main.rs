@@ -1,0 +1,17 @@
+//! Laws of whole scenes and of the laboratory, a file each.
+
+mod advise;
+mod broadphase;
+mod common;
+mod contacts;
+mod converge;
+mod features;
+mod impulses;
+mod metrics;
+mod profile;
+mod scenes;
+mod solver_rules;
+mod truth;
+mod verify;
+mod warm_starting;
+mod width_invariance;

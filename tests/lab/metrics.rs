@@ -1,0 +1,242 @@
+//! Metrics on real runs: what must be zero, what must not, and what an outsider can compute.
+
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::{VARIANTS, find};
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::metrics::{Errors, Observation};
+use simpulse::lab::scenes::{self, Scene};
+
+fn build(scene: &Scene, solver: &str) -> World {
+    let settings =
+        Settings { record_impulses: true, observe_rule: true, ..Settings::new(find(solver).unwrap()) };
+    scene.build(settings).unwrap()
+}
+
+fn observe(world: &mut World, steps: u32) -> Errors {
+    let mut observation = Observation::new(world);
+    for _ in 0..steps {
+        world.step().unwrap();
+        observation.observe(world);
+    }
+    observation.errors()
+}
+
+fn json(bodies: &str, gravity: f64) -> Scene {
+    let text = format!(r#"{{"name":"x","gravity":[0,{gravity}],"bodies":[{bodies}]}}"#);
+    Scene::from_json(&text, "x.json".as_ref()).unwrap()
+}
+
+#[test]
+fn a_scene_without_bodies_has_no_errors() {
+    for variant in &VARIANTS {
+        let errors = observe(&mut build(&json("", -10.0), variant.name), 3);
+        assert_eq!(errors, Errors { steps: 3, ..Errors::default() });
+    }
+}
+
+#[test]
+fn free_fall_keeps_everything_to_rounding() {
+    for variant in &VARIANTS {
+        let mut world = build(&scenes::load("free_fall").unwrap().scene, variant.name);
+        let errors = observe(&mut world, 60);
+        // 60 steps of up to 4 substeps, each a few roundings of 6e-8 of what it adds to.
+        for value in [errors.momentum, errors.energy_change.abs(), errors.energy_created] {
+            assert!(value < 1e-5, "{} {errors:?}", variant.name);
+        }
+        assert_eq!((errors.points, errors.law_rms, errors.penetration_max), (0, 0.0, 0.0));
+    }
+}
+
+#[test]
+fn the_ground_takes_the_momentum_that_weight_gives() {
+    for variant in &VARIANTS {
+        // Boxes on a slope and on each other: impulses of both kinds, at both ends.
+        for name in ["incline_slip", "pyramid:6", "friction_ramp"] {
+            let errors = observe(&mut build(&scenes::load(name).unwrap().scene, variant.name), 120);
+            // Rounding of velocities below 10 m/s in 120 steps; a lost impulse would be 1e-2.
+            assert!(errors.momentum < 1e-4, "{name} {} {errors:?}", variant.name);
+        }
+    }
+}
+
+#[test]
+fn a_push_from_nowhere_shows_in_every_balance() {
+    let mut world = build(&scenes::load("stack:3").unwrap().scene, "pgs");
+    let mut observation = Observation::new(&world);
+    for step in 0..40 {
+        if step == 20 {
+            world.bodies.velocity_x[3] += 0.5;
+            world.bodies.angular_velocity[3] += 0.5;
+        }
+        world.step().unwrap();
+        observation.observe(&world);
+    }
+    let errors = observation.errors();
+    // One of three boxes of 1 kg: 0.5 N·s of 3 kg × at most 0.5/√3 · √(1 + 1/6) m/s.
+    assert!(errors.momentum > 0.3, "{errors:?}");
+    assert!(errors.angular_momentum > 0.1, "{errors:?}");
+    // ½ 1 kg 0.25 m²/s² + ½ (1/6) 0.25 = 0.146 J, of which friction takes some in the same
+    // step; the scale is the weight of 30 N × √(1/6) m = 12.2 J and more.
+    assert!((0.003..0.146 / 12.2).contains(&errors.energy_created), "{errors:?}");
+}
+
+#[test]
+fn a_solver_without_friction_breaks_the_tangential_law_only() {
+    let scene = scenes::load("incline_slip").unwrap().scene;
+    let with = observe(&mut build(&scene, "pgs"), 60);
+    let without = observe(&mut build(&scene, "projection"), 60);
+    // Friction should be µ N = 0.24 cos θ m g Δt in all, shared by two points.
+    let expected = 0.24 * 0.25_f64.cos() / 2.0;
+    assert!(with.law_tangent_rms < 1e-3, "{with:?}");
+    assert!((without.law_tangent_rms - expected).abs() < 0.05 * expected, "{without:?}");
+    assert!(without.law_normal_rms < 1e-2, "{without:?}");
+}
+
+#[test]
+fn penetration_is_what_the_poses_say() {
+    let scene = json(
+        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[5,1]}}]},
+           {"type":"dynamic","position":[0,0.3],"shapes":[{"circle":{"radius":0.5}}]}"#,
+        0.0,
+    );
+    let mut world = build(&scene, "pgs");
+    let errors = observe(&mut world, 1);
+    let depth = 0.5 - world.bodies.position_y[1] as f64;
+    assert!(depth > 0.1 && depth < 0.2, "{depth}");
+    // One point, one step: the maximum is the mean. Distances of 1 m in f32.
+    for value in [errors.penetration_max, errors.penetration_mean, errors.penetration_rms] {
+        assert!((value - depth).abs() < 1e-6, "{value} {depth}");
+    }
+    assert!((errors.penetration_relative - depth / 0.5).abs() < 1e-5);
+}
+
+#[test]
+fn a_lift_gives_energy_that_is_accounted_for() {
+    let scene = json(
+        r#"{"type":"kinematic","position":[0,-1],"velocity":[0,1],"shapes":[{"box":{"half":[5,1]}}]},
+           {"type":"dynamic","position":[0,0.5],"velocity":[0,1],"shapes":[{"box":{"half":[0.5,0.5]}}]}"#,
+        -10.0,
+    );
+    let mut world = build(&scene, "pgs");
+    let errors = observe(&mut world, 120);
+    // 2 m × 10 N = 20 J came in; the scale is 0.5 J + 10 N × √(1/6) m = 4.6 J.
+    assert!(world.bodies.position_y[1] > 2.4);
+    assert!(errors.energy_change.abs() < 1e-3, "{errors:?}");
+}
+
+#[test]
+fn rest_velocity_is_of_the_last_second() {
+    // 2 m/s for ever; and a disc that spins with 2 rad/s: √(ω² r²/2) = 0.7071 m/s at r = 0.5.
+    let moving =
+        r#"{"type":"dynamic","position":[0,0],"velocity":[2,0],"shapes":[{"circle":{"radius":0.5}}]}"#;
+    let spinning =
+        r#"{"type":"dynamic","position":[0,0],"angular_velocity":2,"shapes":[{"circle":{"radius":0.5}}]}"#;
+    let speed = |body: &str| observe(&mut build(&json(body, 0.0), "pgs"), 90).rest_velocity;
+    assert!((speed(moving) - 2.0).abs() < 1e-6);
+    assert!((speed(spinning) - 0.5_f64.sqrt()).abs() < 1e-6);
+}
+
+#[test]
+fn errors_do_not_depend_on_the_lane_width() {
+    let scene = scenes::load("pyramid:5").unwrap().scene;
+    let of = |width| {
+        let settings = Settings { record_impulses: true, width, ..Settings::new(find("soft_step").unwrap()) };
+        observe(&mut scene.build(settings).unwrap(), 60)
+    };
+    let one = of(LaneWidth::W1);
+    assert!(one.penetration_max > 0.0 && one.law_rms > 0.0);
+    for width in LaneWidth::ALL {
+        assert_eq!(of(width), one, "{width:?}");
+    }
+}
+
+#[test]
+fn a_soft_contact_rests_at_its_analytic_floor() {
+    let scene = scenes::load("stack:1").unwrap().scene;
+    let errors = observe(&mut build(&scene, "soft_step"), 180);
+    // 1 kg and 1/6 kg·m² on two corners 0.5 m off the middle: m = 1/(1 + 6/4) kg, 5 N each,
+    // ω = 2 · 2π · 30 Hz against the ground.
+    let omega = 120.0 * std::f64::consts::PI;
+    let floor = 5.0 / (0.4 * omega * omega);
+    // The last bits of a height of 0.5 m are 3e-8 m, and a soft box hardly moves: 1 µm.
+    assert!((errors.soft_floor.unwrap() - floor).abs() < 0.01 * floor, "{errors:?}");
+    assert!((errors.penetration_max - floor).abs() < 1e-6, "{errors:?}");
+    assert!(errors.penetration_excess.unwrap() < 1e-6, "{errors:?}");
+    assert_eq!(observe(&mut build(&scene, "pgs"), 3).penetration_excess, None);
+}
+
+#[test]
+fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
+    let scene = json(
+        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[5,1]}}]},
+           {"type":"dynamic","position":[0,0.4],"shapes":[{"circle":{"radius":0.5}}]}"#,
+        -10.0,
+    );
+    let errors = observe(&mut build(&scene, "pgs"), 1);
+    // The bias wants 0.3 · (0.1 − 0.005) m · 60/s = 1.71 m/s, and the disc gets it. The rigid
+    // law wants it to stand: in m · 10 m/s² / 60, weight × step, 10.26 are too many.
+    assert!((errors.law_normal_max - 10.26).abs() < 0.01, "{errors:?}");
+    // One row that is solved exactly: rounding.
+    assert!(errors.own_max.unwrap() < 1e-5, "{errors:?}");
+
+    // Warm starts in one sweep leave a stack unsolved.
+    let mut world = build(&scenes::load("stack:10").unwrap().scene, "pgs");
+    world.settings.budget.velocity_iterations = 1;
+    assert!(observe(&mut world, 5).own_rms.unwrap() > 1e-3);
+    // Not asked for, and after bounces: none.
+    world.settings.observe_rule = false;
+    assert_eq!(observe(&mut world, 5).own_rms, None);
+    assert_eq!(observe(&mut build(&scenes::load("bounce").unwrap().scene, "pgs"), 90).own_rms, None);
+}
+
+#[test]
+fn friction_takes_the_energy_of_a_slide() {
+    // 1 kg at 1 m/s, µ = 0.5: stops after 0.2 s. Scale: ½ J + 10 N · √(1/6) m.
+    let scene = json(
+        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[9,1]},"friction":0.5}]},
+           {"type":"dynamic","position":[0,0.5],"velocity":[1,0],
+            "shapes":[{"box":{"half":[0.5,0.5]},"friction":0.5}]}"#,
+        -10.0,
+    );
+    let mut world = build(&scene, "pgs");
+    world.settings.budget.velocity_iterations = 100;
+    let errors = observe(&mut world, 120);
+    let scale = 0.5 + 10.0 / 6.0_f64.sqrt();
+    // The box tips by what 100 sweeps leave: per mille of its energy.
+    assert!((errors.friction_loss - 0.5 / scale).abs() < 1e-3, "{errors:?}");
+    assert!((errors.energy_change + 0.5 / scale).abs() < 1e-3, "{errors:?}");
+    assert!(errors.impact_loss.abs() < 1e-3 && errors.energy_unexplained < 1e-5, "{errors:?}");
+    // It stopped for good after 0.2 s, to a step or two.
+    assert!((errors.settled.unwrap() - 0.2).abs() < 0.04, "{errors:?}");
+    assert!(errors.creep < 1e-4, "{errors:?}");
+}
+
+#[test]
+fn a_box_without_friction_creeps_down_a_slope() {
+    let mut world = build(&scenes::load("incline_slip").unwrap().scene, "projection");
+    let errors = observe(&mut world, 60);
+    // x_n = a h² n (n + 1)/2 with a = g sin 0.25 rad; a fit to n² + n over n = 1 … 60 has the
+    // slope 2 · 30.5 + 1, so x has a h/2 · 62. Rounding of positions below 1.3 m.
+    let expected = 10.0 * 0.25_f64.sin() * 31.0 / 60.0;
+    assert!((errors.creep - expected).abs() < 1e-5, "{expected} {errors:?}");
+    // A parabola is no line: its slope is uncertain.
+    assert!(errors.creep_half_width > 0.01, "{errors:?}");
+    assert_eq!(errors.settled, None);
+}
+
+#[test]
+fn speed_from_nowhere_is_a_blow_up() {
+    let mut world = build(&scenes::load("stack:3").unwrap().scene, "pgs");
+    let mut observation = Observation::new(&world);
+    for step in 1..=10 {
+        if step == 5 {
+            world.bodies.velocity_y[2] = 200.0;
+        }
+        world.step().unwrap();
+        observation.observe(&world);
+        let seen = observation.blown_up().map(|d| (d.step, d.body));
+        // It throws the box above it, and one of the two is the fastest.
+        assert_eq!(seen.is_some(), step >= 5, "{seen:?}");
+        assert!(seen.is_none_or(|(at, body)| at == 5 && body >= 2), "{seen:?}");
+    }
+}

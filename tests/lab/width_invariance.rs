@@ -1,0 +1,84 @@
+//! Law: the number of lanes changes the time a step takes and nothing else.
+
+use crate::common::{run, settings};
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::world::Order;
+use simpulse::lab::scenes;
+
+/// Scenes that differ in what their kernels need: discs with and without friction, boxes,
+/// polygons, restitution, kinematic bodies, colours that run out.
+const SCENES: [&str; 8] = [
+    "disc_column:10",
+    "stack:12",
+    "pyramid:12",
+    "circle_pile:120",
+    "card_house",
+    "arch",
+    "oblique_collision",
+    "crowded_plate",
+];
+const STEPS: u32 = 300;
+
+#[test]
+fn all_widths_give_the_same_bits() {
+    for scene in SCENES {
+        let scene = crate::common::scene(scene);
+        for variant in &VARIANTS {
+            let mut hashes = Vec::new();
+            for width in LaneWidth::ALL {
+                let mut world = scene.build(crate::common::with_width(variant, width)).unwrap();
+                let mut trail = Vec::new();
+                for _ in 0..STEPS {
+                    let outcome = world.step();
+                    trail.push(world.state_hash());
+                    if outcome.is_err() {
+                        break;
+                    }
+                }
+                hashes.push(trail);
+            }
+            for (width, trail) in LaneWidth::ALL.iter().zip(&hashes).skip(1) {
+                let first = trail.iter().zip(&hashes[0]).position(|(a, b)| a != b);
+                assert_eq!(first, None, "{} {} {width:?}: first differing step", scene.name, variant.name);
+                assert_eq!(trail.len(), hashes[0].len(), "{} {}: diverged apart", scene.name, variant.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_run_twice_gives_the_same_bits() {
+    for name in ["pyramid:10", "circle_pile:80"] {
+        for variant in &VARIANTS {
+            for order in [Order::Natural, Order::Colored] {
+                let mut settings = settings(variant);
+                settings.order = order;
+                if order == Order::Natural {
+                    settings.width = LaneWidth::W1;
+                }
+                let scene = crate::common::scene(name);
+                let (a, b) = (run(&scene, settings.clone(), 200), run(&scene, settings, 200));
+                assert_eq!(a.state_hash(), b.state_hash(), "{name} {} {order:?}", variant.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_order_of_constraints_does_change_the_bits() {
+    // Else the hashes above would compare nothing.
+    let scene = crate::common::scene("pyramid:10");
+    let colored = run(&scene, settings(&VARIANTS[1]), 50);
+    let mut natural = settings(&VARIANTS[1]);
+    (natural.order, natural.width) = (Order::Natural, LaneWidth::W1);
+    assert_ne!(colored.state_hash(), run(&scene, natural, 50).state_hash());
+}
+
+#[test]
+fn a_crowded_plate_runs_out_of_colors() {
+    let world = run(&scenes::load("pyramid:4").unwrap().scene, settings(&VARIANTS[2]), 1);
+    assert_eq!(world.counts.overflow, 0);
+    let world = run(&crate::common::scene("crowded_plate"), settings(&VARIANTS[2]), 60);
+    assert!(world.counts.overflow > 0, "{:?}", world.counts);
+}
