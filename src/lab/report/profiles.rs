@@ -5,7 +5,7 @@ use super::table::{finish, table};
 use super::units::{digits, ratio, si, si_short};
 use crate::lab::error::Error;
 use crate::lab::study::Record;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, Sample, solvers_of};
 use crate::lab::study::profile::{Profile, TOLERANCES};
 use crate::lab::study::slices::{Slice, equal_error, equal_time};
 use plotters::prelude::*;
@@ -122,7 +122,7 @@ pub fn slice_tables(records: &[Record]) -> String {
     let solvers = solvers_of(records);
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
     let mut text = String::new();
-    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice>, equal_time: bool| {
+    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice<'_>>, equal_time: bool| {
         let mut header = vec!["error", "scene", "at"];
         header.extend(&solvers);
         header.push(if equal_time { "least error" } else { "least time" });
@@ -135,9 +135,13 @@ pub fn slice_tables(records: &[Record]) -> String {
         }
         text += &format!("{heading}\n{}", finish(rows, 2));
     };
-    add("Equal time: the error that each solver has then (— outside its budgets)", equal_time, true);
     add(
-        "\nEqual error: µs per step to it (— outside its budgets; = tied within the noise)",
+        "Equal time: the least error of a setting that takes at most that long (— none does)",
+        equal_time,
+        true,
+    );
+    add(
+        "\nEqual error: µs per step of the fastest setting whose error is at most that (— none; = tied)",
         equal_error,
         false,
     );
@@ -151,10 +155,10 @@ fn slice_row(slice: &Slice, axis: &str, equal_time: bool) -> Vec<String> {
     };
     let time = |ns: f64| digits(1e-3 * ns);
     let at = if equal_time { format!("{} µs", time(slice.at)) } else { error(slice.at) };
-    let mut cells = vec![axis.to_string(), slice.scene.clone(), at];
-    let show = |[value, _]: [f64; 2]| if equal_time { error(value) } else { time(value) };
+    let mut cells = vec![axis.to_string(), slice.scene.to_string(), at];
+    let show = |s: Sample| if equal_time { error(s.error) } else { time(s.time) };
     cells.extend(slice.values.iter().map(|(_, value)| value.map_or("—".to_string(), show)));
-    cells.push(slice.best().join(" = "));
+    cells.push(slice.best.join(" = "));
     cells
 }
 
