@@ -12,7 +12,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use simpulse::engine::constraints::sweep::{NormalRule, sweep, sweep_store};
 use simpulse::engine::constraints::{Batches, Kernel, Workspace};
 use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
-use simpulse::engine::solvers::soft_step::{RigidRule, SoftRule};
+use simpulse::engine::constraints::rules::{Rigid, Soft};
 use std::hint::black_box;
 use wide::{f32x4, f32x8, f32x16};
 
@@ -110,8 +110,8 @@ fn bench(c: &mut Criterion) {
     let h = 1.0 / 240.0;
     for scene in SCENES {
         let starts = LaneWidth::ALL.map(|width| Start::of(scene, width));
-        bench_rule(c, "soft", scene, &starts, SoftRule::new(30.0, h));
-        bench_rule(c, "relax", scene, &starts, RigidRule { inv_h: 1.0 / h });
+        bench_rule(c, "soft", scene, &starts, Soft::new([188.49556, 376.99112], 10.0, 3.0, h));
+        bench_rule(c, "relax", scene, &starts, Rigid { inv_h: 1.0 / h });
     }
 }
 

@@ -7,6 +7,7 @@ use crate::lab::advise::limits::{Limits, quantity};
 use crate::lab::advise::{Advice, Plan, Setting, Trial, advise};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
+use crate::lab::overrides;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, ratio, si, si_short};
@@ -112,7 +113,7 @@ impl AdviseArgs {
             scene: self.scene.clone(),
             limits,
             solvers: match self.solvers.is_empty() {
-                true => VARIANTS.iter().collect(),
+                true => VARIANTS.to_vec(),
                 false => self.solvers.iter().map(|name| find(name)).collect::<Result<_, _>>()?,
             },
             widths: if widths.is_empty() { LaneWidth::ALL.to_vec() } else { widths },
@@ -296,7 +297,7 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
             "solver": s.solver.name,
             "order": s.order,
             "budget": s.budget,
-            "contact_hertz": s.contact_hertz,
+            "parameters": overrides::by_name(s.solver, &s.parameters),
         })
     };
     let trial = |t: &Trial| {

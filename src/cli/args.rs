@@ -7,10 +7,10 @@ use crate::cli::growth::GrowthArgs;
 use crate::cli::profile::ProfileArgs;
 use crate::cli::verify::VerifyArgs;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::CONTACT_HERTZ;
 use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
+use crate::lab::overrides::Override;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::budget::BudgetGrid;
 use clap::{Args, Parser, Subcommand};
@@ -106,10 +106,9 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
-    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
-    /// substep rate acts
-    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
-    pub contact_hertz: f32,
+    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
+    pub set: Vec<Override>,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
@@ -161,10 +160,9 @@ pub struct RunArgs {
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
-    /// Stiffness of soft contacts (Hz), for solvers that have them; at most an eighth of the
-    /// substep rate acts
-    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ, allow_negative_numbers = true)]
-    pub contact_hertz: f32,
+    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
+    pub set: Vec<Override>,
     /// Step in seconds [default: that of the scene]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
@@ -214,7 +212,7 @@ impl StudyArgs {
                 relax_iterations: self.relax_iterations.clone(),
                 position_iterations: self.position_iterations.clone(),
             },
-            contact_hertz: self.contact_hertz,
+            overrides: self.set.clone(),
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),

@@ -2,11 +2,11 @@
 
 use super::capture::{RunArgs, freeze};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::CONTACT_HERTZ;
 use crate::engine::solvers::{self, VARIANTS};
 use crate::lab::converge::{Options, converge, plot, table};
 use crate::lab::error::Error;
 use crate::lab::files;
+use crate::lab::overrides::{self, Override};
 use crate::lab::reference::frozen::Frozen;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -49,9 +49,9 @@ pub struct ConvergeArgs {
     /// Lanes in coloured order: 1, 4, 8 or 16
     #[arg(long, value_name = "LANES", default_value_t = 8)]
     pub width: usize,
-    /// Stiffness of soft contacts (Hz)
-    #[arg(long, value_name = "HZ", default_value_t = CONTACT_HERTZ)]
-    pub contact_hertz: f32,
+    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
+    pub set: Vec<Override>,
     /// Seed of the shuffled order
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -66,23 +66,20 @@ pub struct ConvergeArgs {
 impl ConvergeArgs {
     fn options(&self) -> Result<Options, Error> {
         let solvers = if self.solvers.is_empty() {
-            VARIANTS.iter().collect()
+            VARIANTS.to_vec()
         } else {
             self.solvers.iter().map(|name| solvers::find(name)).collect::<Result<_, _>>()?
         };
         let width = LaneWidth::ALL.into_iter().find(|w| w.lanes() == self.width);
         let width = width
             .ok_or_else(|| Error::invalid("--width", format!("is {}, must be 1, 4, 8 or 16", self.width)))?;
-        if !(self.contact_hertz > 0.0 && self.contact_hertz.is_finite()) {
-            let message = format!("is {} Hz, must be > 0", self.contact_hertz);
-            return Err(Error::invalid("--contact-hertz", message));
-        }
+        overrides::check(&solvers, &self.set)?;
         Ok(Options {
             solvers,
             max_iterations: self.max_iterations,
             seed: self.seed,
             width,
-            contact_hertz: self.contact_hertz,
+            overrides: self.set.clone(),
             rounds: self.rounds,
         })
     }

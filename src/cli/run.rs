@@ -9,6 +9,7 @@ use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::metrics::Observation;
+use crate::lab::overrides;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, si};
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
@@ -101,12 +102,12 @@ fn settings(args: &RunArgs) -> Result<Settings, Error> {
         position_iterations: args.position_iterations.unwrap_or(own.position_iterations),
     };
     budget::check(&chosen, solver)?;
-    budget::check_hertz(args.contact_hertz)?;
+    overrides::check(&[solver], &args.set)?;
     Ok(Settings {
         width: lanes,
         order,
         budget: chosen,
-        contact_hertz: args.contact_hertz,
+        parameters: overrides::values(solver, &args.set)?,
         record_impulses: true,
         timed: true,
         ..Settings::new(solver)

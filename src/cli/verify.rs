@@ -51,7 +51,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
         return print(&list(&cases), ExitCode::SUCCESS);
     }
     let solvers: Vec<&Variant> = match args.solvers.is_empty() {
-        true => VARIANTS.iter().collect(),
+        true => VARIANTS.to_vec(),
         false => args.solvers.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?,
     };
     // Before the long wait, not after it.
@@ -338,7 +338,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("verify.json");
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
-        let matrix = verify::run(cases, VARIANTS.iter().collect(), 1, Lab::new, &|_| ());
+        let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_| ());
         write(Pending::new(&path).unwrap(), &path, &json(&matrix)).unwrap();
         let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());

@@ -69,3 +69,26 @@ pub struct Budget {
     /// Position sweeps per substep.
     pub position_iterations: u32,
 }
+
+/// Most parameters that a solver has.
+pub const MAX_PARAMETERS: usize = 8;
+
+/// A number that a solver can be given, beside its budget.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name for settings, records and the command line, in `snake_case`.
+    pub name: &'static str,
+    /// Unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Value where none is given.
+    pub default: f32,
+    /// Least and greatest value.
+    pub range: [f32; 2],
+    /// What it does, in one line.
+    pub meaning: &'static str,
+    /// Values that a search for a good setting tries; empty where the standard one is kept.
+    pub trials: &'static [f32],
+}
+
+/// Values of a solver's parameters, in the order of its table; zero past its end.
+pub type Parameters = [f32; MAX_PARAMETERS];

@@ -3,7 +3,7 @@
 //! Floors, each importing from those before it only:
 //!
 //! ```text
-//! error  files                   what can go wrong; result files
+//! error  files  overrides        what can go wrong; result files; parameters by name
 //! scenes                         what is simulated, and its known truth
 //! reference  metrics             certified solutions; errors read from states
 //! capture  verify                frozen problems; hard cases
@@ -18,6 +18,7 @@ pub mod converge;
 pub mod error;
 pub mod files;
 pub mod metrics;
+pub mod overrides;
 pub mod profile;
 pub mod reference;
 pub mod report;

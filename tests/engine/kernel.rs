@@ -10,7 +10,7 @@ use simpulse::engine::constraints::{
 };
 use simpulse::engine::contacts::{Contact, Manifold, ManifoldPoint};
 use simpulse::engine::lanes::{BodyRow, Lanes};
-use simpulse::engine::solvers::soft_step::RigidRule;
+use simpulse::engine::constraints::rules::Rigid;
 
 const BODIES: usize = 24;
 const INV_H: f32 = 60.0;
@@ -99,7 +99,7 @@ fn in_lanes<L: Lanes>(setup: &Setup) -> (Vec<BodyRow>, Vec<[[f32; 2]; 2]>, Batch
     prepare::prepare::<L, Full>(&mut rows, &mut batches, &setup.contacts);
     sweep::warm_start::<L, Full>(&mut rows, &mut batches);
     for _ in 0..3 {
-        sweep::sweep::<L, Full, _>(&mut rows, &mut batches, RigidRule { inv_h: INV_H });
+        sweep::sweep::<L, Full, _>(&mut rows, &mut batches, Rigid { inv_h: INV_H });
     }
     let mut impulses = vec![[[0.0; 2]; 2]; setup.contacts.len()];
     batches.for_each_lane(&Features::FULL, |contact, layout, record, lane| {

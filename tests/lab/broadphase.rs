@@ -6,7 +6,7 @@ use simpulse::engine::bodies::{Bodies, BodyDef, BodyKind};
 use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, HashGrid, Proxy, all_pairs};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::shapes::{Aabb, MassProperties, Shape};
-use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::solvers::find;
 
 fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
     let min = Vec2::from(min);
@@ -396,7 +396,7 @@ fn worlds_do_not_depend_on_the_kind() {
         let hashes = BroadPhaseKind::ALL.map(|kind| {
             let settings = simpulse::engine::world::Settings {
                 broadphase: kind,
-                ..crate::common::settings(&VARIANTS[2])
+                ..crate::common::settings(find("soft_step").unwrap())
             };
             crate::common::run(&scene, settings, if name == "smash" { 12 } else { 150 }).state_hash()
         });

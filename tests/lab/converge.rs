@@ -2,7 +2,7 @@
 
 use simpulse::cli::{capture as capture_command, converge as converge_command};
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::params::{Budget, CONTACT_HERTZ};
+use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{self, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
@@ -122,7 +122,7 @@ fn files_converge_to_the_floor_and_to_their_certified_velocities() {
 }
 
 fn replay<'a>(problem: &'a ContactProblem, order: Sequence) -> Replay<'a> {
-    Replay::new(problem, order, LaneWidth::W8, CONTACT_HERTZ).unwrap()
+    Replay::new(problem, order, LaneWidth::W8, solvers::find("soft_step").unwrap().defaults()).unwrap()
 }
 
 fn sweeps(k: u32) -> Budget {

@@ -41,7 +41,7 @@ fn scene(name: &str) -> simpulse::lab::scenes::Scene {
 #[test]
 fn needs_are_read_off_the_scene() {
     for (name, features) in scenes() {
-        let world = scene(name).build(crate::common::settings(&VARIANTS[0])).unwrap();
+        let world = scene(name).build(crate::common::settings(VARIANTS[0])).unwrap();
         assert_eq!(world.features(), features, "{name}");
     }
 }

@@ -299,10 +299,12 @@ fn every_observer_has_an_error_at_the_end() {
 fn a_world_takes_its_field_and_its_step_from_the_scene() {
     let mut scene = scene("stack:3");
     (scene.gravity, scene.dt) = ([1.5, -2.0], 0.125);
-    let world = scene.build(Settings::new(&solvers::VARIANTS[0])).unwrap_or_else(|e| panic!("{e}"));
+    let world =
+        scene.build(Settings::new(solvers::find("projection").unwrap())).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!((world.settings.gravity, world.settings.dt, world.bodies.len()), ([1.5, -2.0], 0.125, 4));
     scene.bodies[2].shapes[0].density = f64::NAN;
-    let message = scene.build(Settings::new(&solvers::VARIANTS[0])).err().map(|e| e.to_string());
+    let message =
+        scene.build(Settings::new(solvers::find("projection").unwrap())).err().map(|e| e.to_string());
     assert_eq!(message.as_deref(), Some("bodies[2].shapes[0].density: must be finite in 32 bits, is NaN"));
 }
 

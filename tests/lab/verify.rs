@@ -157,7 +157,7 @@ const FAST: &[&str] =
 
 #[test]
 fn results_repeat_for_every_solver_and_any_number_of_threads() {
-    let solvers: Vec<&Variant> = VARIANTS.iter().collect();
+    let solvers: Vec<&Variant> = VARIANTS.to_vec();
     let numbers = |threads| -> Vec<String> {
         let matrix = run(FAST, &solvers, threads, Lab::new);
         matrix.cells.iter().flatten().map(|cell| format!("{cell:?}")).collect()

@@ -2,7 +2,7 @@
 
 use crate::common::{run, settings};
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::Order;
 use simpulse::lab::scenes;
 
@@ -69,16 +69,16 @@ fn the_same_run_twice_gives_the_same_bits() {
 fn the_order_of_constraints_does_change_the_bits() {
     // Else the hashes above would compare nothing.
     let scene = crate::common::scene("pyramid:10");
-    let colored = run(&scene, settings(&VARIANTS[1]), 50);
-    let mut natural = settings(&VARIANTS[1]);
+    let colored = run(&scene, settings(find("pgs").unwrap()), 50);
+    let mut natural = settings(find("pgs").unwrap());
     (natural.order, natural.width) = (Order::Natural, LaneWidth::W1);
     assert_ne!(colored.state_hash(), run(&scene, natural, 50).state_hash());
 }
 
 #[test]
 fn a_crowded_plate_runs_out_of_colors() {
-    let world = run(&scenes::load("pyramid:4").unwrap().scene, settings(&VARIANTS[2]), 1);
+    let world = run(&scenes::load("pyramid:4").unwrap().scene, settings(find("soft_step").unwrap()), 1);
     assert_eq!(world.counts.overflow, 0);
-    let world = run(&crate::common::scene("crowded_plate"), settings(&VARIANTS[2]), 60);
+    let world = run(&crate::common::scene("crowded_plate"), settings(find("soft_step").unwrap()), 60);
     assert!(world.counts.overflow > 0, "{:?}", world.counts);
 }

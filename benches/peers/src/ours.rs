@@ -20,8 +20,9 @@ impl Simpulse {
         broadphase: BroadPhaseKind,
     ) -> Result<Self, String> {
         let solver = solvers::find("soft_step").map_err(|e| e.to_string())?;
-        let mut settings =
-            Settings { width, broadphase, contact_hertz: contender.hertz, ..Settings::new(solver) };
+        let mut settings = Settings { width, broadphase, ..Settings::new(solver) };
+        let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
+        set.map_err(|e| e.to_string())?;
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }

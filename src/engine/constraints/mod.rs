@@ -1,21 +1,34 @@
-//! Constraints: contacts as lane batches, and the row arithmetic that solvers share.
+//! Constraints: contacts as lane batches, and the passes that solvers are made of.
 //!
-//! Reading order: [`needs`] (what is compiled in, where a record keeps what),
-//! [`batches`] and [`assign`] (which contact stands in which lane), [`sweep`] (the kernel),
-//! [`prepare`], [`restitution`], [`motion`], and [`problem`], which is all that a
-//! solver sees.
+//! Reading order: [`features`] (what is compiled in, where a record keeps what), [`batches`] and
+//! [`assign`] (which contact is in which lane), [`sweep`] (the kernel) and [`rules`] (what it
+//! solves), [`prepare`], [`restitution`], [`motion`]; then [`passes`], which is all that a solver
+//! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
+//! sweep; [`system`] shows the problem as vectors, [`graph`] as nodes and edges, and [`kept`]
+//! keeps a solver's own numbers. [`pass`] is how a kernel is added.
 
 pub mod assign;
 pub mod batches;
+pub mod block;
 pub mod features;
+pub mod graph;
+pub mod jacobi;
+pub mod kept;
 pub mod motion;
 pub mod observe;
+pub mod pass;
+pub mod passes;
+pub mod position;
 pub mod prepare;
-pub mod problem;
 pub mod restitution;
+pub mod rules;
 pub mod sweep;
+pub mod system;
 
 pub use batches::Batches;
 pub use features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
-pub use problem::{Problem, StepInput, WorkCount, Workspace};
-pub use sweep::NormalRule;
+pub use pass::{AnyPass, Pass, PassInput};
+pub use passes::{Passes, StepInput, WorkCount, Workspace};
+pub use position::PositionSweep;
+pub use rules::{NormalRule, Rule};
+pub use system::System;

@@ -1,17 +1,17 @@
 //! The law behind a rule, read off the rule itself.
 //!
-//! A sweep under a [`super::NormalRule`] converges, if it does, to impulses that the rule leaves alone.
+//! A sweep under a [`super::rules::NormalRule`] converges, if it does, to impulses that the rule leaves alone.
 //! Which contact law those obey is asked of the rule by trying it, so that no solver can be
 //! measured against a law that it does not solve. Nothing is observed unless
 //! [`super::Workspace::observe`] is set; a step then costs one branch per sweep.
 
-use super::sweep::NormalRule;
+use super::rules::VelocitySweep;
 use crate::engine::lanes::BodyRow;
 use std::fmt;
 
 /// The rule of a velocity sweep, as a function of plain numbers.
 pub struct ObservedRule {
-    rule: Box<dyn Fn(bool, f32, f32, f32) -> f32>,
+    sweep: Box<dyn VelocitySweep + Send + Sync>,
     /// Whether the sweep solved friction rows.
     pub friction: bool,
     /// How far each row's body had moved since the step began: Δx, Δy (m), Δθ (rad); the fourth
@@ -41,13 +41,13 @@ const FASTEST_PROBE: f32 = 1048576.0;
 const KEEP_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 impl ObservedRule {
-    /// Keeps a copy of `rule`, and of the motions that it saw.
-    pub fn of<R: NormalRule>(rule: R, rows: &[BodyRow]) -> Self {
-        let rule = move |against_static, vn, separation, old| {
-            rule.normal_impulse::<f32>(against_static, vn, separation, 1.0, old)
-        };
-        let deltas = rows.iter().map(|row| row.delta).collect();
-        ObservedRule { rule: Box::new(rule), friction: R::FRICTION, deltas }
+    /// Keeps a copy of the rule of `sweep`, and of the motions that it saw.
+    pub fn of(sweep: &dyn VelocitySweep, rows: &[BodyRow]) -> Self {
+        ObservedRule {
+            sweep: sweep.boxed(),
+            friction: sweep.has_friction(),
+            deltas: rows.iter().map(|row| row.delta).collect(),
+        }
     }
 
     /// The law at a contact with this separation (m) and effective mass (kg); none where the rule
@@ -65,7 +65,9 @@ impl ObservedRule {
     /// powers of two, so that products with them are exact, and as small as they can be, since
     /// the rounding of b grows with them.
     pub fn law(&self, against_static: bool, separation: f32, mass: f64) -> Option<NormalLaw> {
-        let f = |vn: f32, old: f32| f64::from((self.rule)(against_static, vn, separation, old));
+        let f = |vn: f32, old: f32| {
+            f64::from(self.sweep.normal_impulse(against_static, vn, separation, 1.0, old))
+        };
         let mut speed = 1.0_f32;
         let [once, twice] = loop {
             let [once, twice] = [f(-speed, 0.0), f(-2.0 * speed, 0.0)];
@@ -89,12 +91,13 @@ impl ObservedRule {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::constraints::rules::{NormalRule, Rigid, Soft};
+    use crate::engine::constraints::sweep::Sweep;
     use crate::engine::lanes::Lanes;
-    use crate::engine::solvers::soft_step::{RigidRule, SoftRule};
 
     #[test]
     fn the_rigid_rule_closes_gaps_and_nothing_else() {
-        let rule = ObservedRule::of(RigidRule { inv_h: 64.0 }, &[]);
+        let rule = ObservedRule::of(&Sweep(Rigid { inv_h: 64.0 }), &[]);
         assert!(rule.friction);
         // 2⁻⁶ m in 2⁻⁶ s: every number is a power of two, so exactly 1 m/s.
         let law = |separation| rule.law(false, separation, 3.0).unwrap();
@@ -111,7 +114,7 @@ mod tests {
     fn the_soft_rule_is_an_implicit_spring() {
         // ω = 2π 30, ζ = 10, h = 1/240: β = ω/(2ζ + hω), a = hω(2ζ + hω), and a spring's
         // compliance is 1/(m a).
-        let rule = ObservedRule::of(SoftRule::new(30.0, 1.0 / 240.0), &[]);
+        let rule = ObservedRule::of(&Sweep(Soft::new([188.49556, 376.99112], 10.0, 3.0, 1.0 / 240.0)), &[]);
         let (omega, h) = (std::f64::consts::TAU * 30.0, 1.0 / 240.0);
         let denominator = 20.0 + h * omega;
         let law = rule.law(false, -0.01, 2.0).unwrap();
@@ -134,6 +137,6 @@ mod tests {
                 [old, L::zero()]
             }
         }
-        assert_eq!(ObservedRule::of(Deaf, &[]).law(false, 0.0, 1.0), None);
+        assert_eq!(ObservedRule::of(&Sweep(Deaf), &[]).law(false, 0.0, 1.0), None);
     }
 }

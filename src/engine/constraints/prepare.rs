@@ -2,6 +2,7 @@
 
 use super::batches::{Batches, PADDING, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::pass::{Pass, PassInput};
 use super::sweep::over_segments;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
@@ -118,6 +119,16 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     }
 }
 
+/// Fills the records of all batches from the contacts.
+pub struct Prepare;
+
+impl Pass for Prepare {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        prepare::<L, F>(on.rows, on.batches, on.contacts);
+    }
+}
+
 /// Fills the records of all segments.
 #[inline(never)]
 pub fn prepare<L: Lanes, N: KernelFeatures>(
@@ -164,6 +175,16 @@ fn store_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             (first.normal_impulse, first.tangent_impulse) = (at(0), at(1));
             (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
         }
+    }
+}
+
+/// Writes accumulated impulses back to the contacts.
+pub struct Store;
+
+impl Pass for Store {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        store::<L, F>(on.rows, on.batches, on.contacts);
     }
 }
 

@@ -29,6 +29,7 @@
 
 use super::batches::{Batches, PADDING, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::pass::{Pass, PassInput};
 use super::sweep::{arms, over_segments, turn, with_arms};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Lanes, held};
@@ -59,6 +60,52 @@ impl Bounces {
     /// Bytes in use for `lanes` lanes of `points`-point contacts.
     pub fn bytes(lanes: usize, points: usize) -> usize {
         4 * lanes * (1 + 2 * points)
+    }
+}
+
+/// Reads the energies, before anything moves.
+pub struct Begin {
+    /// Substep (s).
+    pub h: f32,
+}
+
+impl Pass for Begin {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
+    }
+}
+
+/// Notes the largest impulses, after each substep.
+pub struct Track;
+
+impl Pass for Track {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        track::<L, F>(on.rows, on.batches, on.bounces);
+    }
+}
+
+/// Bounces, at the end of the step.
+pub struct Apply {
+    /// Substep (s).
+    pub h: f32,
+}
+
+impl Pass for Apply {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        apply::<L, F>(on.rows, on.batches, on.bounces, self.h);
+    }
+}
+
+/// Forgets the impulses of points that bounced.
+pub struct Forget;
+
+impl Pass for Forget {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        forget::<L, F>(on.rows, on.batches, on.bounces);
     }
 }
 

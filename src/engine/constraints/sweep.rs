@@ -74,30 +74,19 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::pass::{Pass, PassInput};
+use super::position::PositionSweep;
+use super::rules::NormalRule;
 use crate::engine::lanes::{BodyRow, Lanes, RowStore, prefetch};
-use crate::engine::params::MAX_POSITION_CORRECTION;
 
-/// How a solver turns the state of a normal row into its new accumulated impulse.
-///
-/// A rule is the whole difference between sequential-impulse solvers; the sweep around
-/// it is shared. `against_static` tells that body a is static or kinematic.
-pub trait NormalRule: Copy + 'static {
-    /// Whether the sweep solves the friction rows as well.
-    const FRICTION: bool;
-    /// Whether the rule reads the separation.
-    const SEPARATION: bool = true;
+/// The velocity sweep under a rule: Gauss–Seidel on the accumulated impulses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep<R>(pub R);
 
-    /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
-    /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
-    ///
-    /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
-    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
-
-    /// The new accumulated impulse (N·s), ≥ 0, at the normal velocity `vn` (m/s).
+impl<R: NormalRule> Pass for Sweep<R> {
     #[inline(always)]
-    fn normal_impulse<L: Lanes>(&self, against_static: bool, vn: L, separation: L, mass: L, old: L) -> L {
-        let [constant, slope] = self.line(against_static, separation, mass, old);
-        slope.neg_mul_add(vn, constant).max(L::zero())
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        sweep::<L, F, R>(on.rows, on.batches, self.0);
     }
 }
 
@@ -114,16 +103,20 @@ pub(super) fn turn<L: Lanes>(angle: L) -> (L, L) {
 }
 
 /// The two bodies of a batch, in registers.
-struct BodyPair<L> {
-    a: [L; 8],
-    b: [L; 8],
+pub(super) struct BodyPair<L> {
+    pub(super) a: [L; 8],
+    pub(super) b: [L; 8],
 }
 
 impl<L: Lanes> BodyPair<L> {
     /// # Safety
     /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    unsafe fn gather<O: Opposite, S: RowStore + ?Sized>(rows: &S, row_a: &[u32], row_b: &[u32]) -> Self {
+    pub(super) unsafe fn gather<O: Opposite, S: RowStore + ?Sized>(
+        rows: &S,
+        row_a: &[u32],
+        row_b: &[u32],
+    ) -> Self {
         // SAFETY: the caller keeps the indices in bounds.
         let a = if O::HAS_ROW { unsafe { rows.gather(row_a) } } else { [L::zero(); 8] };
         // SAFETY: the caller keeps the indices in bounds.
@@ -135,7 +128,7 @@ impl<L: Lanes> BodyPair<L> {
     /// # Safety
     /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    unsafe fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
+    pub(super) unsafe fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
         &self,
         rows: &mut S,
         row_a: &[u32],
@@ -152,18 +145,18 @@ impl<L: Lanes> BodyPair<L> {
     }
 }
 
-const VX: usize = 0;
-const VY: usize = 1;
-const W: usize = 2;
-const INV_MASS: usize = 3;
-const DX: usize = 4;
-const DY: usize = 5;
-const TURN: usize = 6;
-const INV_INERTIA: usize = 7;
+pub(super) const VX: usize = 0;
+pub(super) const VY: usize = 1;
+pub(super) const W: usize = 2;
+pub(super) const INV_MASS: usize = 3;
+pub(super) const DX: usize = 4;
+pub(super) const DY: usize = 5;
+pub(super) const TURN: usize = 6;
+pub(super) const INV_INERTIA: usize = 7;
 
 /// Components of b − a along n and t.
 #[inline(always)]
-fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
+pub(super) fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
     let x = if O::HAS_ROW { b[0] - a[0] } else { b[0] };
     let y = if O::HAS_ROW { b[1] - a[1] } else { b[1] };
     [n[0].mul_add(x, n[1] * y), n[1].mul_add(x, -(n[0] * y))]
@@ -184,7 +177,12 @@ pub(super) fn with_arms<L: Lanes, N: KernelFeatures, O: Opposite>(base: L, w: [L
 
 /// `ω_b += I_b⁻¹ arm_b λ`, `ω_a −= I_a⁻¹ arm_a λ`, where the needs have arms.
 #[inline(always)]
-fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(w: &mut [L; 2], inertia: [L; 2], arm: [L; 2], impulse: L) {
+pub(super) fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(
+    w: &mut [L; 2],
+    inertia: [L; 2],
+    arm: [L; 2],
+    impulse: L,
+) {
     if N::ROTATION {
         w[1] = (inertia[1] * arm[1]).mul_add(impulse, w[1]);
         if O::MOVES {
@@ -237,7 +235,7 @@ impl<L: Lanes> Rows<L> {
 
 /// One sweep over a segment: Gauss–Seidel within a contact, all contacts of a batch at once.
 #[inline(always)]
-fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
+pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
     rows: &mut S,
     batches: &mut Batches,
     segment: &Segment,
@@ -246,7 +244,7 @@ fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: Row
     let layout = const { Layout::of::<N, O>() };
     let friction_rows = const { N::FRICTION && R::FRICTION };
     for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Problem::new` checked every row index against the rows.
+        // SAFETY: `Passes::new` checked every row index against the rows.
         let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, S>(rows, row_a, row_b) };
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -275,7 +273,7 @@ fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: Row
             normal.impulse[p] = slope.neg_mul_add(vn, constant);
             (normal.slope[p], normal.old[p]) = (slope, old);
             if friction_rows {
-                let mass = record[layout.at(p, layout.tangent_mass)];
+                let mass = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
                 let old = record[layout.at(p, layout.tangent_impulse)];
                 let vt = with_arms::<L, N, O>(along_t, w, arm_t);
                 tangent.impulse[p] = mass.neg_mul_add(vt, old);
@@ -324,7 +322,13 @@ fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: Row
 
 /// Turns the impulses along n and t back into world axes and applies them; `w` are the new spins.
 #[inline(always)]
-fn apply<L: Lanes, O: Opposite>(a: &mut [L; 8], b: &mut [L; 8], n: [L; 2], sum: [L; 2], w: [L; 2]) {
+pub(super) fn apply<L: Lanes, O: Opposite>(
+    a: &mut [L; 8],
+    b: &mut [L; 8],
+    n: [L; 2],
+    sum: [L; 2],
+    w: [L; 2],
+) {
     let x = n[0].mul_add(sum[0], n[1] * sum[1]);
     let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
     b[VX] = b[INV_MASS].mul_add(x, b[VX]);
@@ -362,7 +366,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Problem::new` checked every row index against the rows.
+        // SAFETY: `Passes::new` checked every row index against the rows.
         let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
         let n = [record[0], record[1]];
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -384,18 +388,17 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     });
 }
 
-/// One Gauss–Seidel sweep on positions: every overlapping point is pushed apart by the
-/// impulse-like λ = −fraction · s / k, which moves the bodies and leaves velocities alone.
+/// One position sweep over a segment, see [`super::position`].
 #[inline(always)]
-fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
-    fraction: f32,
+    sweep: PositionSweep,
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Problem::new` checked every row index against the rows.
+        // SAFETY: `Passes::new` checked every row index against the rows.
         let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -404,15 +407,28 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
         let mut angle = [a[TURN], b[TURN]];
         let mut sum = L::zero();
         for p in 0..N::POINTS {
-            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
             let arm_t = arms::<L, N, O>(record, &layout, p, 1);
             let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
             let mut separation = record[layout.at(p, layout.separation)] + moved;
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
-            let mass = record[layout.at(p, layout.normal_mass)];
-            let overlap = (-separation).max(L::zero()).min(L::splat(MAX_POSITION_CORRECTION));
-            let push = mass * overlap * L::splat(fraction);
+            let mut mass = record[layout.at(p, layout.normal_mass)];
+            if TURNED && N::ROTATION {
+                let turned = |sine: L, versine: L, side: usize| {
+                    sine.mul_add(arm_t[side], versine.neg_mul_add(arm_n[side], arm_n[side]))
+                };
+                arm_n = [turned(sine_a, versine_a, 0), turned(sine_b, versine_b, 1)];
+                let mut k = (inertia[1] * arm_n[1]).mul_add(arm_n[1], mass_sum);
+                if O::MOVES {
+                    k = (inertia[0] * arm_n[0]).mul_add(arm_n[0], k);
+                }
+                // A point that is not there has no mass, and keeps none.
+                mass = mass.select_positive(L::splat(1.0) / k, L::zero());
+            }
+            let overlap = (-(separation + L::splat(sweep.slop))).max(L::zero());
+            let correction = (overlap * L::splat(sweep.fraction)).min(L::splat(sweep.max_correction));
+            let push = mass * correction;
             sum = sum + push;
             moved = mass_sum.mul_add(push, moved);
             spin::<L, N, O>(&mut angle, inertia, arm_n, push);
@@ -492,6 +508,16 @@ pub fn sweep_store<L: Lanes, N: KernelFeatures, R: NormalRule, S: RowStore>(
     over_segments!(sweep_segment, L, N, R, S; rows, batches, rule);
 }
 
+/// The warm start: applies the accumulated impulses.
+pub struct WarmStart;
+
+impl Pass for WarmStart {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        warm_start::<L, F>(on.rows, on.batches);
+    }
+}
+
 /// Applies all accumulated impulses.
 #[inline(never)]
 pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
@@ -500,10 +526,23 @@ pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &m
 
 /// One position sweep over all segments, in order.
 #[inline(never)]
-pub fn position_sweep<L: Lanes, N: KernelFeatures>(
+pub fn position_sweep<L: Lanes, N: KernelFeatures, const TURNED: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
-    fraction: f32,
+    sweep: PositionSweep,
 ) {
-    over_segments!(position_segment, L, N; rows, batches, fraction);
+    for i in 0..batches.segments.len() {
+        let segment = batches.segments[i];
+        match segment.opposite {
+            OppositeKind::Dynamic => {
+                position_segment::<L, N, OnDynamic, TURNED>(rows, batches, &segment, sweep);
+            }
+            OppositeKind::Kinematic => {
+                position_segment::<L, N, OnKinematic, TURNED>(rows, batches, &segment, sweep);
+            }
+            OppositeKind::Static => {
+                position_segment::<L, N, OnStatic, TURNED>(rows, batches, &segment, sweep);
+            }
+        }
+    }
 }

@@ -1,26 +1,40 @@
-//! Solver variants, one file each; [`VARIANTS`] is the table that everything iterates.
+//! Solvers, one file each; [`VARIANTS`] is the table that everything iterates.
 //!
-//! A variant is a schedule of passes over a [`Problem`] and a
-//! [`NormalRule`](crate::engine::constraints::NormalRule) or two.
-//! Variants never import one another. `pgs.rs` is the tutorial: it explains the whole
+//! A solver is a schedule: passes over bodies and contacts in its own order, called on
+//! [`Passes`], and a [`Variant`] that says what it is. Solvers never import one another; what two
+//! of them share is in [`crate::engine::constraints`]. `pgs.rs` is the tutorial: it explains the whole
 //! method, the others only what differs.
+//!
+//! To add one, write a file with a `pub static SOLVER: Variant` and add its row to [`VARIANTS`].
+//! Everything else (command line, study, tests, benches, records) follows from the row.
 
 use crate::engine::clock::Clock;
-use crate::engine::constraints::{Kernel, KernelFeatures, Problem, StepInput, WorkCount, Workspace};
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::{Passes, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::error::Error;
-use crate::engine::lanes::{Counted, LaneWidth, Lanes};
-use crate::engine::params::Budget;
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::{Budget, MAX_PARAMETERS, Parameter, Parameters};
 
+pub mod jacobi;
 pub mod pgs;
+pub mod pgs_ngs_block;
 pub mod projection;
 pub mod soft_step;
+pub mod tgs_ngs;
 
-/// A solver: what it does within one step.
-pub trait Solver {
-    /// Runs the step's schedule on a prepared problem.
-    fn step<L: Lanes, N: KernelFeatures>(problem: &mut Problem<'_, L, N>);
-}
+/// Every solver of the crate.
+pub static VARIANTS: [&Variant; 6] = [
+    &projection::SOLVER,
+    &pgs::SOLVER,
+    &pgs_ngs_block::SOLVER,
+    &jacobi::SOLVER,
+    &tgs_ngs::SOLVER,
+    &soft_step::SOLVER,
+];
+
+/// The solver that is used where none is named.
+pub const DEFAULT: &str = "soft_step";
 
 /// Which fields of a [`Budget`] a solver's schedule has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +46,21 @@ pub struct Uses {
     pub relax: bool,
     /// [`Budget::position_iterations`]
     pub position: bool,
+}
+
+/// What tests hold every solver to, unless it says that it cannot promise it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Law {
+    /// Lane widths give the same bits.
+    SameBits,
+    /// Impulses act on two bodies with opposite signs.
+    Momentum,
+    /// Tangential impulses stay within the friction cone.
+    Cone,
+    /// A step allocates nothing.
+    NoAllocation,
+    /// Piles of a few boxes stay where they are at the standard budget.
+    Rest,
 }
 
 /// A row of [`VARIANTS`].
@@ -47,54 +76,28 @@ pub struct Variant {
     pub budget: Budget,
     /// The budget fields it reads, besides `substeps`.
     pub uses: Uses,
+    /// The budget of `k` of what the solver itself calls iterations, without substeps: how
+    /// convergence is counted.
+    pub iterations: fn(k: u32) -> Budget,
+    /// Its own parameters, [`MAX_PARAMETERS`] at most.
+    pub parameters: &'static [Parameter],
     /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
-    /// others, from the stiffness asked for (Hz) and the substep (s); none if its contacts are
-    /// not springs. At rest such a contact gives way, and metrics tell that from error.
-    pub softness: Option<fn(f32, f32) -> [f32; 2]>,
-    run: Run,
+    /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
+    /// such a contact gives way, and metrics tell that from error.
+    pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
+    /// What it keeps from step to step beside impulses.
+    pub kept: KeptSize,
+    /// What it cannot promise, and why.
+    pub breaks: &'static [(Law, &'static str)],
+    /// Its schedule: all passes of one step.
+    pub step: fn(&mut Passes<'_>),
 }
-
-type Run = fn(&mut Workspace, &mut [Contact], &mut Clock, &StepInput, LaneWidth) -> WorkCount;
-
-/// Every solver of the crate.
-pub static VARIANTS: [Variant; 3] = [
-    Variant {
-        name: "projection",
-        source: "article",
-        summary: "positions pushed apart, then approach velocities removed; no memory, no friction",
-        budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
-        uses: Uses { velocity: true, relax: false, position: true },
-        softness: None,
-        run: dispatch::<projection::Projection>,
-    },
-    Variant {
-        name: "pgs",
-        source: "catto2006",
-        summary: "sequential impulses with warm starting and Baumgarte stabilisation",
-        budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-        uses: Uses { velocity: true, relax: false, position: false },
-        softness: None,
-        run: dispatch::<pgs::Pgs>,
-    },
-    Variant {
-        name: "soft_step",
-        source: "catto2024solver2d",
-        summary: "substeps, soft contacts and a relaxing sweep without position feedback",
-        budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
-        uses: Uses { velocity: true, relax: true, position: false },
-        softness: Some(soft_step::angular_frequencies),
-        run: dispatch::<soft_step::SoftStep>,
-    },
-];
-
-/// The solver that is used where none is named.
-pub const DEFAULT: &str = "soft_step";
 
 /// The variant called `name`.
 pub fn find(name: &str) -> Result<&'static Variant, Error> {
     let known = || VARIANTS.iter().map(|v| v.name).collect();
     let unknown = || Error::Unknown { kind: "solver", name: name.into(), known: known() };
-    VARIANTS.iter().find(|v| v.name == name).ok_or_else(unknown)
+    VARIANTS.iter().copied().find(|v| v.name == name).ok_or_else(unknown)
 }
 
 impl Variant {
@@ -107,53 +110,84 @@ impl Variant {
         input: &StepInput,
         width: LaneWidth,
     ) -> WorkCount {
-        (self.run)(work, contacts, clock, input, width)
+        let mut passes = Passes::new(work, contacts, clock, input, width);
+        (self.step)(&mut passes);
+        passes.finish()
+    }
+
+    /// Its parameters' standard values.
+    pub fn defaults(&self) -> Parameters {
+        let mut values = [0.0; MAX_PARAMETERS];
+        for (value, parameter) in values.iter_mut().zip(self.parameters) {
+            *value = parameter.default;
+        }
+        values
+    }
+
+    /// Place of the parameter called `name`; hyphens count as underscores. Errors: no such parameter.
+    pub fn parameter(&self, name: &str) -> Result<usize, Error> {
+        let plain = name.replace('-', "_");
+        self.parameters.iter().position(|p| p.name == plain).ok_or_else(|| Error::Unknown {
+            kind: "parameter",
+            name: name.into(),
+            known: self.parameters.iter().map(|p| p.name).collect(),
+        })
+    }
+
+    /// Sets the parameter called `name`. Errors: no such parameter, a value out of its range.
+    pub fn set(&self, values: &mut Parameters, name: &str, value: f32) -> Result<(), Error> {
+        let place = self.parameter(name)?;
+        let Parameter { name, unit, range: [least, greatest], .. } = self.parameters[place];
+        if !(value >= least && value <= greatest) {
+            let message = format!("{value} is not within {least} to {greatest} {unit}");
+            return Err(Error::invalid(name, message.trim_end()));
+        }
+        values[place] = value;
+        Ok(())
+    }
+
+    /// Whether it promises `law`.
+    pub fn promises(&self, law: Law) -> bool {
+        self.breaks.iter().all(|(broken, _)| *broken != law)
     }
 }
 
-/// From values to types, once per step: the width, then the needs.
-fn dispatch<S: Solver>(
-    work: &mut Workspace,
-    contacts: &mut [Contact],
-    clock: &mut Clock,
-    input: &StepInput,
-    width: LaneWidth,
-) -> WorkCount {
-    match width {
-        LaneWidth::W1 if clock.counts() => with_width::<S, Counted>(work, contacts, clock, input),
-        LaneWidth::W1 => with_width::<S, f32>(work, contacts, clock, input),
-        LaneWidth::W4 => with_width::<S, wide::f32x4>(work, contacts, clock, input),
-        LaneWidth::W8 => with_width::<S, wide::f32x8>(work, contacts, clock, input),
-        LaneWidth::W16 => with_width::<S, wide::f32x16>(work, contacts, clock, input),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_are_found_set_and_refused() {
+        let soft = find("soft_step").unwrap();
+        let mut values = soft.defaults();
+        let hertz = soft.parameter("contact_hertz").unwrap();
+        assert_eq!(values[hertz], 30.0);
+        soft.set(&mut values, "contact-hertz", 60.0).unwrap();
+        assert_eq!(values[hertz], 60.0);
+        for bad in [-3.0, f32::NAN, 0.0] {
+            let message = soft.set(&mut values, "contact_hertz", bad).unwrap_err().to_string();
+            assert!(
+                message.starts_with("contact_hertz: ") && message.contains(&bad.to_string()),
+                "{message}"
+            );
+        }
+        assert_eq!(values[hertz], 60.0);
+        let message = soft.set(&mut values, "hertz", 1.0).unwrap_err().to_string();
+        assert!(message.contains("'hertz'") && message.contains("contact_hertz"), "{message}");
     }
-}
 
-fn with_width<S: Solver, L: Lanes>(
-    work: &mut Workspace,
-    contacts: &mut [Contact],
-    clock: &mut Clock,
-    input: &StepInput,
-) -> WorkCount {
-    let features = &input.features;
-    let run = match (features.rotation, features.friction, features.two_points) {
-        (false, false, false) => with_features::<S, L, Kernel<false, false, 1>>,
-        (true, false, false) => with_features::<S, L, Kernel<true, false, 1>>,
-        (true, true, false) => with_features::<S, L, Kernel<true, true, 1>>,
-        (true, false, true) => with_features::<S, L, Kernel<true, false, 2>>,
-        (true, true, true) => with_features::<S, L, Kernel<true, true, 2>>,
-        // Friction and a second point act through rotation.
-        (false, ..) => unreachable!("friction or a second point without rotation"),
-    };
-    run(work, contacts, clock, input)
-}
-
-fn with_features<S: Solver, L: Lanes, N: KernelFeatures>(
-    work: &mut Workspace,
-    contacts: &mut [Contact],
-    clock: &mut Clock,
-    input: &StepInput,
-) -> WorkCount {
-    let mut problem = Problem::<L, N>::new(work, contacts, clock, input);
-    S::step(&mut problem);
-    problem.finish()
+    #[test]
+    fn rows_are_complete() {
+        for v in VARIANTS {
+            assert!(v.parameters.len() <= MAX_PARAMETERS, "{}", v.name);
+            for p in v.parameters {
+                let mut values = v.defaults();
+                assert!(v.set(&mut values, p.name, p.default).is_ok(), "{} {}", v.name, p.name);
+                assert!(!p.meaning.is_empty() && p.name == p.name.to_lowercase(), "{} {}", v.name, p.name);
+            }
+            // Iterations count something that the schedule has.
+            let (none, three) = ((v.iterations)(0), (v.iterations)(3));
+            assert!(none != three && three.substeps == 1, "{}", v.name);
+        }
+    }
 }

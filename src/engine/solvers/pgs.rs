@@ -32,51 +32,45 @@
 //! so that a later row's push can be taken back. Friction clamps its own accumulated
 //! impulse to ±µλ. The accumulated impulses are kept, and the next step starts from them.
 
-use super::Solver;
+use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::{KernelFeatures, NormalRule, Problem};
-use crate::engine::lanes::Lanes;
-use crate::engine::params::{BAUMGARTE, LINEAR_SLOP, MAX_PUSH_SPEED};
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
-pub struct Pgs;
+pub static SOLVER: Variant = Variant {
+    name: "pgs",
+    source: "catto2006",
+    summary: "sequential impulses with warm starting and Baumgarte stabilisation",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
+    softness: None,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    step,
+};
 
-impl Solver for Pgs {
-    fn step<L: Lanes, N: KernelFeatures>(problem: &mut Problem<'_, L, N>) {
-        let budget = problem.budget();
-        let rule = BaumgarteRule { inv_h: 1.0 / problem.h() };
-        for substep in 0..budget.substeps {
-            problem.integrate_velocities();
-            problem.warm_start();
-            for _ in 0..budget.velocity_iterations {
-                problem.sweep(Phase::Solve, rule);
-            }
-            problem.integrate_positions();
-            problem.end_substep(substep);
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
         }
-    }
-}
-
-/// λ ← max(0, λ − m_eff (v_n + b)) with the bias velocity
-///
-/// ```text
-/// b = s/h                           s > 0   close the gap, no more
-/// b = max(β (s + slop)/h, −v_max)   s < −slop
-/// b = 0                             between
-/// ```
-#[derive(Clone, Copy)]
-struct BaumgarteRule {
-    inv_h: f32,
-}
-
-impl NormalRule for BaumgarteRule {
-    const FRICTION: bool = true;
-
-    #[inline(always)]
-    fn line<L: Lanes>(&self, _stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        let gap = separation.max(L::zero()) * L::splat(self.inv_h);
-        let overlap = (separation + L::splat(LINEAR_SLOP)).min(L::zero());
-        let push = (overlap * L::splat(BAUMGARTE * self.inv_h)).max(L::splat(-MAX_PUSH_SPEED));
-        [mass.neg_mul_add(gap + push, old), mass]
+        passes.integrate_positions();
+        passes.end_substep(substep);
     }
 }

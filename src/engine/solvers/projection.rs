@@ -11,44 +11,45 @@
 //! `velocity_iterations` velocity sweeps.
 //!
 //! **Fails when** anything should slide, roll or lean: there is no friction. There is no
-//! memory either, so every step starts cold and tall stacks sink and spread.
+//! warm starting either, so every step starts cold and tall stacks sink and spread.
 
-use super::Solver;
+use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::{KernelFeatures, NormalRule, Problem};
-use crate::engine::lanes::Lanes;
-use crate::engine::params::LINEAR_SLOP;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Touching;
+use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION};
 
 /// See the [module](self).
-pub struct Projection;
+pub static SOLVER: Variant = Variant {
+    name: "projection",
+    source: "article",
+    summary: "positions pushed apart, then approach velocities removed; no warm starting, no friction",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
+    uses: Uses { velocity: true, relax: false, position: true },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[],
+    softness: None,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "no friction and no warm starting")],
+    step,
+};
 
-impl Solver for Projection {
-    fn step<L: Lanes, N: KernelFeatures>(problem: &mut Problem<'_, L, N>) {
-        let budget = problem.budget();
-        for substep in 0..budget.substeps {
-            problem.forget_impulses();
-            problem.integrate_velocities();
-            problem.integrate_positions();
-            for _ in 0..budget.position_iterations {
-                problem.position_sweep(1.0);
-            }
-            for _ in 0..budget.velocity_iterations {
-                problem.sweep(Phase::Solve, ProjectionRule);
-            }
-            problem.end_substep(substep);
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let positions =
+        PositionSweep { fraction: 1.0, slop: 0.0, max_correction: MAX_POSITION_CORRECTION, turned: false };
+    let touching = Touching::rule(LINEAR_SLOP);
+    for substep in 0..budget.substeps {
+        passes.forget_impulses();
+        passes.integrate_velocities();
+        passes.integrate_positions();
+        for _ in 0..budget.position_iterations {
+            passes.position_sweep(positions);
         }
-    }
-}
-
-/// λ ← max(0, λ − m_eff v_n) at points that touch once positions are projected.
-#[derive(Clone, Copy)]
-struct ProjectionRule;
-
-impl NormalRule for ProjectionRule {
-    const FRICTION: bool = false;
-
-    #[inline(always)]
-    fn line<L: Lanes>(&self, _stiff: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        [old, (L::splat(LINEAR_SLOP) - separation).select_positive(mass, L::zero())]
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &touching);
+        }
+        passes.end_substep(substep);
     }
 }

@@ -95,7 +95,8 @@ impl World {
                 component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
                 component("colouring", &[opaque(self.assignment.held_bytes())]),
                 component("records", &records),
-                component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
+                component("rows", &[arrays![w.rows][0], arrays![w.sums][0], opaque(w.motion.held_bytes())]),
+                component("solver", &[opaque(w.kept.held_bytes() + w.graph.held_bytes())]),
             ],
         }
     }

@@ -226,11 +226,12 @@ impl World {
             features: self.kernel_features(),
             budget: s.budget,
             h: s.h(),
-            contact_hertz: s.contact_hertz,
+            parameters: s.parameters,
             record_impulses: s.record_impulses,
             points: self.counts.points,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
+        self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());
         s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width)
     }
 

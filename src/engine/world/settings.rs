@@ -4,7 +4,7 @@ use crate::engine::broadphase::BroadPhaseKind;
 use crate::engine::constraints::Features;
 use crate::engine::constraints::motion::{Integrator, RotationUpdate};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
 
 /// The order in which constraints are solved.
@@ -33,8 +33,8 @@ pub struct Settings {
     pub gravity: [f32; 2],
     /// Step (s).
     pub dt: f32,
-    /// Stiffness of soft contacts (Hz), for solvers that have them.
-    pub contact_hertz: f32,
+    /// The solver's own parameters, see [`Variant::set`].
+    pub parameters: Parameters,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
@@ -61,7 +61,7 @@ impl Settings {
             budget: solver.budget,
             gravity: [0.0, -10.0],
             dt: 1.0 / 60.0,
-            contact_hertz: CONTACT_HERTZ,
+            parameters: solver.defaults(),
             record_impulses: false,
             observe_rule: false,
             timed: false,

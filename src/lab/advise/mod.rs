@@ -17,11 +17,12 @@ pub mod limits;
 mod search;
 
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::Budget;
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
+use crate::lab::overrides;
 use crate::lab::study::interleave::{Sample, race};
 use crate::lab::study::pareto::tie;
 use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
@@ -56,7 +57,7 @@ const RACE_STEPS: u32 = 200;
 /// Settings in the final race; the best of every other solver is in it too.
 const FINALISTS: usize = 4;
 
-/// A solver, an order, a budget and a stiffness.
+/// A solver, an order, a budget and parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
     /// Row of the table of solvers.
@@ -65,28 +66,28 @@ pub struct Setting {
     pub order: Order,
     /// Work per step.
     pub budget: Budget,
-    /// Stiffness of soft contacts (Hz); none where the solver has none.
-    pub contact_hertz: Option<f32>,
+    /// The solver's own parameters.
+    pub parameters: Parameters,
 }
 
 impl Setting {
     /// The settings of a world, at this width.
     pub fn settings(&self, width: LaneWidth) -> Settings {
-        let standard = Settings::new(self.solver);
         Settings {
             order: self.order,
             budget: self.budget,
             width,
-            contact_hertz: self.contact_hertz.unwrap_or(standard.contact_hertz),
-            ..standard
+            parameters: self.parameters,
+            ..Settings::new(self.solver)
         }
     }
 
-    /// `soft_step, 4 sub 1 vel 1 rel, 30 Hz`
+    /// `soft_step, 4 sub 1 vel 1 rel, contact_hertz 60 Hz`
     pub fn text(&self) -> String {
         let mut text = format!("{}, {}", self.solver.name, budget::brief(&self.budget, self.solver));
-        if let Some(hertz) = self.contact_hertz {
-            text += &format!(", {hertz} Hz");
+        let changed = overrides::brief(self.solver, &self.parameters);
+        if !changed.is_empty() {
+            text += &format!(", {changed}");
         }
         text
     }
@@ -277,7 +278,8 @@ mod tests {
 
     pub fn trial(time: f64, excess: f64) -> Trial {
         let solver = find("pgs").unwrap();
-        let setting = Setting { solver, order: Order::Colored, budget: solver.budget, contact_hertz: None };
+        let setting =
+            Setting { solver, order: Order::Colored, budget: solver.budget, parameters: solver.defaults() };
         let time = Some(Time { lanes: 8, median_ns: time, spread_ns: 0.0 });
         Trial { setting, time, errors: Some(Errors::default()), truth: None, failure: None, excess }
     }
@@ -322,13 +324,14 @@ mod tests {
     #[test]
     fn a_setting_says_what_it_is() {
         let soft = find("soft_step").unwrap();
-        let setting =
-            Setting { solver: soft, order: Order::Natural, budget: soft.budget, contact_hertz: Some(60.0) };
-        assert_eq!(setting.text(), "soft_step, 4 sub 1 vel 1 rel, 60 Hz");
+        let mut parameters = soft.defaults();
+        soft.set(&mut parameters, "contact_hertz", 60.0).unwrap();
+        let setting = Setting { solver: soft, order: Order::Natural, budget: soft.budget, parameters };
+        assert_eq!(setting.text(), "soft_step, 4 sub 1 vel 1 rel, contact_hertz 60 Hz");
         let settings = setting.settings(LaneWidth::W1);
         assert_eq!(
-            (settings.contact_hertz, settings.order, settings.budget),
-            (60.0, Order::Natural, soft.budget)
+            (settings.parameters, settings.order, settings.budget),
+            (parameters, Order::Natural, soft.budget)
         );
     }
 }

@@ -1,7 +1,7 @@
 //! The grid, the bisection, and what can be left out.
 
 use super::{Plan, Setting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
-use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
@@ -13,10 +13,6 @@ use std::time::Instant;
 /// Most substeps, most sweeps per substep, and most sweeps of a kind per step of the grid.
 const MOST_SUBSTEPS: u32 = 32;
 const MOST_SWEEPS: u32 = 64;
-
-/// Stiffnesses to try, in times the standard one. Where the substep caps them, the equal ones
-/// count once.
-const STIFFNESSES: [f32; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// A budget has to be too slow by this factor before larger ones are left out: a scene that is
 /// solved badly moves more and touches more, so that a larger budget can be somewhat faster. On
@@ -82,16 +78,29 @@ pub fn budgets(solver: &Variant) -> Vec<Budget> {
     budgets
 }
 
-/// Stiffnesses (Hz) that make a difference with substeps of `h` (s); none for rigid contacts.
-pub fn stiffnesses(solver: &Variant, h: f32) -> Vec<Option<f32>> {
-    let Some(softness) = solver.softness else { return vec![None] };
-    let mut kept: Vec<f32> = Vec::new();
-    for hertz in STIFFNESSES.map(|s| s * CONTACT_HERTZ) {
-        if !kept.iter().any(|&k| softness(k, h) == softness(hertz, h)) {
-            kept.push(hertz);
+/// Values of the solver's parameters to try with substeps of `h` (s): those that its table
+/// lists, without stiffnesses that come to the same.
+pub fn parameters(solver: &Variant, h: f32) -> Vec<Parameters> {
+    let mut all = vec![solver.defaults()];
+    for (place, parameter) in solver.parameters.iter().enumerate().filter(|(_, p)| !p.trials.is_empty()) {
+        let each = |values: &Parameters| {
+            let values = *values;
+            parameter.trials.iter().map(move |&trial| {
+                let mut values = values;
+                values[place] = trial;
+                values
+            })
+        };
+        all = all.iter().flat_map(each).collect();
+    }
+    let Some(softness) = solver.softness else { return all };
+    let mut kept: Vec<Parameters> = Vec::new();
+    for values in all {
+        if !kept.iter().any(|k| softness(k, h) == softness(&values, h)) {
+            kept.push(values);
         }
     }
-    kept.into_iter().map(Some).collect()
+    kept
 }
 
 impl<'a> Search<'a> {
@@ -119,8 +128,8 @@ impl<'a> Search<'a> {
         for &solver in &self.plan.solvers {
             for budget in budgets(solver) {
                 let h = self.scene.dt as f32 / budget.substeps as f32;
-                for contact_hertz in stiffnesses(solver, h) {
-                    grid.extend(orders.iter().map(|&order| Setting { solver, order, budget, contact_hertz }));
+                for parameters in parameters(solver, h) {
+                    grid.extend(orders.iter().map(|&order| Setting { solver, order, budget, parameters }));
                 }
             }
         }
@@ -229,7 +238,7 @@ impl<'a> Search<'a> {
 
 /// Whether two settings differ in their budget at most.
 fn same(a: &Setting, b: &Setting) -> bool {
-    a.solver.name == b.solver.name && a.order == b.order && a.contact_hertz == b.contact_hertz
+    a.solver.name == b.solver.name && a.order == b.order && a.parameters == b.parameters
 }
 
 #[cfg(test)]
@@ -261,9 +270,10 @@ mod tests {
     fn capped_stiffnesses_count_once() {
         let soft = find("soft_step").unwrap();
         // The cap is an eighth of the substep rate: 7.5 Hz in 1/60 s, 60 in 1/480, 240 in 1/1920.
-        let count = |rate: f32| stiffnesses(soft, 1.0 / rate).len();
+        let count = |rate: f32| parameters(soft, 1.0 / rate).len();
         assert_eq!([count(60.0), count(480.0), count(1920.0)], [1, 3, 4]);
-        assert_eq!(stiffnesses(find("pgs").unwrap(), 0.01), [None]);
+        let pgs = find("pgs").unwrap();
+        assert_eq!(parameters(pgs, 0.01), [pgs.defaults()]);
     }
 
     fn plan(limits: Limits) -> Plan {

@@ -10,8 +10,8 @@
 //!   missing friction are other laws; a solver may solve its own to the last bit and stay far
 //!   from the rigid one for ever.
 //!
-//! An *iteration* is one velocity sweep, and one relaxing sweep where the solver relaxes; position
-//! sweeps stay at the standard number. *Sweeps* are what the solver itself counts. No residual
+//! An *iteration* is what the solver's row counts as one ([`Variant::iterations`]): mostly one velocity
+//! sweep, and one relaxing sweep where the solver relaxes. *Sweeps* are what the solver itself counts. No residual
 //! gets below what `f32` can hold, some 1e-6 times the largest impulse; where a tolerance is not
 //! reached within the cap, there is no number.
 //!
@@ -28,9 +28,10 @@ pub mod table;
 mod timing;
 
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
+use crate::lab::overrides::{self, Override};
 use crate::lab::reference::ContactProblem;
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::rates;
@@ -54,8 +55,8 @@ pub struct Options {
     pub seed: u64,
     /// Lanes in coloured order; the other orders are serial.
     pub width: LaneWidth,
-    /// Stiffness of soft contacts (Hz).
-    pub contact_hertz: f32,
+    /// Parameters of solvers, by name.
+    pub overrides: Vec<Override>,
     /// Timing rounds; none for no times.
     pub rounds: u32,
 }
@@ -63,11 +64,11 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Options {
-            solvers: VARIANTS.iter().collect(),
+            solvers: VARIANTS.to_vec(),
             max_iterations: 1000,
             seed: 1,
             width: LaneWidth::W8,
-            contact_hertz: CONTACT_HERTZ,
+            overrides: Vec::new(),
             rounds: 15,
         }
     }
@@ -164,12 +165,8 @@ impl Schedule {
     }
 
     fn budget(&self, iterations: u32) -> Budget {
-        Budget {
-            substeps: 1,
-            velocity_iterations: iterations,
-            relax_iterations: if self.relaxes { iterations } else { 0 },
-            position_iterations: self.variant.budget.position_iterations,
-        }
+        let whole = (self.variant.iterations)(iterations);
+        Budget { relax_iterations: if self.relaxes { whole.relax_iterations } else { 0 }, ..whole }
     }
 }
 
@@ -194,7 +191,8 @@ pub fn converge(
     let mut timers = Vec::new();
     for schedule in &schedules {
         for order in orders {
-            let mut replay = Replay::new(problem, order, options.width, options.contact_hertz)?;
+            let parameters = overrides::values(schedule.variant, &options.overrides)?;
+            let mut replay = Replay::new(problem, order, options.width, parameters)?;
             let first = curves.len();
             curves.push(curve(problem, reference, schedule, order, Start::Cold, &mut replay, options));
             if has_warm_start && remembers(schedule, &mut replay) {

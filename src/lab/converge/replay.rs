@@ -12,7 +12,7 @@ use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::params::Budget;
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 use crate::lab::reference::residual::OwnRow;
@@ -114,7 +114,7 @@ impl<'a> Replay<'a> {
         problem: &'a ContactProblem,
         sequence: Sequence,
         width: LaneWidth,
-        contact_hertz: f32,
+        parameters: Parameters,
     ) -> Result<Self, Error> {
         problem.validate()?;
         let h = problem.h as f32;
@@ -126,7 +126,7 @@ impl<'a> Replay<'a> {
         let budget =
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
-        let input = StepInput { features, budget, h, contact_hertz, record_impulses: false, points };
+        let input = StepInput { features, budget, h, parameters, record_impulses: false, points };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],

@@ -178,10 +178,7 @@ impl Observation {
             largest_impulse: 0.0,
             rest: Rest::new(settings.dt as f64),
             depths: RestDepths::default(),
-            softness: settings
-                .solver
-                .softness
-                .map(|s| s(settings.contact_hertz, settings.h()).map(f64::from)),
+            softness: settings.solver.softness.map(|s| s(&settings.parameters, settings.h()).map(f64::from)),
             substeps: settings.budget.substeps.max(1) as f64,
             blown_up: None,
         }

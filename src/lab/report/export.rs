@@ -5,6 +5,7 @@ use crate::engine::params;
 use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
+use crate::lab::overrides;
 use crate::lab::study::ablation::NeedCost;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
@@ -189,12 +190,15 @@ fn settings(plan: &StudyPlan) -> Value {
         source: &'static str,
         standard_budget: params::Budget,
         uses: Uses,
+        parameters: serde_json::Map<String, Value>,
     }
     let solver = |v: &&'static crate::engine::solvers::Variant| Solver {
         name: v.name,
         source: v.source,
         standard_budget: v.budget,
         uses: v.uses,
+        parameters: overrides::values(v, &plan.overrides)
+            .map_or_else(|_| Default::default(), |values| overrides::by_name(v, &values)),
     };
     let standard = plan.solvers.first().map(|v| {
         let s = Settings::new(v);
@@ -202,7 +206,6 @@ fn settings(plan: &StudyPlan) -> Value {
             "broadphase": format!("{:?}", s.broadphase),
             "integrator": s.integrator,
             "rotation": s.rotation,
-            "contact_hertz": decimal(s.contact_hertz),
         })
     });
     json!({
@@ -214,17 +217,13 @@ fn settings(plan: &StudyPlan) -> Value {
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,
         "repeats": plan.repeats,
-        "contact_hertz": plan.contact_hertz,
+        "set": plan.overrides,
         "seed": plan.seed,
         "world": standard,
         "constants": {
             "linear_slop_m": decimal(params::LINEAR_SLOP),
             "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
             "aabb_margin_m": decimal(params::AABB_MARGIN),
-            "baumgarte": decimal(params::BAUMGARTE),
-            "contact_hertz_fraction": decimal(params::CONTACT_HERTZ_FRACTION),
-            "contact_damping_ratio": decimal(params::CONTACT_DAMPING_RATIO),
-            "max_push_speed_m_s": decimal(params::MAX_PUSH_SPEED),
             "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
             "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
             "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),

@@ -91,15 +91,6 @@ pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
     Ok(())
 }
 
-/// Refuses a contact stiffness (Hz) that no spring has.
-pub fn check_hertz(hertz: f32) -> Result<(), Error> {
-    if hertz > 0.0 && hertz.is_finite() {
-        Ok(())
-    } else {
-        Err(Error::invalid("contact_hertz", format!("{hertz} is not a positive number")))
-    }
-}
-
 /// A budget in few letters, with the fields that `variant` reads: `4 sub · 1 vel · 1 rel`.
 pub fn brief(budget: &Budget, variant: &Variant) -> String {
     let mut text = format!("{} sub", budget.substeps);

@@ -15,11 +15,12 @@ pub mod record;
 pub mod slices;
 
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, CONTACT_HERTZ};
+use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
+use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use interleave::{race, speed_up};
@@ -55,8 +56,8 @@ pub struct StudyPlan {
     pub orders: Vec<Order>,
     /// Work per step.
     pub budgets: BudgetGrid,
-    /// Stiffness of soft contacts (Hz), for solvers that have them.
-    pub contact_hertz: f32,
+    /// Parameters of solvers, by name.
+    pub overrides: Vec<Override>,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
     /// Most steps of a timing run.
@@ -71,11 +72,11 @@ impl Default for StudyPlan {
     fn default() -> Self {
         StudyPlan {
             scenes: DEFAULT_SCENES.map(String::from).to_vec(),
-            solvers: VARIANTS.iter().collect(),
+            solvers: VARIANTS.to_vec(),
             widths: LaneWidth::ALL.to_vec(),
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
-            contact_hertz: CONTACT_HERTZ,
+            overrides: Vec::new(),
             steps: None,
             timing_steps: 200,
             repeats: 3,
@@ -101,7 +102,7 @@ impl StudyPlan {
         if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
             return Err(Error::invalid(name, "none given"));
         }
-        budget::check_hertz(self.contact_hertz)?;
+        overrides::check(&self.solvers, &self.overrides)?;
         let counts = [("steps", self.steps.unwrap_or(1)), ("repeats", self.repeats)];
         if let Some((name, _)) = counts.into_iter().find(|c| c.1 == 0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
@@ -229,8 +230,8 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
 
 /// Settings of a cell in one order at one width.
 fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
-    let contact_hertz = plan.contact_hertz;
-    Settings { width, order, budget: cell.budget, contact_hertz, ..Settings::new(cell.solver) }
+    let parameters = overrides::values(cell.solver, &plan.overrides).unwrap_or(cell.solver.defaults());
+    Settings { width, order, budget: cell.budget, parameters, ..Settings::new(cell.solver) }
 }
 
 /// Steps of a timing run.

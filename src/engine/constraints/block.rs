@@ -1,0 +1,212 @@
+//! The block sweep: the two normal rows of a contact are solved together.
+//!
+//! Gauss–Seidel on the two points of a manifold needs many sweeps where the points are stiffly
+//! coupled: what one pushes, the other feels. A 2 × 2 problem is solved exactly instead.
+//!
+//! # Derivation
+//!
+//! A [rule](super::rules::NormalRule) gives each row the line λ = max(0, c − s v), v being the
+//! normal velocity that the row sees. With both rows at once, row p sees what the other row's change
+//! does to it, v_p = v_p⁰ + k₁₂ (λ_q − λ_q⁰). So, dividing by s > 0,
+//!
+//! ```text
+//! w = A λ − r,   0 ≤ λ ⊥ w ≥ 0,   A = | 1/s₁  k₁₂  |,   r_p = c_p/s_p − v_p⁰ + k₁₂ λ_q⁰
+//!                                     | k₁₂   1/s₂ |
+//! ```
+//!
+//! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the unchanged K of the two rows. Of the
+//! four cases the first that fits is taken (total enumeration, `catto2007`, Murty):
+//!
+//! ```text
+//! both push     λ = A⁻¹ r              λ ≥ 0
+//! first alone   λ = (r₁ s₁, 0)         λ₁ ≥ 0, w₂ = k₁₂ λ₁ − r₂ ≥ 0
+//! second alone  λ = (0, r₂ s₂)         λ₂ ≥ 0, w₁ = k₁₂ λ₂ − r₁ ≥ 0
+//! none          λ = 0                  r ≤ 0
+//! ```
+//!
+//! For a positive definite A exactly one does, up to ties. Where A is close to singular (its
+//! determinant below a thousandth of a₁₁ a₂₂) or there is one point only, rows are solved one after
+//! the other.
+//!
+//! Friction rows come first, bounded by the normal impulses so far (`catto2024solver2d`,
+//! `solve_pgs_ngs_block`): normal rows have the last word.
+
+use super::batches::{Batches, Segment};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::pass::{AnyPass, Pass, PassInput};
+use super::rules::{NormalRule, Rule, each_rule};
+use super::sweep::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
+    spin, to_frame, turn, with_arms,
+};
+use crate::engine::lanes::{BodyRow, Lanes};
+
+/// A matrix with a determinant below this part of a₁₁ a₂₂ is solved row by row (1).
+const SINGULAR: f32 = 1e-3;
+
+/// A block sweep under a rule.
+#[derive(Clone, Copy, Debug)]
+struct BlockSweep<R>(R);
+
+impl<R: NormalRule> Pass for BlockSweep<R> {
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        sweep::<L, F, R>(on.rows, on.batches, self.0);
+    }
+}
+
+/// Calls `then` with the block sweep under `rule`.
+pub(super) fn with_pass(rule: &Rule, then: impl FnOnce(&dyn AnyPass)) {
+    each_rule!(rule, sweep => then(&BlockSweep(sweep.0)))
+}
+
+#[inline(never)]
+fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
+    over_segments!(segment, L, N, R; rows, batches, rule);
+}
+
+#[inline(always)]
+fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: R,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        // SAFETY: `Passes::new` checked every row index against the rows.
+        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+        let mut sum = [L::zero(); 2];
+
+        if N::FRICTION && R::FRICTION {
+            let friction = record[layout.friction];
+            for p in 0..N::POINTS {
+                let arm = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, w, arm);
+                let at = layout.at(p, layout.tangent_impulse);
+                let (old, mass) = (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
+                let bound = friction * record[layout.at(p, layout.normal_impulse)];
+                let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
+                record[at] = new;
+                let delta = new - old;
+                sum[1] = sum[1] + delta;
+                along_t = mass_sum.mul_add(delta, along_t);
+                spin::<L, N, O>(&mut w, inertia, arm, delta);
+            }
+        }
+
+        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
+        let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+        let (mut arm, mut old) = ([[L::zero(); 2]; 2], [L::zero(); 2]);
+        let (mut constant, mut slope, mut v) = ([L::zero(); 2], [L::zero(); 2], [L::zero(); 2]);
+        for p in 0..N::POINTS {
+            arm[p] = arms::<L, N, O>(record, &layout, p, 0);
+            let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+            let mut separation = record[layout.at(p, layout.separation)] + moved;
+            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm[p]);
+            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            old[p] = record[layout.at(p, layout.normal_impulse)];
+            let mass = record[layout.at(p, layout.normal_mass)];
+            [constant[p], slope[p]] = rule.line(!O::MOVES, separation, mass, old[p]);
+            v[p] = with_arms::<L, N, O>(along_n, w, arm[p]);
+        }
+        let mut coupling = L::zero();
+        if N::POINTS == 2 {
+            coupling = mass_sum;
+            if N::ROTATION {
+                coupling = (inertia[1] * arm[0][1]).mul_add(arm[1][1], coupling);
+                if O::MOVES {
+                    coupling = (inertia[0] * arm[0][0]).mul_add(arm[1][0], coupling);
+                }
+            }
+        }
+        let new = solve_pair::<L>(N::POINTS, constant, slope, v, coupling, old);
+        for p in 0..N::POINTS {
+            record[layout.at(p, layout.normal_impulse)] = new[p];
+            let delta = new[p] - old[p];
+            sum[0] = sum[0] + delta;
+            spin::<L, N, O>(&mut w, inertia, arm[p], delta);
+        }
+        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        // SAFETY: as above.
+        unsafe { BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b) };
+    });
+}
+
+/// The impulses of both rows; see the [module](self).
+#[inline(always)]
+fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling: L, old: [L; 2]) -> [L; 2] {
+    let zero = L::zero();
+    // One after the other: what is left where the pair cannot be solved.
+    let first = s[0].neg_mul_add(v[0], c[0]).max(zero);
+    if points == 1 {
+        return [first, zero];
+    }
+    let seen = coupling.mul_add(first - old[0], v[1]);
+    let one_by_one = [first, s[1].neg_mul_add(seen, c[1]).max(zero)];
+
+    // The problem times s₁ and s₂, so that nothing is divided by an s of zero: with
+    // g = s k₁₂ and q = s r, the cases are x₁ + g₁ x₂ = q₁, g₂ x₁ + x₂ = q₂.
+    let g = [s[0] * coupling, s[1] * coupling];
+    let q = [
+        s[0].mul_add(coupling.mul_add(old[1], -v[0]), c[0]),
+        s[1].mul_add(coupling.mul_add(old[0], -v[1]), c[1]),
+    ];
+    // det A/(a₁₁ a₂₂)
+    let determinant = g[0].neg_mul_add(g[1], L::splat(1.0));
+    let is_regular = |yes: L, no: L| (determinant - L::splat(SINGULAR)).select_positive(yes, no);
+    let safe = is_regular(determinant, L::splat(1.0));
+    let both = [g[0].neg_mul_add(q[1], q[0]) / safe, g[1].neg_mul_add(q[0], q[1]) / safe];
+    // Not negative: −x is not positive.
+    let fits = |x: L, y: L, yes: [L; 2], no: [L; 2]| -> [L; 2] {
+        std::array::from_fn(|k| (-x).select_positive(no[k], (-y).select_positive(no[k], yes[k])))
+    };
+    let mut new = one_by_one;
+    new = fits(-q[0], -q[1], [zero; 2], new);
+    new = fits(q[1], g[0].mul_add(q[1], -q[0]), [zero, q[1]], new);
+    new = fits(q[0], g[1].mul_add(q[0], -q[1]), [q[0], zero], new);
+    new = fits(both[0], both[1], both, new);
+    let both_exist = |yes: L, no: L| s[0].select_positive(s[1].select_positive(yes, no), no);
+    std::array::from_fn(|k| both_exist(is_regular(new[k], one_by_one[k]), one_by_one[k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows with k₁₁, k₂₂, k₁₂ under the rigid rule without a gap: K λ + v⁰ − K λ⁰ = v.
+    fn solve(k: [f32; 3], v: [f32; 2], old: [f32; 2]) -> [f32; 2] {
+        let s = [1.0 / k[0], 1.0 / k[1]];
+        solve_pair::<f32>(2, old, s, v, k[2], old)
+    }
+
+    #[test]
+    fn all_four_cases_by_hand() {
+        let k = [2.0, 2.0, 1.0];
+        // 2x + y = 3, x + 2y = 3.
+        assert_eq!(solve(k, [-3.0, -3.0], [0.0; 2]), [1.0, 1.0]);
+        // The first alone stops itself and lifts the second: 2x = 3, 1.5 − 1 ≥ 0.
+        assert_eq!(solve(k, [-3.0, -1.0], [0.0; 2]), [1.5, 0.0]);
+        assert_eq!(solve(k, [-1.0, -3.0], [0.0; 2]), [0.0, 1.5]);
+        assert_eq!(solve(k, [1.0, 2.0], [0.0; 2]), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn accumulated_impulses_are_taken_back() {
+        // With λ⁰ = (1, 1) the velocities are (3, 3) more than without.
+        assert_eq!(solve([2.0, 2.0, 1.0], [0.0, 0.0], [1.0; 2]), [1.0, 1.0]);
+        assert_eq!(solve([2.0, 2.0, 1.0], [3.0, 3.0], [1.0; 2]), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_nearly_singular_pair_and_a_missing_point_are_solved_row_by_row() {
+        let [x, y] = solve([1.0, 1.0, 0.9999], [-1.0, -1.0], [0.0; 2]);
+        assert_eq!((x, y > 0.0 && y < 1e-3), (1.0, true));
+        assert_eq!(solve_pair::<f32>(2, [0.0; 2], [0.5, 0.0], [-2.0, -7.0], 0.0, [0.0; 2]), [1.0, 0.0]);
+    }
+}

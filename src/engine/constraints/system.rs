@@ -1,0 +1,191 @@
+//! The step's problem as vectors: λ of all contact points, v of all bodies, and J between them.
+//!
+//! For methods that need more than one row at a time: conjugate gradients, projected gradients,
+//! acceleration, stopping by a residual. Vectors are in contact order with two points a contact,
+//! absent points zero, whatever lanes the contacts have, and sums run in that order in `f64`. So
+//! the result has the same bits at every width. One entry of a λ or of a relative velocity is
+//! `[normal, tangential]`, along n and t = (n_y, −n_x) on body b.
+
+use super::batches::Batches;
+use super::features::Features;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::BodyRow;
+
+/// `[normal, tangential]` of one contact point.
+pub type Pair = [f32; 2];
+
+/// A view of the step's problem; see the [module](self).
+pub struct System<'a> {
+    rows: &'a mut [BodyRow],
+    batches: [&'a mut Batches; 2],
+    contacts: &'a [Contact],
+    features: &'a Features,
+}
+
+impl<'a> System<'a> {
+    pub(super) fn new(
+        rows: &'a mut [BodyRow],
+        batches: [&'a mut Batches; 2],
+        contacts: &'a [Contact],
+        features: &'a Features,
+    ) -> Self {
+        System { rows, batches, contacts, features }
+    }
+
+    /// Entries of every vector over contact points: two a contact.
+    pub fn len(&self) -> usize {
+        2 * self.contacts.len()
+    }
+
+    /// Whether there are no contacts.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// Velocities and inverse masses, a row per body and an inert one at the end.
+    pub fn rows(&mut self) -> &mut [BodyRow] {
+        self.rows
+    }
+
+    /// Reads all accumulated impulses (N·s).
+    pub fn impulses(&mut self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        self.each_record(|at, normal, tangent| to[at] = [*normal, tangent.map_or(0.0, |t| *t)]);
+    }
+
+    /// Replaces all accumulated impulses (N·s); velocities stay as they are.
+    ///
+    /// # Panics
+    /// If `from` is not [`Self::len`] long.
+    pub fn set_impulses(&mut self, from: &[Pair]) {
+        assert_eq!(from.len(), self.len(), "a vector over contact points has two entries a contact");
+        self.each_record(|at, normal, tangent| {
+            *normal = from[at][0];
+            if let Some(tangent) = tangent {
+                *tangent = from[at][1];
+            }
+        });
+    }
+
+    /// J v: how fast the surfaces part and slide at each point (m/s).
+    pub fn relative_velocities(&self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        for (at, [a, b], [along_n, along_t], [arms_n, arms_t]) in self.points() {
+            let (va, vb) = (self.row(a).velocity, self.row(b).velocity);
+            let d = [vb[0] - va[0], vb[1] - va[1]];
+            let along =
+                |u: [f32; 2], arms: Pair| u[0] * d[0] + u[1] * d[1] + vb[2] * arms[1] - va[2] * arms[0];
+            to[at] = [along(along_n, arms_n), along(along_t, arms_t)];
+        }
+    }
+
+    /// v ← v + M⁻¹ Jᵀ Δλ, point after point. Accumulated impulses stay as they are.
+    ///
+    /// # Panics
+    /// If `delta` is not [`Self::len`] long.
+    pub fn apply(&mut self, delta: &[Pair]) {
+        assert_eq!(delta.len(), self.len(), "a vector over contact points has two entries a contact");
+        for contact in 0..self.contacts.len() {
+            for p in 0..self.contacts[contact].manifold.count as usize {
+                let (at, [a, b], [n, t], [arms_n, arms_t]) = self.point(contact, p);
+                let [normal, tangent] = delta[at];
+                let push = [normal * n[0] + tangent * t[0], normal * n[1] + tangent * t[1]];
+                for (body, sign, side) in [(a, -1.0, 0), (b, 1.0, 1)] {
+                    let Some(row) = self.rows.get_mut(body as usize) else { continue };
+                    let (inv_mass, inv_inertia) = (row.velocity[3], row.delta[3]);
+                    row.velocity[0] += sign * inv_mass * push[0];
+                    row.velocity[1] += sign * inv_mass * push[1];
+                    row.velocity[2] += sign * inv_inertia * (normal * arms_n[side] + tangent * arms_t[side]);
+                }
+            }
+        }
+    }
+
+    /// The greatest violation of the rigid contact law, in N·s: over all points the natural map
+    ///
+    /// ```text
+    /// λn − max(0, λn − m_n (vn + max(s, 0)/h)),   λt − clamp(λt − m_t vt, ±µ λn)
+    /// ```
+    ///
+    /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly
+    /// where a rigid sweep would change nothing.
+    pub fn residual(&mut self, h: f32) -> f64 {
+        let (mut impulses, mut velocities) = (Vec::new(), Vec::new());
+        self.impulses(&mut impulses);
+        self.relative_velocities(&mut velocities);
+        let mut worst = 0.0_f64;
+        for (at, bodies, _, arms) in self.points() {
+            let contact = &self.contacts[at / 2];
+            let gap = contact.manifold.points[at % 2].separation.max(0.0) / h;
+            let ([normal, tangent], [vn, vt]) = (impulses[at].map(f64::from), velocities[at].map(f64::from));
+            let mass = arms.map(|arms| self.effective_mass(bodies, arms));
+            let wanted = (normal - mass[0] * (vn + f64::from(gap))).max(0.0);
+            let bound = f64::from(contact.friction) * normal.max(0.0);
+            let held = (tangent - mass[1] * vt).clamp(-bound, bound);
+            let friction = if self.features.friction { (tangent - held).abs() } else { 0.0 };
+            worst = worst.max((normal - wanted).abs()).max(friction);
+        }
+        worst
+    }
+
+    /// x·y, summed in `f64` in contact order.
+    pub fn dot(x: &[Pair], y: &[Pair]) -> f64 {
+        let product =
+            |(x, y): (&Pair, &Pair)| f64::from(x[0]) * f64::from(y[0]) + f64::from(x[1]) * f64::from(y[1]);
+        x.iter().zip(y).map(product).sum()
+    }
+
+    /// 1/(J M⁻¹ Jᵀ) of one row (kg).
+    fn effective_mass(&self, [a, b]: [u32; 2], arms: Pair) -> f64 {
+        let (a, b) = (self.row(a), self.row(b));
+        let turned = |row: BodyRow, arm: f32| f64::from(row.delta[3]) * f64::from(arm) * f64::from(arm);
+        let k = f64::from(a.velocity[3]) + f64::from(b.velocity[3]) + turned(a, arms[0]) + turned(b, arms[1]);
+        if k > 0.0 { 1.0 / k } else { 0.0 }
+    }
+
+    /// A body's row; what is no body does not move.
+    fn row(&self, body: u32) -> BodyRow {
+        self.rows.get(body as usize).copied().unwrap_or_default()
+    }
+
+    /// Every point in use, see [`Self::point`].
+    fn points(&self) -> impl Iterator<Item = (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2])> {
+        self.contacts
+            .iter()
+            .enumerate()
+            .flat_map(move |(contact, c)| (0..c.manifold.count as usize).map(move |p| self.point(contact, p)))
+    }
+
+    /// Its place in vectors, its bodies, n and t, and the arms `[r_a × u, r_b × u]` for u = n and t.
+    fn point(&self, contact: usize, p: usize) -> (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2]) {
+        let c = &self.contacts[contact];
+        let (n, point) = (c.manifold.normal, &c.manifold.points[p]);
+        let t = glam::Vec2::new(n.y, -n.x);
+        let turns = if self.features.rotation { 1.0 } else { 0.0 };
+        let arms = |u: glam::Vec2| [point.anchor_a, point.anchor_b].map(|r| turns * r.perp_dot(u));
+        (2 * contact + p, [c.body_a, c.body_b], [n.to_array(), t.to_array()], [arms(n), arms(t)])
+    }
+
+    /// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point.
+    fn each_record(&mut self, mut visit: impl FnMut(usize, &mut f32, Option<&mut f32>)) {
+        for batches in &mut self.batches {
+            let width = batches.width;
+            batches.for_each_lane(self.features, |contact, layout, record, lane| {
+                for p in 0..layout.points.min(2) {
+                    let normal = layout.at(p, layout.normal_impulse) * width + lane;
+                    let tangent = layout.at(p, layout.tangent_impulse) * width + lane;
+                    let at = 2 * contact as usize + p;
+                    if layout.has_friction {
+                        let [normal, tangent] =
+                            record.get_disjoint_mut([normal, tangent]).expect("two places in a record");
+                        visit(at, normal, Some(tangent));
+                    } else {
+                        visit(at, &mut record[normal], None);
+                    }
+                }
+            });
+        }
+    }
+}

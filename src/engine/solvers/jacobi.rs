@@ -1,0 +1,97 @@
+//! Jacobi: every contact solves against the velocities from before the sweep, and what all of
+//! them add to a body is summed up. No contact waits for another, so no colouring is needed.
+//!
+//! **Source.** `catto2024solver2d`, `solve_jacobi`; soft contacts as in [`super::soft_step`].
+//!
+//! **Departures.** Contacts between two dynamic bodies are softer than those with others by a
+//! factor of two in frequency, as in the source; sums are formed colour by colour, so that
+//! every width gives the same bits. A factor `relaxation` on all increments is added: 1 is the
+//! source's solver.
+//!
+//! **Cost.** Per substep 2 body passes and 1 warm start; `velocity_iterations` soft sweeps and, after
+//! the positions, `relax_iterations` rigid ones. A sweep gathers each body twice, as it reads old
+//! velocities and adds to sums.
+//!
+//! **Fails when** a body has several contacts: each removes the whole approach velocity, and n of
+//! them remove it n times. The iteration x ← x − D⁻¹(A x + b) diverges where D⁻¹A has an eigenvalue
+//! above 2, which a body in a pile has from three contacts on. A `relaxation` below 2/λ_max heals
+//! that and slows everything else.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, Parameter, Parameters};
+use std::f32::consts::TAU;
+
+/// A soft contact's frequency is capped at this fraction of the substep rate (1).
+const HERTZ_FRACTION: f32 = 1.0 / 3.0;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "jacobi",
+    source: "catto2024solver2d",
+    summary: "all contacts at once against the old velocities, soft contacts and relaxing sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most a third of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "relaxation",
+            unit: "",
+            default: 1.0,
+            range: [1e-3, 1.0],
+            meaning: "factor on what a sweep adds to velocities and impulses",
+            trials: &[],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: 4.0,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "diverges where a body has three contacts or more")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, relaxation, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
+    let soft = Soft::rule(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let rigid = Rigid::rule(h);
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.jacobi_sweep(Phase::Solve, &soft, relaxation);
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.jacobi_sweep(Phase::Relax, &rigid, relaxation);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

@@ -1,0 +1,66 @@
+//! Sequential impulses in which the two normal rows of a contact are solved together, and
+//! overlap is removed from positions.
+//!
+//! **Source.** `catto2024solver2d`, `solve_pgs_ngs_block`; `catto2006` (the 2 × 2 problem by
+//! enumeration of its four cases).
+//!
+//! **Departures.** Gaps are closed and no more (speculative contacts), which the source's rigid
+//! rows do not know. Position sweeps go point by point; the source solves them in pairs, too.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` block sweeps and
+//! `position_iterations` position sweeps.
+//!
+//! **Fails when** loads must travel far: the block couples two points, not two contacts, so
+//! convergence over a stack is that of [`super::pgs`].
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Rigid;
+use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "pgs_ngs_block",
+    source: "catto2024solver2d",
+    summary: "sequential impulses, both points of a contact at once; nonlinear position sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 2 },
+    uses: Uses { velocity: true, relax: false, position: true },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "correction",
+        unit: "",
+        default: 0.2,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that a position sweep removes",
+        trials: &[],
+    }],
+    softness: None,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rigid = Rigid::rule(passes.h());
+    let positions = PositionSweep {
+        fraction: passes.parameter(0),
+        slop: LINEAR_SLOP,
+        max_correction: MAX_POSITION_CORRECTION,
+        turned: true,
+    };
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.block_sweep(Phase::Solve, &rigid);
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.position_iterations {
+            passes.position_sweep(positions);
+        }
+        passes.end_substep(substep);
+    }
+}

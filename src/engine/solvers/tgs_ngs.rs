@@ -1,0 +1,70 @@
+//! Substeps with a rigid velocity sweep and a position sweep each: velocities carry no position
+//! feedback, overlap is removed from positions alone.
+//!
+//! **Source.** `catto2024solver2d`, `solve_tgs_ngs`.
+//!
+//! **Departures.** Impulses are applied again at every substep, as in the source, by a pass over
+//! bodies from the second substep on (see [`super::soft_step`]). Velocity rows keep the arms of the
+//! start of the step; those of position rows turn with the bodies.
+//!
+//! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` velocity
+//! sweeps and `position_iterations` position sweeps.
+//!
+//! **Fails when** contacts are rigid and the budget is small: without a relaxing sweep what one
+//! sweep leaves over is kept as velocity, and stacks jitter.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Rigid;
+use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "tgs_ngs",
+    source: "catto2024solver2d",
+    summary: "substeps of one rigid velocity sweep and one nonlinear position sweep",
+    budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 0, position_iterations: 1 },
+    uses: Uses { velocity: true, relax: false, position: true },
+    iterations: |k| Budget { substeps: 1, velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "correction",
+        unit: "",
+        default: 0.2,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that a position sweep removes",
+        trials: &[],
+    }],
+    softness: None,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "jitters at its standard budget")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rigid = Rigid::rule(passes.h());
+    let positions = PositionSweep {
+        fraction: passes.parameter(0),
+        slop: LINEAR_SLOP,
+        max_correction: MAX_POSITION_CORRECTION,
+        turned: true,
+    };
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rigid);
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.position_iterations {
+            passes.position_sweep(positions);
+        }
+        passes.end_substep(substep);
+    }
+}

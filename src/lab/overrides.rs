@@ -1,0 +1,96 @@
+//! Parameters of solvers as they are given by name: `contact_hertz=60`.
+//!
+//! Several solvers are often run side by side, so a list of overrides reaches those that have the
+//! parameter and must reach at least one.
+
+use crate::engine::params::Parameters;
+use crate::engine::solvers::Variant;
+use crate::lab::error::Error;
+use std::str::FromStr;
+
+/// A parameter's name and its value.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Override {
+    /// As in [`Variant::parameters`].
+    pub name: String,
+    /// In the parameter's own unit.
+    pub value: f32,
+}
+
+impl FromStr for Override {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let refuse = || Error::invalid("set", format!("'{text}' is not NAME=VALUE"));
+        let (name, value) = text.split_once('=').ok_or_else(refuse)?;
+        let value = value.trim().parse().map_err(|_| refuse())?;
+        Ok(Override { name: name.trim().replace('-', "_"), value })
+    }
+}
+
+/// Refuses an override that none of the solvers has, or a value out of its range.
+pub fn check(solvers: &[&'static Variant], overrides: &[Override]) -> Result<(), Error> {
+    for given in overrides {
+        if solvers.iter().all(|v| v.parameter(&given.name).is_err()) {
+            let known = solvers.iter().flat_map(|v| v.parameters).map(|p| p.name);
+            return Err(Error::unknown("parameter", &given.name, known));
+        }
+    }
+    solvers.iter().try_for_each(|v| values(v, overrides).map(drop))
+}
+
+/// The values of `variant`'s parameters under those overrides that it has.
+pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, Error> {
+    let mut values = variant.defaults();
+    for Override { name, value } in overrides.iter().filter(|o| variant.parameter(&o.name).is_ok()) {
+        variant.set(&mut values, name, *value)?;
+    }
+    Ok(values)
+}
+
+/// What differs from the standard, for tables: `contact_hertz 60 Hz`; empty where nothing does.
+pub fn brief(variant: &Variant, values: &Parameters) -> String {
+    let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
+    let texts = changed.map(|(p, value)| format!("{} {value} {}", p.name, p.unit).trim_end().to_string());
+    texts.collect::<Vec<_>>().join(" ")
+}
+
+/// All values by name.
+pub fn by_name(variant: &Variant, values: &Parameters) -> serde_json::Map<String, serde_json::Value> {
+    let each = variant.parameters.iter().zip(values);
+    each.map(|(p, &value)| (p.name.to_string(), decimal(value))).collect()
+}
+
+/// An `f32` as the shortest decimal that names it.
+fn decimal(value: f32) -> serde_json::Value {
+    value.to_string().parse::<f64>().map_or(serde_json::Value::Null, Into::into)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::find;
+
+    #[test]
+    fn overrides_reach_the_solvers_that_have_them() {
+        let (soft, pgs) = (find("soft_step").unwrap(), find("pgs").unwrap());
+        let list: Vec<Override> =
+            ["contact-hertz=60", " baumgarte = 0.5"].iter().map(|t| t.parse().unwrap()).collect();
+        check(&[soft, pgs], &list).unwrap();
+        assert_eq!(brief(soft, &values(soft, &list).unwrap()), "contact_hertz 60 Hz");
+        assert_eq!(brief(pgs, &values(pgs, &list).unwrap()), "baumgarte 0.5");
+        assert!(check(&[pgs], &list).unwrap_err().to_string().contains("contact_hertz"));
+        assert_eq!(by_name(pgs, &values(pgs, &list).unwrap())["baumgarte"], 0.5);
+    }
+
+    #[test]
+    fn what_is_no_override_is_refused_with_its_text() {
+        for text in ["contact_hertz", "contact_hertz=", "contact_hertz=much", ""] {
+            let message = text.parse::<Override>().unwrap_err().to_string();
+            assert!(message.contains(&format!("'{text}'")), "{message}");
+        }
+        let soft = find("soft_step").unwrap();
+        let out = Override { name: "contact_hertz".into(), value: -3.0 };
+        assert!(check(&[soft], &[out]).unwrap_err().to_string().contains("-3"));
+    }
+}
