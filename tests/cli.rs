@@ -55,8 +55,8 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
-        (&["run", "stack:2", "--contact-hertz", "-3"], &["contact_hertz", "-3"]),
-        (&["study", "--contact-hertz", "nan"], &["contact_hertz", "NaN"]),
+        (&["run", "stack:2", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
+        (&["study", "--set", "contact_hertz=nan"], &["contact_hertz", "NaN"]),
         (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
         (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
@@ -82,6 +82,9 @@ fn bad_requests_are_refused_in_one_line() {
         (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
         (&["study", "--repeats", "0"], &["repeats", "0"]),
         (&["study", "--steps", "0"], &["steps", "0"]),
+        (&["study", "--tolerance", "penetration=5"], &["tolerance", "'5'", "unit"]),
+        (&["study", "--tolerance", "penetraton=5mm"], &["'penetraton'", "'penetration'"]),
+        (&["study", "--tolerance", "5mm"], &["tolerance", "'5mm'"]),
         (&["studdy"], &["studdy"]),
     ];
     for (args, parts) in table {
@@ -181,8 +184,8 @@ fn a_small_study_leaves_whole_files() {
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // 2 scenes × 3 solvers × 3 budgets × (natural order and 2 widths).
-    assert_eq!(rows.len(), 2 * 3 * 3 * 3);
+    // 2 scenes × solvers × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 2 * simpulse::engine::solvers::VARIANTS.len() * 3 * 3);
     for row in &rows {
         for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
             let value: f64 = row[column(name)].parse().unwrap();

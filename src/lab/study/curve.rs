@@ -12,7 +12,7 @@ pub const ERROR_FLOOR: f64 = 1e-8;
 pub enum ErrorAxis {
     /// The deepest penetration: what people see.
     Penetration,
-    /// The contact-law residual, root mean square: the mathematics.
+    /// The contact-law residual, root mean square in body weights: the mathematics.
     Law,
     /// The distance to the truth: the physics.
     Truth,
@@ -35,7 +35,7 @@ impl ErrorAxis {
     pub fn of(self, record: &Record) -> Option<f64> {
         match self {
             ErrorAxis::Penetration => Some(record.errors?.penetration_max),
-            ErrorAxis::Law => Some(record.errors?.law_rms),
+            ErrorAxis::Law => Some(record.errors?.law_rms_body),
             ErrorAxis::Truth => record.truth?.error,
         }
     }
@@ -71,7 +71,7 @@ pub struct Sample<'a> {
 pub struct Curve<'a> {
     /// Name of the solver.
     pub solver: &'static str,
-    /// Settings that failed, or have no such error, are left out.
+    /// Settings that do not hold, or have no such error, are left out.
     pub samples: Vec<Sample<'a>>,
 }
 
@@ -97,7 +97,7 @@ pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
     solvers
 }
 
-/// The curves of one scene, one per solver: every order and budget at its fastest width.
+/// The curves of one scene, one per solver: every order and budget that holds, at its fastest width.
 pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
     let curve = |solver: &'static str| {
         let own = || records.iter().filter(|r| r.solver == solver);
@@ -105,7 +105,7 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
         for (budget, value) in budgets_of(records, solver).iter().enumerate() {
             for order in [Order::Natural, Order::Colored] {
                 let widths = own().filter(|r| r.budget == *value && r.order == order);
-                let timed = widths.filter_map(|record| {
+                let timed = widths.filter(|r| r.holds()).filter_map(|record| {
                     let (lap, error) = (record.lap.as_ref()?, axis.of(record)?);
                     Some(Sample { record, budget, time: lap.median_ns, error: error.max(ERROR_FLOOR) })
                 });
@@ -149,7 +149,7 @@ impl<'a> Curve<'a> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::lab::study::record::tests::{failed, record};
+    use crate::lab::study::record::tests::{failed, fell, record};
 
     /// Records of `pgs` with times (µs) and errors (m).
     fn settings(samples: &[(f64, f64)]) -> Vec<Record> {
@@ -194,6 +194,7 @@ pub(crate) mod tests {
         let natural = Record { order: Order::Natural, ..record(1, 1, 5.0, 0.7) };
         let records =
             [natural, record(1, 1, 20.0, 0.5), record(8, 1, 10.0, 0.5), record(8, 2, 30.0, 0.0), failed(8)];
+        let records: Vec<Record> = records.into_iter().chain([fell(8, 4, 1.0, 0.0)]).collect();
         let found = curves(&records, ErrorAxis::Penetration);
         let samples: Vec<_> = found[0].samples.iter().map(|s| (s.budget, s.time, s.error)).collect();
         assert_eq!(samples, [(0, 5e3, 0.7), (0, 10e3, 0.5), (1, 30e3, ERROR_FLOOR)]);
