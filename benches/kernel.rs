@@ -9,7 +9,8 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use simpulse::engine::constraints::sweep::{NormalRule, sweep, sweep_store};
+use simpulse::engine::constraints::NormalRule;
+use simpulse::engine::constraints::sweep::{sweep, sweep_store};
 use simpulse::engine::constraints::{Batches, Kernel, Workspace};
 use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
 use simpulse::engine::constraints::rules::{Rigid, Soft};
