@@ -9,6 +9,7 @@
 //!
 //! Nothing here knows the simulation's own solvers, so that it can judge them.
 
+pub mod dense;
 pub mod frozen;
 pub mod gallery;
 pub mod lcp;
