@@ -15,6 +15,7 @@ pub mod gallery;
 pub mod lcp;
 pub mod newton;
 pub mod nncg;
+pub mod nnls;
 pub mod problem;
 pub mod rates;
 pub mod reference;
