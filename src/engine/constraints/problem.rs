@@ -1,6 +1,6 @@
 //! The velocity problem of one step, as solvers see it: passes over bodies and constraints.
 
-use super::batches::{Batches, PADDING};
+use super::batches::Batches;
 use super::features::{Features, KernelFeatures};
 use super::motion::Motion;
 use super::observe::ObservedRule;
@@ -83,8 +83,7 @@ impl<'a, L: Lanes, N: KernelFeatures> Problem<'a, L, N> {
     /// Prepares the constraints of a step.
     ///
     /// # Panics
-    /// If a batch names a row or a contact that does not exist: the one check on which all gathers
-    /// and scatters of the step rest.
+    /// If a batch names a row or a contact that does not exist.
     pub fn new(
         work: &'a mut Workspace,
         contacts: &'a mut [Contact],
@@ -94,12 +93,7 @@ impl<'a, L: Lanes, N: KernelFeatures> Problem<'a, L, N> {
         // A phase that is repeated finds the records, and the check, of the step before it.
         if !clock.skips(Phase::Prepare) {
             for (batches, width) in [(&work.lanes, L::WIDTH), (&work.serial, 1)] {
-                let rows = work.rows.len() as u32;
-                assert!(batches.width == width || batches.segments.is_empty());
-                let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
-                assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
-                let made = contacts.len();
-                assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
+                batches.assert_fits(width, work.rows.len(), contacts.len());
             }
             let Workspace { rows, motion, lanes, serial, lane_bounces, serial_bounces, .. } = &mut *work;
             prepare::prepare::<L, N>(rows, lanes, contacts);
@@ -182,7 +176,7 @@ impl<'a, L: Lanes, N: KernelFeatures> Problem<'a, L, N> {
             return;
         }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
-            let width = batches.width;
+            let width = batches.width();
             batches.for_each_lane(&self.features, |_, layout, record, lane| {
                 for p in 0..layout.points {
                     record[layout.at(p, layout.normal_impulse) * width + lane] = 0.0;
@@ -251,7 +245,7 @@ impl<'a, L: Lanes, N: KernelFeatures> Problem<'a, L, N> {
         if self.record_impulses && !self.clock.skips(Phase::Store) {
             let Workspace { lanes, serial, .. } = self.work;
             for batches in [lanes, serial] {
-                let width = batches.width;
+                let width = batches.width();
                 batches.for_each_lane(&self.features, |contact, layout, record, lane| {
                     let contact = &mut self.contacts[contact as usize];
                     for p in 0..layout.points {
