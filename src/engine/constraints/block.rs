@@ -74,8 +74,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -133,8 +132,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             spin::<L, N, O>(&mut w, inertia, arm[p], delta);
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
     });
 }
 

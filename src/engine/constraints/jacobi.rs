@@ -10,7 +10,7 @@ use super::features::KernelFeatures;
 use super::pass::{AnyPass, Pass, PassInput};
 use super::rules::{NormalRule, Rule, each_rule};
 use super::sweep::{INV_MASS, VX, VY, W, sweep_store};
-use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under a rule.
 #[derive(Clone, Copy, Debug)]
@@ -79,20 +79,16 @@ struct SummedRows<'a> {
 
 impl RowStore for SummedRows<'_> {
     #[inline(always)]
-    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { L::gather(self.before, index) }
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self.before, index)
     }
 
     #[inline(always)]
-    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
-        // SAFETY: the caller keeps `index` in bounds; there is a sum per row.
-        unsafe {
-            let (old, mut sum) = (L::gather(self.before, index), L::gather(self.sums, index));
-            for k in [VX, VY, W] {
-                sum[k] = sum[k] + (velocity[k] - old[k]);
-            }
-            L::scatter_velocity(self.sums, index, [sum[VX], sum[VY], sum[W], sum[INV_MASS]]);
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        let (old, mut sum) = (L::gather(self.before, index), L::gather(self.sums, index));
+        for k in [VX, VY, W] {
+            sum[k] = sum[k] + (velocity[k] - old[k]);
         }
+        L::scatter_velocity(self.sums, index, [sum[VX], sum[VY], sum[W], sum[INV_MASS]]);
     }
 }

@@ -1,6 +1,6 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
-use super::batches::{Batches, PADDING};
+use super::batches::Batches;
 use super::features::Features;
 use super::graph::Graph;
 use super::kept::Kept;
@@ -91,8 +91,7 @@ impl<'a> Passes<'a> {
     /// Prepares the constraints of a step.
     ///
     /// # Panics
-    /// If a batch names a row or a contact that does not exist: the one check on which all gathers
-    /// and scatters of the step rest.
+    /// If a batch names a row or a contact that does not exist.
     pub fn new(
         work: &'a mut Workspace,
         contacts: &'a mut [Contact],
@@ -104,12 +103,7 @@ impl<'a> Passes<'a> {
         // A phase that is repeated finds the records, and the check, of the step before it.
         if !passes.clock.skips(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
-                let rows = passes.work.rows.len() as u32;
-                assert!(batches.width == width || batches.segments.is_empty());
-                let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
-                assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
-                let made = passes.contacts.len();
-                assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
+                batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
             passes.over_batches(&Prepare);
             if input.features.restitution {
@@ -157,7 +151,7 @@ impl<'a> Passes<'a> {
             return;
         }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
-            let width = batches.width;
+            let width = batches.width();
             batches.for_each_lane(&self.input.features, |_, layout, record, lane| {
                 for p in 0..layout.points {
                     record[layout.at(p, layout.normal_impulse) * width + lane] = 0.0;
@@ -268,7 +262,7 @@ impl<'a> Passes<'a> {
         if self.input.record_impulses && !self.clock.skips(Phase::Store) {
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
-                let width = batches.width;
+                let width = batches.width();
                 batches.for_each_lane(&self.input.features, |contact, layout, record, lane| {
                     let contact = &mut self.contacts[contact as usize];
                     for p in 0..layout.points {

@@ -27,14 +27,15 @@
 //! Source: `catto2024solver2d` for the placement after the sweeps and for the threshold; the
 //! rebound speed is *derived* here.
 
-use super::batches::{Batches, PADDING, Segment};
+use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput};
 use super::sweep::{arms, over_segments, turn, with_arms};
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, Lanes, held};
+use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, held};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
+use std::slice::ChunksExactMut;
 
 /// Side records: per batch, the acceleration a of approach (m/s²), then per point the energy e² E₀
 /// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
@@ -48,8 +49,15 @@ const fn stride<N: KernelFeatures>() -> usize {
 }
 
 impl Bounces {
-    fn records<L: Lanes>(&mut self) -> &mut [L] {
-        bytemuck::cast_slice_mut(&mut self.buffer)
+    /// The side records of a segment, batch by batch.
+    ///
+    /// # Panics
+    /// If they were not prepared.
+    fn of<L: Lanes, N: KernelFeatures>(&mut self, segment: &Segment) -> ChunksExactMut<'_, L> {
+        let (first, stride) = (segment.first_lane / L::WIDTH, stride::<N>());
+        let range = first * stride..(first + segment.batches) * stride;
+        let records = bytemuck::cast_slice_mut(&mut self.buffer).get_mut(range);
+        records.expect("bounces of these batches: `prepare` makes them").chunks_exact_mut(stride)
     }
 
     /// Bytes held.
@@ -120,7 +128,7 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     velocity_increments: &[[f32; 4]],
     h: f32,
 ) {
-    let floats = batches.contact.len() * stride::<N>();
+    let floats = batches.lanes() * stride::<N>();
     bounces.buffer.resize(floats.div_ceil(16), Block::default());
     over_segments!(prepare_segment, L, N; rows, batches, bounces, contacts, velocity_increments, h);
 }
@@ -134,32 +142,35 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     velocity_increments: &[[f32; 4]],
     h: f32,
 ) {
-    let first = segment.first_lane / L::WIDTH;
-    for batch in 0..segment.batches {
-        let record = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+    let layout = const { Layout::of::<N, O>() };
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let records = records.chunks_exact(layout.stride);
+    let rows_of = row_a.batches().zip(row_b.batches());
+    let all = bounces.of::<L, N>(segment).zip(records).zip(contact.batches::<L::Index>().zip(rows_of));
+    for (batch, ((bounce, record), (contact, (row_a, row_b)))) in all.enumerate() {
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(bounce);
         for lane in 0..L::WIDTH {
-            let at = segment.first_lane + batch * L::WIDTH + lane;
-            let contact = batches.contact[at];
             // Lanes without a contact have e = 0 and so no energy.
-            let (e, n) = match contact {
-                PADDING => (0.0, Vec2::ZERO),
-                _ => (contacts[contact as usize].restitution, contacts[contact as usize].manifold.normal),
+            let (e, n) = if lane < segment.filled(batch, L::WIDTH) {
+                let contact = &contacts[contact.entries()[lane] as usize];
+                (contact.restitution, contact.manifold.normal)
+            } else {
+                (0.0, Vec2::ZERO)
             };
             let velocity_increment = |row: u32| {
                 Vec2::new(velocity_increments[row as usize][0], velocity_increments[row as usize][1])
             };
-            floats[lane] =
-                -n.dot(velocity_increment(batches.row_b[at]) - velocity_increment(batches.row_a[at])) / h;
+            let [a, b] = [row_a, row_b].map(|row| velocity_increment(row.entries()[lane]));
+            floats[lane] = -n.dot(b - a) / h;
             floats[L::WIDTH + lane] = e;
         }
-        let points = points::<L, N, O>(rows, batches, segment, batch);
-        let (a, e) = (record[0], record[1]);
+        let points = points::<L, N, O>(rows, record, row_a, row_b);
+        let (a, e) = (bounce[0], bounce[1]);
         for (p, [v, s]) in points.into_iter().enumerate().take(N::POINTS) {
             let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
             let fast = (L::splat(-RESTITUTION_THRESHOLD) - v).select_positive(energy, L::zero());
-            record[1 + 2 * p] = e * e * fast;
-            record[2 + 2 * p] = L::zero();
+            bounce[1 + 2 * p] = e * e * fast;
+            bounce[2 + 2 * p] = L::zero();
         }
     }
 }
@@ -168,22 +179,13 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 #[inline(always)]
 fn points<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &[BodyRow],
-    batches: &Batches,
-    segment: &Segment,
-    batch: usize,
+    record: &[L],
+    row_a: LaneIndex<L::Index>,
+    row_b: LaneIndex<L::Index>,
 ) -> [[L; 2]; 2] {
     let layout = const { Layout::of::<N, O>() };
-    let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
-    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
-    let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-    // SAFETY: `Problem::new` checked every row index against the rows.
-    let b = unsafe { L::gather(rows, &batches.row_b[lanes.clone()]) };
-    let a = if O::HAS_ROW {
-        // SAFETY: as above.
-        unsafe { L::gather(rows, &batches.row_a[lanes]) }
-    } else {
-        [L::zero(); 8]
-    };
+    let b = L::gather(rows, row_b);
+    let a = if O::HAS_ROW { L::gather(rows, row_a) } else { [L::zero(); 8] };
     let along_n = |at: usize| record[0].mul_add(b[at] - a[at], record[1] * (b[at + 1] - a[at + 1]));
     let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[6]), turn(b[6]));
     std::array::from_fn(|p| {
@@ -217,11 +219,8 @@ fn track_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     bounces: &mut Bounces,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
-    for batch in 0..segment.batches {
-        let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-        let bounce = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+    let records = batches.records_of::<L>(segment, &layout).records.chunks_exact(layout.stride);
+    for (record, bounce) in records.zip(bounces.of::<L, N>(segment)) {
         for p in 0..N::POINTS {
             bounce[2 + 2 * p] = bounce[2 + 2 * p].max(record[layout.at(p, layout.normal_impulse)]);
         }
@@ -247,14 +246,11 @@ fn apply_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     h: f32,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    for batch in 0..segment.batches {
-        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
-        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L, N>(segment));
+    for ((record, bounce), (row_a, row_b)) in records.zip(row_a.batches().zip(row_b.batches())) {
         for p in 0..N::POINTS {
-            let [vn, separation] = points::<L, N, O>(rows, batches, segment, batch)[p];
-            let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-            let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+            let [vn, separation] = points::<L, N, O>(rows, record, row_a, row_b)[p];
             let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
             let half = a * L::splat(0.5 * h);
             let left = half * half + L::splat(2.0) * (energy - a * separation);
@@ -268,20 +264,14 @@ fn apply_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             let n = [record[0], record[1]];
             let arms = |at: usize| record[layout.at(p, at)];
             let (x, y) = (n[0] * delta, n[1] * delta);
-            // SAFETY: `Problem::new` checked every row index against the rows.
-            unsafe {
-                let index = &batches.row_b[lanes.clone()];
-                let b = L::gather(rows, index);
-                let w = if N::ROTATION { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
-                L::scatter_velocity(rows, index, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
-                if O::MOVES {
-                    let index = &batches.row_a[lanes.clone()];
-                    let a = L::gather(rows, index);
-                    let w =
-                        if N::ROTATION { (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]) } else { a[2] };
-                    let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
-                    L::scatter_velocity(rows, index, v);
-                }
+            let b = L::gather(rows, row_b);
+            let w = if N::ROTATION { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
+            L::scatter_velocity(rows, row_b, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
+            if O::MOVES {
+                let a = L::gather(rows, row_a);
+                let w = if N::ROTATION { (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]) } else { a[2] };
+                let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
+                L::scatter_velocity(rows, row_a, v);
             }
         }
     }
@@ -310,11 +300,8 @@ fn forget_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     bounces: &mut Bounces,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-    for batch in 0..segment.batches {
-        let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
+    let records = batches.records_of::<L>(segment, &layout).records.chunks_exact_mut(layout.stride);
+    for (record, bounce) in records.zip(bounces.of::<L, N>(segment)) {
         for p in 0..N::POINTS {
             let mut forget = |at: usize| {
                 let at = layout.at(p, at);

@@ -72,12 +72,12 @@
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
 //! (gather, solve, scatter by colour); the contact frame is this crate's own.
 
-use super::batches::{Batches, Segment};
+use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput};
 use super::position::PositionSweep;
 use super::rules::NormalRule;
-use crate::engine::lanes::{BodyRow, Lanes, RowStore, prefetch};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
 
 /// The velocity sweep under a rule: Gauss–Seidel on the accumulated impulses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,38 +109,28 @@ pub(super) struct BodyPair<L> {
 }
 
 impl<L: Lanes> BodyPair<L> {
-    /// # Safety
-    /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    pub(super) unsafe fn gather<O: Opposite, S: RowStore + ?Sized>(
+    pub(super) fn gather<O: Opposite, S: RowStore + ?Sized>(
         rows: &S,
-        row_a: &[u32],
-        row_b: &[u32],
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
     ) -> Self {
-        // SAFETY: the caller keeps the indices in bounds.
-        let a = if O::HAS_ROW { unsafe { rows.gather(row_a) } } else { [L::zero(); 8] };
-        // SAFETY: the caller keeps the indices in bounds.
-        BodyPair { a, b: unsafe { rows.gather(row_b) } }
+        let a = if O::HAS_ROW { rows.gather(row_a) } else { [L::zero(); 8] };
+        BodyPair { a, b: rows.gather(row_b) }
     }
 
     /// Writes back the velocities of the bodies that answer to impulses.
-    ///
-    /// # Safety
-    /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    pub(super) unsafe fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
+    pub(super) fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
         &self,
         rows: &mut S,
-        row_a: &[u32],
-        row_b: &[u32],
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
     ) {
         let (a, b) = (&self.a, &self.b);
-        // SAFETY: the caller keeps the indices in bounds.
-        unsafe {
-            rows.scatter_velocity(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-            if O::MOVES {
-                rows.scatter_velocity(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-            }
+        rows.scatter_velocity(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+        if O::MOVES {
+            rows.scatter_velocity(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
         }
     }
 }
@@ -244,8 +234,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
     let layout = const { Layout::of::<N, O>() };
     let friction_rows = const { N::FRICTION && R::FRICTION };
     for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, S>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, S>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -315,8 +304,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
         }
 
         apply::<L, O>(&mut a, &mut b, n, [normal.sum, tangent.sum], w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, S>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, S>(rows, row_a, row_b);
     });
 }
 
@@ -366,8 +354,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let mut w = [a[W], b[W]];
@@ -383,8 +370,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             }
         }
         apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
     });
 }
 
@@ -398,8 +384,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -436,13 +421,11 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
         let (x, y) = (n[0] * sum, n[1] * sum);
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
-        // SAFETY: as above.
-        unsafe { L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]) };
+        L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
         if O::MOVES {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
-            // SAFETY: as above.
-            unsafe { L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]) };
+            L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
         }
     });
 }
@@ -457,17 +440,13 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
     rows: &mut S,
     batches: &mut Batches,
     segment: &Segment,
-    mut visit: impl FnMut(&mut S, &mut [L], &[u32], &[u32]),
+    mut visit: impl FnMut(&mut S, &mut [L], LaneIndex<L::Index>, LaneIndex<L::Index>),
 ) {
-    let stride = const { Layout::of::<N, O>().stride };
-    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-    let mut records = &mut buffer[segment.first_vector..][..segment.batches * stride];
-    let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
-    let row_a = batches.row_a[lanes.clone()].chunks_exact(L::WIDTH);
-    let row_b = batches.row_b[lanes].chunks_exact(L::WIDTH);
-    for (row_a, row_b) in row_a.zip(row_b) {
-        let (record, later) = records.split_at_mut(stride);
-        prefetch(later, (PREFETCH_BATCHES - 1) * stride..PREFETCH_BATCHES * stride);
+    let layout = const { Layout::of::<N, O>() };
+    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {
+        let (record, later) = records.split_at_mut(layout.stride);
+        prefetch(later, (PREFETCH_BATCHES - 1) * layout.stride..PREFETCH_BATCHES * layout.stride);
         visit(rows, record, row_a, row_b);
         records = later;
     }
@@ -476,8 +455,8 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
 macro_rules! over_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        for i in 0..$batches.segments.len() {
-            let segment = $batches.segments[i];
+        for i in 0..$batches.segments().len() {
+            let segment = $batches.segments()[i];
             match segment.opposite {
                 OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
                 OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
@@ -531,8 +510,8 @@ pub fn position_sweep<L: Lanes, N: KernelFeatures, const TURNED: bool>(
     batches: &mut Batches,
     sweep: PositionSweep,
 ) {
-    for i in 0..batches.segments.len() {
-        let segment = batches.segments[i];
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
         match segment.opposite {
             OppositeKind::Dynamic => {
                 position_segment::<L, N, OnDynamic, TURNED>(rows, batches, &segment, sweep);
