@@ -6,10 +6,10 @@
 //! width; in exact arithmetic no order matters. The kernel is that of [`super::sweep`], given a store
 //! of rows that reads from one place and adds up in another.
 
-use super::features::KernelFeatures;
+use super::features::{KernelFeatures, OnDynamic, OnKinematic, OnStatic, OppositeKind};
 use super::pass::{AnyPass, Pass, PassInput};
-use super::rules::{NormalRule, Rule, each_rule};
-use super::sweep::{INV_MASS, VX, VY, W, sweep_store};
+use super::rules::{Rigid, Rule, Soft};
+use super::sweep::{INV_MASS, NormalRule, Sweep, VX, VY, W, over_segments, sweep_segment};
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under a rule.
@@ -20,17 +20,41 @@ struct JacobiSweep<R> {
 }
 
 impl<R: NormalRule> Pass for JacobiSweep<R> {
-    #[inline(always)]
+    const COUNTED: bool = false;
+
+    #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         let mut store = SummedRows { before: on.rows, sums: on.sums };
         let rule = Relaxed { rule: self.rule, factor: self.relaxation };
-        sweep_store::<L, F, Relaxed<R>, SummedRows>(&mut store, on.batches, rule);
+        over_segments!(sweep_segment, L, F, Relaxed<R>, SummedRows; &mut store, on.batches, rule);
     }
 }
 
-/// Calls `then` with the Jacobi sweep under `rule`.
-pub(super) fn with_pass(rule: &Rule, relaxation: f32, then: impl FnOnce(&dyn AnyPass)) {
-    each_rule!(rule, sweep => then(&JacobiSweep { rule: sweep.0, relaxation }))
+/// A rule that a Jacobi sweep is compiled for, as a value.
+#[derive(Clone, Copy, Debug)]
+pub enum JacobiRule {
+    /// [`Soft`]
+    Soft(Soft),
+    /// [`Rigid`]
+    Rigid(Rigid),
+}
+
+impl JacobiRule {
+    /// The same rule of a Gauss–Seidel sweep.
+    pub(super) fn rule(self) -> Rule {
+        match self {
+            JacobiRule::Soft(rule) => Rule::Soft(Sweep(rule)),
+            JacobiRule::Rigid(rule) => Rule::Rigid(Sweep(rule)),
+        }
+    }
+
+    /// Calls `then` with the Jacobi sweep.
+    pub(super) fn with_pass(self, relaxation: f32, then: impl FnOnce(&dyn AnyPass)) {
+        match self {
+            JacobiRule::Soft(rule) => then(&JacobiSweep { rule, relaxation }),
+            JacobiRule::Rigid(rule) => then(&JacobiSweep { rule, relaxation }),
+        }
+    }
 }
 
 /// Another rule's line c − s v, a part of the way from the old impulse: λ + ω (c − s v − λ).

@@ -1,19 +1,21 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
 use super::batches::Batches;
+use super::block::BlockSweep;
 use super::features::Features;
 use super::graph::Graph;
+use super::jacobi::{self, JacobiRule};
 use super::kept::Kept;
 use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::pass::{AnyPass, PassInput, PassWidth};
 use super::position::PositionSweep;
 use super::prepare::{Prepare, Store};
+use super::restitution;
 use super::restitution::Bounces;
-use super::rules::{Rule, VelocitySweep};
-use super::sweep::WarmStart;
+use super::rules::{Rigid, Rule};
+use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::System;
-use super::{block, jacobi, restitution};
 use crate::engine::clock::{Clock, Phase};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
@@ -183,25 +185,23 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
     /// together; see [`super::block`].
-    pub fn block_sweep(&mut self, phase: Phase, rule: &Rule) {
-        let mut ran = false;
-        block::with_pass(rule, |pass| ran = self.run(phase, pass));
-        if ran {
-            self.solved(rule.sweep());
+    pub fn block_sweep(&mut self, phase: Phase, rule: Rigid) {
+        if self.run(phase, &BlockSweep(rule)) {
+            self.solved(&Sweep(rule));
         }
     }
 
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
-    pub fn jacobi_sweep(&mut self, phase: Phase, rule: &Rule, relaxation: f32) {
+    pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
         if self.clock.skips(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
-        jacobi::with_pass(rule, relaxation, |pass| self.over_batches(pass));
+        rule.with_pass(relaxation, |pass| self.over_batches(pass));
         jacobi::finish(&mut self.work.rows, &self.work.sums);
         self.clock.lap(phase);
-        self.solved(rule.sweep());
+        self.solved(rule.rule().sweep());
     }
 
     /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.

@@ -125,24 +125,43 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     over_segments!(prepare_segment, L, N; rows, batches, contacts);
 }
 
-/// Writes the accumulated impulses of a segment back to its contacts, in lanes.
-#[inline(always)]
-fn store_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    _rows: &mut [BodyRow],
+/// Writes accumulated impulses back to the contacts.
+pub struct Store;
+
+impl Pass for Store {
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        store::<L, F>(on.batches, on.contacts);
+    }
+}
+
+/// Writes the accumulated impulses of all segments back to their contacts.
+pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut [Contact]) {
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        store_segment::<L>(batches, &segment, &N::layout(segment.opposite), contacts);
+    }
+}
+
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width
+/// alone: this pass waits for memory, and a branch on the layout per batch costs nothing.
+#[inline(never)]
+fn store_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
+    layout: &Layout,
     contacts: &mut [Contact],
 ) {
     use quad::*;
-    let layout = const { Layout::of::<N, O>() };
-    let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, &layout);
+    let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches()).enumerate() {
         let impulses = |p: usize| {
-            let tangent = if N::FRICTION { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
+            let tangent =
+                if layout.has_friction { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
             [record[layout.at(p, layout.normal_impulse)], tangent]
         };
-        let ([n0, t0], [n1, t1]) = (impulses(0), if N::POINTS == 2 { impulses(1) } else { [L::zero(); 2] });
+        let ([n0, t0], [n1, t1]) =
+            (impulses(0), if layout.points == 2 { impulses(1) } else { [L::zero(); 2] });
         let filled = segment.filled(batch, L::WIDTH);
         if filled == L::WIDTH {
             let quads = bytemuck::cast_slice_mut(contacts);
@@ -158,24 +177,4 @@ fn store_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
         }
     }
-}
-
-/// Writes accumulated impulses back to the contacts.
-pub struct Store;
-
-impl Pass for Store {
-    #[inline(always)]
-    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        store::<L, F>(on.rows, on.batches, on.contacts);
-    }
-}
-
-/// Writes the accumulated impulses of all segments back to their contacts.
-#[inline(never)]
-pub fn store<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    contacts: &mut [Contact],
-) {
-    over_segments!(store_segment, L, N; rows, batches, contacts);
 }

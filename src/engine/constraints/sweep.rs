@@ -74,10 +74,77 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{AnyPass, Pass, PassInput};
 use super::position::PositionSweep;
-use super::rules::NormalRule;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
+
+/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
+macro_rules! over_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.segments().len() {
+            let segment = $batches.segments()[i];
+            match segment.opposite {
+                OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(super) use over_segments;
+
+/// As `over_segments!`, with a kinematic body a taken for a dynamic one: its inverse mass is zero,
+/// so that nothing changes it. For kernels that seldom run: an instance less.
+macro_rules! over_moving_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.segments().len() {
+            let segment = $batches.segments()[i];
+            match segment.opposite {
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                _ => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(super) use over_moving_segments;
+
+/// How a normal row's state becomes its new accumulated impulse.
+///
+/// `against_static` tells that body a is static or kinematic.
+pub trait NormalRule: Copy + Send + Sync + 'static {
+    /// Whether the sweep solves the friction rows as well.
+    const FRICTION: bool;
+    /// Whether the rule reads the separation.
+    const SEPARATION: bool = true;
+
+    /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
+    /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
+    ///
+    /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
+
+    /// The same slope (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
+    #[inline(always)]
+    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
+        mass
+    }
+
+    /// The new accumulated impulse (N·s), ≥ 0, at the normal velocity `vn` (m/s).
+    #[inline(always)]
+    fn normal_impulse<L: Lanes>(&self, against_static: bool, vn: L, separation: L, mass: L, old: L) -> L {
+        let [constant, slope] = self.line(against_static, separation, mass, old);
+        slope.neg_mul_add(vn, constant).max(L::zero())
+    }
+
+    /// One velocity sweep under this rule over all segments, in order.
+    ///
+    /// A method of the rule, so that the compiler puts its instances beside the rule: rules in
+    /// files of their own are compiled side by side, and again only if they change.
+    #[inline(never)]
+    fn sweep<L: Lanes, N: KernelFeatures>(self, rows: &mut [BodyRow], batches: &mut Batches) {
+        over_segments!(sweep_segment, L, N, Self, [BodyRow]; rows, batches, self);
+    }
+}
 
 /// The velocity sweep under a rule: Gauss–Seidel on the accumulated impulses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +153,33 @@ pub struct Sweep<R>(pub R);
 impl<R: NormalRule> Pass for Sweep<R> {
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R>(on.rows, on.batches, self.0);
+        self.0.sweep::<L, F>(on.rows, on.batches);
+    }
+}
+
+/// A velocity sweep under some rule: a pass that can say which law it solves.
+pub trait VelocitySweep: AnyPass {
+    /// Whether friction rows are solved.
+    fn has_friction(&self) -> bool;
+
+    /// [`NormalRule::normal_impulse`] of one row.
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32;
+
+    /// The same sweep, owned.
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync>;
+}
+
+impl<R: NormalRule> VelocitySweep for Sweep<R> {
+    fn has_friction(&self) -> bool {
+        R::FRICTION
+    }
+
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32 {
+        self.0.normal_impulse(against_static, vn, separation, mass, old)
+    }
+
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync> {
+        Box::new(*self)
     }
 }
 
@@ -376,7 +469,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 
 /// One position sweep over a segment, see [`super::position`].
 #[inline(always)]
-fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
+fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -399,7 +492,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             let mut mass = record[layout.at(p, layout.normal_mass)];
-            if TURNED && N::ROTATION {
+            if sweep.turned && N::ROTATION {
                 let turned = |sine: L, versine: L, side: usize| {
                     sine.mul_add(arm_t[side], versine.neg_mul_add(arm_n[side], arm_n[side]))
                 };
@@ -452,29 +545,13 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
     }
 }
 
-/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
-macro_rules! over_segments {
-    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        for i in 0..$batches.segments().len() {
-            let segment = $batches.segments()[i];
-            match segment.opposite {
-                OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-                OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-            }
-        }
-    };
-}
-pub(super) use over_segments;
-
 /// One velocity sweep over all segments, in order.
-#[inline(never)]
 pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     rule: R,
 ) {
-    over_segments!(sweep_segment, L, N, R, [BodyRow]; rows, batches, rule);
+    rule.sweep::<L, N>(rows, batches);
 }
 
 /// As [`sweep`], on rows that are kept in another way: to measure what that costs.
@@ -505,23 +582,10 @@ pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &m
 
 /// One position sweep over all segments, in order.
 #[inline(never)]
-pub fn position_sweep<L: Lanes, N: KernelFeatures, const TURNED: bool>(
+pub fn position_sweep<L: Lanes, N: KernelFeatures>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     sweep: PositionSweep,
 ) {
-    for i in 0..batches.segments().len() {
-        let segment = batches.segments()[i];
-        match segment.opposite {
-            OppositeKind::Dynamic => {
-                position_segment::<L, N, OnDynamic, TURNED>(rows, batches, &segment, sweep);
-            }
-            OppositeKind::Kinematic => {
-                position_segment::<L, N, OnKinematic, TURNED>(rows, batches, &segment, sweep);
-            }
-            OppositeKind::Static => {
-                position_segment::<L, N, OnStatic, TURNED>(rows, batches, &segment, sweep);
-            }
-        }
-    }
+    over_moving_segments!(position_segment, L, N; rows, batches, sweep);
 }
