@@ -9,10 +9,11 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use simpulse::engine::constraints::sweep::{NormalRule, sweep, sweep_store};
+use simpulse::engine::constraints::NormalRule;
+use simpulse::engine::constraints::rules::{Rigid, Soft};
+use simpulse::engine::constraints::sweep::{sweep, sweep_store};
 use simpulse::engine::constraints::{Batches, Kernel, Workspace};
 use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
-use simpulse::engine::constraints::rules::{Rigid, Soft};
 use std::hint::black_box;
 use wide::{f32x4, f32x8, f32x16};
 
@@ -44,7 +45,7 @@ impl Start {
                 Some(columns) => sweep_store::<L, Boxes, R, _>(columns, &mut start.lanes, rule),
             }
         }
-        match self.lanes.width {
+        match self.lanes.width() {
             1 => at::<f32, R>(self, columns, rule),
             4 => at::<f32x4, R>(self, columns, rule),
             8 => at::<f32x8, R>(self, columns, rule),
@@ -70,9 +71,9 @@ fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, scene: &str, starts:
     for start in starts {
         for packed in [true, false] {
             let name = if packed { name.to_string() } else { format!("{name}_columns") };
-            let lanes = start.lanes.width;
+            let lanes = start.lanes.width();
             assert!(start.clone().after_20_sweeps(packed, rule) == truth, "{name} {scene} {lanes}");
-            group.throughput(Throughput::Elements(starts[0].lanes.contact.len() as u64));
+            group.throughput(Throughput::Elements(starts[0].lanes.lanes() as u64));
             let (mut start, mut columns) = (start.clone(), start.columns(packed));
             group.bench_function(BenchmarkId::new(format!("{name}/{scene}"), format!("{lanes}/1")), |b| {
                 b.iter(|| black_box(&mut start).sweep(columns.as_mut(), rule));

@@ -4,13 +4,12 @@
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use simpulse::engine::coloring::{Coloring, EXEMPT};
-use simpulse::engine::constraints::batches::PADDING;
+use simpulse::engine::constraints::rules::Rigid;
 use simpulse::engine::constraints::{
     Batches, Features, Kernel, Layout, NormalRule, OppositeKind, prepare, sweep,
 };
 use simpulse::engine::contacts::{Contact, Manifold, ManifoldPoint};
 use simpulse::engine::lanes::{BodyRow, Lanes};
-use simpulse::engine::constraints::rules::Rigid;
 
 const BODIES: usize = 24;
 const INV_H: f32 = 60.0;
@@ -205,7 +204,10 @@ proptest! {
     #[test]
     fn lanes_compute_what_the_textbook_says(setup in setup()) {
         let (rows, impulses, batches) = in_lanes::<wide::f32x8>(&setup);
-        let order: Vec<u32> = batches.contact.iter().copied().filter(|&c| c != PADDING).collect();
+        let mut order = vec![];
+        for s in batches.segments() {
+            order.extend(&batches.contact()[s.first_lane..][..s.contacts]);
+        }
         prop_assert_eq!(order.len(), setup.contacts.len());
         let (bodies, exact) = by_the_book(&setup, &order);
         for (row, body) in rows.iter().zip(&bodies) {
@@ -239,14 +241,11 @@ proptest! {
         let (rows, _, batches) = in_lanes::<wide::f32x16>(&setup);
         prop_assert_eq!(rows[BODIES], BodyRow::default());
         prop_assert_eq!(&rows[..STATIC as usize], &[BodyRow::default(); STATIC as usize]);
-        let floats: &[f32] = bytemuck::cast_slice(&batches.buffer);
-        for segment in &batches.segments {
+        let floats: &[f32] = bytemuck::cast_slice(batches.records());
+        for segment in batches.segments() {
             let layout = Layout::for_features(&Features::FULL, segment.opposite);
             for batch in 0..segment.batches {
-                for lane in 0..16 {
-                    if batches.contact[segment.first_lane + batch * 16 + lane] != PADDING {
-                        continue;
-                    }
+                for lane in segment.filled(batch, 16)..16 {
                     for vector in 0..layout.stride {
                         let at = (segment.first_vector + batch * layout.stride + vector) * 16 + lane;
                         prop_assert_eq!(floats[at], 0.0);

@@ -161,7 +161,7 @@ fn a_reset_brings_back_rows_and_records() {
         let mut world = settled("pyramid:5", settings(find(DEFAULT).unwrap()), 10);
         let mut frozen = world.hold();
         let state = |f: &HeldWorld| {
-            let floats: &[f32] = bytemuck::cast_slice(&f.workspace().lanes.buffer);
+            let floats: &[f32] = bytemuck::cast_slice(f.workspace().lanes.records());
             (f.workspace().rows.clone(), floats.to_vec(), f.world().state_hash())
         };
         let before = state(&frozen);

@@ -1,5 +1,7 @@
 //! Box2D through its C interface: the one place with unsafe code.
 
+#![allow(unsafe_code)] // A foreign library.
+
 use crate::engine::{Contender, Engine, Stage, State};
 use boxdd_sys::ffi::*;
 use simpulse::engine::bodies::BodyKind;

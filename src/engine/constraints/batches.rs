@@ -1,10 +1,8 @@
-//! Which contact stands in which lane: batches, segments, and the slab that holds records.
+//! Which contact is in which lane: batches, segments, and the buffer that holds records.
 
 use super::features::{Features, Layout, OppositeKind};
-use crate::engine::lanes::Block;
-
-/// Marks a lane without a contact.
-pub const PADDING: u32 = u32::MAX;
+use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
+use std::mem::size_of_val;
 
 /// Batches of one colour and one kind of body a: one kernel runs over them.
 ///
@@ -15,34 +13,108 @@ pub struct Segment {
     pub opposite: OppositeKind,
     /// First lane slot (a multiple of the width).
     pub first_lane: usize,
+    /// Lanes that hold a contact: the first ones. What the last batch has beyond is padding.
+    pub contacts: usize,
     /// Batches of `width` lanes.
     pub batches: usize,
-    /// Where the first record starts in the slab, in lane vectors.
+    /// Where the first record starts in the buffer, in lane vectors.
     pub first_vector: usize,
+    /// Lane vectors of a record ([`Layout::stride`]).
+    pub stride: usize,
+}
+
+impl Segment {
+    /// How many lanes of a batch hold a contact.
+    #[inline(always)]
+    pub fn filled(&self, batch: usize, width: usize) -> usize {
+        self.contacts.saturating_sub(batch * width).min(width)
+    }
 }
 
 /// Constraint records of one width, with the lane each contact has.
+///
+/// Lanes without a contact repeat the first contact of their batch, and their rows are the inert one:
+/// whatever is gathered by these indices exists if contacts and rows do.
 #[derive(Clone, Debug, Default)]
 pub struct Batches {
-    /// Lanes per batch.
-    pub width: usize,
-    /// What runs, in order.
-    pub segments: Vec<Segment>,
-    /// Contact in each lane, or [`PADDING`]. `[lanes]`
-    pub contact: Vec<u32>,
-    /// Row of body a in each lane; the inert row where there is no contact. `[lanes]`
-    pub row_a: Vec<u32>,
-    /// Row of body b in each lane; the inert row where there is no contact. `[lanes]`
-    pub row_b: Vec<u32>,
+    width: usize,
+    segments: Vec<Segment>,
+    contact: Indices,
+    row_a: Indices,
+    row_b: Indices,
     /// Records, `stride × width` floats each.
-    pub buffer: Vec<Block>,
-    /// Lane vectors in use of the slab.
-    pub vectors: usize,
+    buffer: Vec<Block>,
+    /// Lane vectors in use of the buffer.
+    vectors: usize,
+}
+
+/// The records of a segment, and by what they gather.
+pub struct SegmentRecords<'a, L> {
+    /// `[batches × stride]`
+    pub records: &'a mut [L],
+    /// `[batches × width]`
+    pub contact: IndexList<'a>,
+    /// `[batches × width]`
+    pub row_a: IndexList<'a>,
+    /// `[batches × width]`
+    pub row_b: IndexList<'a>,
 }
 
 impl Batches {
+    /// Lanes per batch.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// What runs, in order.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// Contact in each lane; padding repeats one. `[lanes]`
+    pub fn contact(&self) -> &[u32] {
+        &self.contact
+    }
+
+    /// Row of body a in each lane; the inert row where there is no contact. `[lanes]`
+    pub fn row_a(&self) -> &[u32] {
+        &self.row_a
+    }
+
+    /// Row of body b in each lane; the inert row where there is no contact. `[lanes]`
+    pub fn row_b(&self) -> &[u32] {
+        &self.row_b
+    }
+
+    /// Lanes of all segments, padding included.
+    pub fn lanes(&self) -> usize {
+        self.contact.len()
+    }
+
+    /// The part of the buffer that holds records, in whole blocks.
+    ///
+    /// # Panics
+    /// As [`Self::records_of`] without a buffer.
+    pub fn records(&self) -> &[Block] {
+        &self.buffer[..self.blocks()]
+    }
+
+    /// As [`Self::records`], to write.
+    pub fn records_mut(&mut self) -> &mut [Block] {
+        let blocks = self.blocks();
+        &mut self.buffer[..blocks]
+    }
+
+    fn blocks(&self) -> usize {
+        (self.vectors * self.width).div_ceil(16)
+    }
+
     /// Empties the batches for a new step.
+    ///
+    /// # Panics
+    /// If the width is 0.
     pub fn clear(&mut self, width: usize) {
+        assert!(width > 0, "batches without lanes");
         self.width = width;
         self.segments.clear();
         self.contact.clear();
@@ -53,36 +125,79 @@ impl Batches {
 
     /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
     /// batches with lanes that point at the `inert` row.
+    ///
+    /// # Panics
+    /// If the batches have no width yet ([`Self::clear`]).
     pub fn push_segment(
         &mut self,
         opposite: OppositeKind,
         layout: &Layout,
-        contacts: impl ExactSizeIterator<Item = (u32, [u32; 2])>,
+        contacts: impl Iterator<Item = (u32, [u32; 2])>,
         inert: u32,
     ) {
-        if contacts.len() == 0 {
-            return;
-        }
-        let batches = contacts.len().div_ceil(self.width);
+        assert!(self.width > 0, "batches without lanes: `clear` gives them their width");
         let first_lane = self.contact.len();
-        self.segments.push(Segment { opposite, first_lane, batches, first_vector: self.vectors });
         for (contact, [a, b]) in contacts {
             self.contact.push(contact);
             self.row_a.push(a);
             self.row_b.push(b);
         }
+        let contacts = self.contact.len() - first_lane;
+        if contacts == 0 {
+            return;
+        }
+        let batches = contacts.div_ceil(self.width);
         let end = first_lane + batches * self.width;
-        self.contact.resize(end, PADDING);
-        self.row_a.resize(end, inert);
-        self.row_b.resize(end, inert);
-        self.vectors += batches * layout.stride;
+        self.contact.fill_to(end, self.contact[end - self.width]);
+        self.row_a.fill_to(end, inert);
+        self.row_b.fill_to(end, inert);
+        let (first_vector, stride) = (self.vectors, layout.stride);
+        self.segments.push(Segment { opposite, first_lane, contacts, batches, first_vector, stride });
+        self.vectors += batches * stride;
     }
 
-    /// Makes room in the slab for the records of all segments.
+    /// Makes room in the buffer for the records of all segments.
     pub fn reserve_buffer(&mut self) {
-        let blocks = (self.vectors * self.width).div_ceil(16);
+        let blocks = self.blocks();
         if self.buffer.len() < blocks {
             self.buffer.resize(blocks, Block::default());
+        }
+    }
+
+    /// Whether these are batches for kernels of `width` lanes, and all their rows and contacts exist.
+    ///
+    /// Gathers and scatters see to that themselves; this says it before a step has begun.
+    ///
+    /// # Panics
+    /// If not.
+    pub fn assert_fits(&self, width: usize, rows: usize, contacts: usize) {
+        if self.segments.is_empty() {
+            return;
+        }
+        assert!(self.width == width, "batches of {} lanes for kernels of {width}", self.width);
+        let bound = self.row_a.list().bound().max(self.row_b.list().bound());
+        assert!(bound <= rows, "batches name row {} of {rows}", bound - 1);
+        let bound = self.contact.list().bound();
+        assert!(bound <= contacts, "batches name contact {} of {contacts}", bound - 1);
+    }
+
+    /// The records of a segment of these batches for a kernel of as many lanes and of the same layout.
+    ///
+    /// # Panics
+    /// If the batches are of another width or layout, or have no buffer ([`Self::reserve_buffer`]).
+    #[inline(always)]
+    pub fn records_of<L: Lanes>(&mut self, segment: &Segment, layout: &Layout) -> SegmentRecords<'_, L> {
+        assert!(self.width == L::WIDTH, "batches of {} lanes for a kernel of {}", self.width, L::WIDTH);
+        assert!(segment.stride == layout.stride, "records of another kernel's layout");
+        let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
+        let vectors = segment.first_vector..segment.first_vector + segment.batches * segment.stride;
+        let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut self.buffer);
+        assert!(vectors.end <= buffer.len(), "no room for records: `reserve_buffer` makes it");
+        SegmentRecords {
+            records: &mut buffer[vectors],
+            contact: self.contact.list().part(lanes.clone()),
+            row_a: self.row_a.list().part(lanes.clone()),
+            row_b: self.row_b.list().part(lanes),
         }
     }
 
@@ -97,8 +212,23 @@ impl Batches {
         4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
     }
 
+    /// Per array, bytes held and bytes in use.
+    pub fn memory(&self) -> [(usize, usize); 5] {
+        let of = |list: &Indices| (list.held_bytes(), size_of_val::<[u32]>(list));
+        [
+            (held(&self.segments), size_of_val(self.segments.as_slice())),
+            of(&self.contact),
+            of(&self.row_a),
+            of(&self.row_b),
+            (held(&self.buffer), 4 * self.vectors * self.width),
+        ]
+    }
+
     /// Calls `visit(contact, record, lane)` for every lane that holds a contact, where
     /// quantity `q` of the contact is `record[q · width + lane]`.
+    ///
+    /// # Panics
+    /// If the records were laid out for other features, or have no buffer ([`Self::reserve_buffer`]).
     pub fn for_each_lane(
         &mut self,
         features: &Features,
@@ -107,15 +237,14 @@ impl Batches {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut self.buffer);
         for segment in &self.segments {
             let layout = Layout::for_features(features, segment.opposite);
+            assert!(segment.stride == layout.stride, "records of another layout");
             let record_floats = layout.stride * self.width;
             let start = segment.first_vector * self.width;
             for batch in 0..segment.batches {
                 let record = &mut floats[start + batch * record_floats..][..record_floats];
-                let lanes = &self.contact[segment.first_lane + batch * self.width..][..self.width];
-                for (lane, &contact) in lanes.iter().enumerate() {
-                    if contact != PADDING {
-                        visit(contact, &layout, record, lane);
-                    }
+                let lanes = &self.contact[segment.first_lane + batch * self.width..];
+                for (lane, &contact) in lanes[..segment.filled(batch, self.width)].iter().enumerate() {
+                    visit(contact, &layout, record, lane);
                 }
             }
         }

@@ -32,12 +32,12 @@
 //! `solve_pgs_ngs_block`): normal rows have the last word.
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::pass::{AnyPass, Pass, PassInput};
-use super::rules::{NormalRule, Rule, each_rule};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::pass::{Pass, PassInput};
+use super::sweep::NormalRule;
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
-    spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
+    over_moving_segments, spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
@@ -46,23 +46,20 @@ const SINGULAR: f32 = 1e-3;
 
 /// A block sweep under a rule.
 #[derive(Clone, Copy, Debug)]
-struct BlockSweep<R>(R);
+pub struct BlockSweep<R>(pub R);
 
 impl<R: NormalRule> Pass for BlockSweep<R> {
+    const COUNTED: bool = false;
+
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         sweep::<L, F, R>(on.rows, on.batches, self.0);
     }
 }
 
-/// Calls `then` with the block sweep under `rule`.
-pub(super) fn with_pass(rule: &Rule, then: impl FnOnce(&dyn AnyPass)) {
-    each_rule!(rule, sweep => then(&BlockSweep(sweep.0)))
-}
-
 #[inline(never)]
 fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
-    over_segments!(segment, L, N, R; rows, batches, rule);
+    over_moving_segments!(segment, L, N, R; rows, batches, rule);
 }
 
 #[inline(always)]
@@ -74,8 +71,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -133,8 +129,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             spin::<L, N, O>(&mut w, inertia, arm[p], delta);
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
     });
 }
 

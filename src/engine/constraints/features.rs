@@ -48,7 +48,15 @@ pub trait KernelFeatures: Copy + 'static {
     const FRICTION: bool;
     /// 1 or 2: the points of a contact.
     const POINTS: usize;
+
+    /// The layout of this kernel's records against that kind of body a.
+    fn layout(opposite: OppositeKind) -> Layout {
+        Layout::new(Self::ROTATION, Self::FRICTION, Self::POINTS, opposite != OppositeKind::Static)
+    }
 }
+
+/// [`KernelFeatures::layout`] as a value.
+pub type LayoutOf = fn(OppositeKind) -> Layout;
 
 /// One kernel's needs.
 #[derive(Clone, Copy, Debug)]
@@ -143,6 +151,8 @@ pub struct Layout {
     pub has_friction: bool,
     /// Whether the arms have a place, of body b and of body a.
     pub has_arms: [bool; 2],
+    /// Whether body a has a row that is gathered.
+    pub a_has_row: bool,
 }
 
 impl Layout {
@@ -172,6 +182,7 @@ impl Layout {
             stride: first_point + points * point_stride,
             has_friction: friction,
             has_arms: [rotation, rotation && a_has_row],
+            a_has_row,
         }
     }
 

@@ -6,11 +6,11 @@
 //! width; in exact arithmetic no order matters. The kernel is that of [`super::sweep`], given a store
 //! of rows that reads from one place and adds up in another.
 
-use super::features::KernelFeatures;
+use super::features::{KernelFeatures, OnDynamic, OnKinematic, OnStatic, OppositeKind};
 use super::pass::{AnyPass, Pass, PassInput};
-use super::rules::{NormalRule, Rule, each_rule};
-use super::sweep::{INV_MASS, VX, VY, W, sweep_store};
-use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+use super::rules::{Rigid, Rule, Soft};
+use super::sweep::{INV_MASS, NormalRule, Sweep, VX, VY, W, over_segments, sweep_segment};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under a rule.
 #[derive(Clone, Copy, Debug)]
@@ -20,17 +20,41 @@ struct JacobiSweep<R> {
 }
 
 impl<R: NormalRule> Pass for JacobiSweep<R> {
-    #[inline(always)]
+    const COUNTED: bool = false;
+
+    #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         let mut store = SummedRows { before: on.rows, sums: on.sums };
         let rule = Relaxed { rule: self.rule, factor: self.relaxation };
-        sweep_store::<L, F, Relaxed<R>, SummedRows>(&mut store, on.batches, rule);
+        over_segments!(sweep_segment, L, F, Relaxed<R>, SummedRows; &mut store, on.batches, rule);
     }
 }
 
-/// Calls `then` with the Jacobi sweep under `rule`.
-pub(super) fn with_pass(rule: &Rule, relaxation: f32, then: impl FnOnce(&dyn AnyPass)) {
-    each_rule!(rule, sweep => then(&JacobiSweep { rule: sweep.0, relaxation }))
+/// A rule that a Jacobi sweep is compiled for, as a value.
+#[derive(Clone, Copy, Debug)]
+pub enum JacobiRule {
+    /// [`Soft`]
+    Soft(Soft),
+    /// [`Rigid`]
+    Rigid(Rigid),
+}
+
+impl JacobiRule {
+    /// The same rule of a Gauss–Seidel sweep.
+    pub(super) fn rule(self) -> Rule {
+        match self {
+            JacobiRule::Soft(rule) => Rule::Soft(Sweep(rule)),
+            JacobiRule::Rigid(rule) => Rule::Rigid(Sweep(rule)),
+        }
+    }
+
+    /// Calls `then` with the Jacobi sweep.
+    pub(super) fn with_pass(self, relaxation: f32, then: impl FnOnce(&dyn AnyPass)) {
+        match self {
+            JacobiRule::Soft(rule) => then(&JacobiSweep { rule, relaxation }),
+            JacobiRule::Rigid(rule) => then(&JacobiSweep { rule, relaxation }),
+        }
+    }
 }
 
 /// Another rule's line c − s v, a part of the way from the old impulse: λ + ω (c − s v − λ).
@@ -79,20 +103,16 @@ struct SummedRows<'a> {
 
 impl RowStore for SummedRows<'_> {
     #[inline(always)]
-    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { L::gather(self.before, index) }
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self.before, index)
     }
 
     #[inline(always)]
-    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
-        // SAFETY: the caller keeps `index` in bounds; there is a sum per row.
-        unsafe {
-            let (old, mut sum) = (L::gather(self.before, index), L::gather(self.sums, index));
-            for k in [VX, VY, W] {
-                sum[k] = sum[k] + (velocity[k] - old[k]);
-            }
-            L::scatter_velocity(self.sums, index, [sum[VX], sum[VY], sum[W], sum[INV_MASS]]);
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        let (old, mut sum) = (L::gather(self.before, index), L::gather(self.sums, index));
+        for k in [VX, VY, W] {
+            sum[k] = sum[k] + (velocity[k] - old[k]);
         }
+        L::scatter_velocity(self.sums, index, [sum[VX], sum[VY], sum[W], sum[INV_MASS]]);
     }
 }

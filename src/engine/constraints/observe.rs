@@ -5,7 +5,7 @@
 //! measured against a law that it does not solve. Nothing is observed unless
 //! [`super::Workspace::observe`] is set; a step then costs one branch per sweep.
 
-use super::rules::VelocitySweep;
+use super::sweep::VelocitySweep;
 use crate::engine::lanes::BodyRow;
 use std::fmt;
 

@@ -30,6 +30,10 @@ pub struct PassInput<'a> {
 ///
 /// To add one, implement this; [`super::sweep::Sweep`] is the example.
 pub trait Pass {
+    /// Whether there is an instance that counts operations, for profiles. Kernels that are not
+    /// profiled are compiled faster without.
+    const COUNTED: bool = true;
+
     /// Runs over all segments of `on.batches`, in order.
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>);
 }
@@ -53,7 +57,7 @@ impl<P: Pass> AnyPass for P {
     fn run_at(&self, width: PassWidth, features: &Features, on: PassInput<'_>) {
         match width.width {
             #[cfg(feature = "count")]
-            LaneWidth::W1 if width.counted => {
+            LaneWidth::W1 if width.counted && P::COUNTED => {
                 with_features::<P, crate::engine::lanes::Counted>(self, features, on);
             }
             LaneWidth::W1 => with_features::<P, f32>(self, features, on),

@@ -1,19 +1,21 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
-use super::batches::{Batches, PADDING};
+use super::batches::Batches;
+use super::block::BlockSweep;
 use super::features::Features;
 use super::graph::Graph;
+use super::jacobi::{self, JacobiRule};
 use super::kept::Kept;
 use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::pass::{AnyPass, PassInput, PassWidth};
 use super::position::PositionSweep;
 use super::prepare::{Prepare, Store};
+use super::restitution;
 use super::restitution::Bounces;
-use super::rules::{Rule, VelocitySweep};
-use super::sweep::WarmStart;
+use super::rules::{Rigid, Rule};
+use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::System;
-use super::{block, jacobi, restitution};
 use crate::engine::clock::{Clock, Phase};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
@@ -91,8 +93,7 @@ impl<'a> Passes<'a> {
     /// Prepares the constraints of a step.
     ///
     /// # Panics
-    /// If a batch names a row or a contact that does not exist: the one check on which all gathers
-    /// and scatters of the step rest.
+    /// If a batch names a row or a contact that does not exist.
     pub fn new(
         work: &'a mut Workspace,
         contacts: &'a mut [Contact],
@@ -104,12 +105,7 @@ impl<'a> Passes<'a> {
         // A phase that is repeated finds the records, and the check, of the step before it.
         if !passes.clock.skips(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
-                let rows = passes.work.rows.len() as u32;
-                assert!(batches.width == width || batches.segments.is_empty());
-                let below = |list: &[u32], limit: u32| list.iter().all(|&i| i < limit);
-                assert!(below(&batches.row_a, rows) && below(&batches.row_b, rows));
-                let made = passes.contacts.len();
-                assert!(batches.contact.iter().all(|&c| (c as usize) < made || c == PADDING));
+                batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
             passes.over_batches(&Prepare);
             if input.features.restitution {
@@ -157,7 +153,7 @@ impl<'a> Passes<'a> {
             return;
         }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
-            let width = batches.width;
+            let width = batches.width();
             batches.for_each_lane(&self.input.features, |_, layout, record, lane| {
                 for p in 0..layout.points {
                     record[layout.at(p, layout.normal_impulse) * width + lane] = 0.0;
@@ -189,25 +185,23 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
     /// together; see [`super::block`].
-    pub fn block_sweep(&mut self, phase: Phase, rule: &Rule) {
-        let mut ran = false;
-        block::with_pass(rule, |pass| ran = self.run(phase, pass));
-        if ran {
-            self.solved(rule.sweep());
+    pub fn block_sweep(&mut self, phase: Phase, rule: Rigid) {
+        if self.run(phase, &BlockSweep(rule)) {
+            self.solved(&Sweep(rule));
         }
     }
 
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
-    pub fn jacobi_sweep(&mut self, phase: Phase, rule: &Rule, relaxation: f32) {
+    pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
         if self.clock.skips(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
-        jacobi::with_pass(rule, relaxation, |pass| self.over_batches(pass));
+        rule.with_pass(relaxation, |pass| self.over_batches(pass));
         jacobi::finish(&mut self.work.rows, &self.work.sums);
         self.clock.lap(phase);
-        self.solved(rule.sweep());
+        self.solved(rule.rule().sweep());
     }
 
     /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.
@@ -268,7 +262,7 @@ impl<'a> Passes<'a> {
         if self.input.record_impulses && !self.clock.skips(Phase::Store) {
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
-                let width = batches.width;
+                let width = batches.width();
                 batches.for_each_lane(&self.input.features, |contact, layout, record, lane| {
                     let contact = &mut self.contacts[contact as usize];
                     for p in 0..layout.points {

@@ -41,11 +41,7 @@ pub struct PositionSweep {
 }
 
 impl Pass for PositionSweep {
-    #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        match self.turned {
-            false => sweep::position_sweep::<L, F, false>(on.rows, on.batches, *self),
-            true => sweep::position_sweep::<L, F, true>(on.rows, on.batches, *self),
-        }
+        sweep::position_sweep::<L, F>(on.rows, on.batches, *self);
     }
 }

@@ -1,6 +1,6 @@
 //! Contacts into constraint records at the start of a step, impulses back at its end.
 
-use super::batches::{Batches, PADDING, Segment};
+use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput};
 use super::sweep::over_segments;
@@ -29,37 +29,26 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 ) {
     use quad::*;
     let layout = const { Layout::of::<N, O>() };
-    let stride = layout.stride;
     let quads: &[Quad] = bytemuck::cast_slice(contacts);
-    let last_lane = segment.first_lane + segment.batches * L::WIDTH;
-    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-    let records = &mut buffer[segment.first_vector..][..segment.batches * stride];
-    for (batch, record) in records.chunks_exact_mut(stride).enumerate() {
-        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let records = records.chunks_exact_mut(layout.stride);
+    let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
+    for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
         // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
-        let ahead = lanes.start + AHEAD * L::WIDTH..(lanes.end + AHEAD * L::WIDTH).min(last_lane);
-        let coming = batches.contact.get(ahead).unwrap_or(&[]);
-        prefetch_records::<STRIDE>(quads, coming.iter().map(|&i| if i == PADDING { 0 } else { i }));
-        let mut index = &batches.contact[lanes.clone()];
-        // Only a segment's last batch has empty lanes. They read some contact and ignore it.
-        let (mut replaced, mut present) = ([0; 16], L::splat(1.0));
-        if index[L::WIDTH - 1] == PADDING {
+        let ahead = (batch + AHEAD) * L::WIDTH;
+        let ahead = ahead..(ahead + L::WIDTH).min(contact.entries().len());
+        let coming = contact.entries().get(ahead).unwrap_or(&[]);
+        prefetch_records::<STRIDE>(quads, coming.iter().copied());
+        // Only a segment's last batch has empty lanes. They read a contact and ignore it.
+        let mut present = L::splat(1.0);
+        let filled = segment.filled(batch, L::WIDTH);
+        if filled < L::WIDTH {
             let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut present));
-            for (lane, &contact) in index.iter().enumerate() {
-                let padding = contact == PADDING;
-                replaced[lane] = if padding { index[0] } else { contact };
-                floats[lane] = if padding { 0.0 } else { 1.0 };
-            }
-            index = &replaced;
+            floats[filled..].fill(0.0);
         }
-        // SAFETY: `Problem::new` checked every row and contact index.
-        let ([nx, ny, count, friction], a, b) = unsafe {
-            (
-                L::gather_quads::<STRIDE, HEADER>(quads, index),
-                if O::MOVES { L::gather(rows, &batches.row_a[lanes.clone()]) } else { [L::zero(); 8] },
-                L::gather(rows, &batches.row_b[lanes]),
-            )
-        };
+        let [nx, ny, count, friction] = L::gather_quads::<STRIDE, HEADER>(quads, index);
+        let a = if O::MOVES { L::gather(rows, row_a) } else { [L::zero(); 8] };
+        let b = L::gather(rows, row_b);
         let filled = |value: L| present.select_positive(value, L::zero());
         (record[0], record[1]) = (filled(nx), filled(ny));
         if N::FRICTION {
@@ -67,19 +56,16 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
         }
         let two = L::splat(2.0).integer_bits();
         for p in 0..N::POINTS {
-            // SAFETY: as above.
-            let ([ax, ay, bx, by], [separation, _, normal, tangent]) = unsafe {
-                if p == 0 {
-                    (
-                        L::gather_quads::<STRIDE, ANCHORS_0>(quads, index),
-                        L::gather_quads::<STRIDE, STATE_0>(quads, index),
-                    )
-                } else {
-                    (
-                        L::gather_quads::<STRIDE, ANCHORS_1>(quads, index),
-                        L::gather_quads::<STRIDE, STATE_1>(quads, index),
-                    )
-                }
+            let ([ax, ay, bx, by], [separation, _, normal, tangent]) = if p == 0 {
+                (
+                    L::gather_quads::<STRIDE, ANCHORS_0>(quads, index),
+                    L::gather_quads::<STRIDE, STATE_0>(quads, index),
+                )
+            } else {
+                (
+                    L::gather_quads::<STRIDE, ANCHORS_1>(quads, index),
+                    L::gather_quads::<STRIDE, STATE_1>(quads, index),
+                )
             };
             // Counts are integers, compared as the bits of floats.
             let active = if p == 0 {
@@ -139,61 +125,56 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     over_segments!(prepare_segment, L, N; rows, batches, contacts);
 }
 
-/// Writes the accumulated impulses of a segment back to its contacts, in lanes.
-#[inline(always)]
-fn store_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    _rows: &mut [BodyRow],
+/// Writes accumulated impulses back to the contacts.
+pub struct Store;
+
+impl Pass for Store {
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        store::<L, F>(on.batches, on.contacts);
+    }
+}
+
+/// Writes the accumulated impulses of all segments back to their contacts.
+pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut [Contact]) {
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        store_segment::<L>(batches, &segment, &N::layout(segment.opposite), contacts);
+    }
+}
+
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width
+/// alone: this pass waits for memory, and a branch on the layout per batch costs nothing.
+#[inline(never)]
+fn store_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
+    layout: &Layout,
     contacts: &mut [Contact],
 ) {
     use quad::*;
-    let layout = const { Layout::of::<N, O>() };
-    let stride = layout.stride;
-    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
-    let records = &buffer[segment.first_vector..][..segment.batches * stride];
-    for (batch, record) in records.chunks_exact(stride).enumerate() {
-        let index = &batches.contact[segment.first_lane + batch * L::WIDTH..][..L::WIDTH];
+    let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride);
+    for (batch, (record, index)) in records.zip(contact.batches()).enumerate() {
         let impulses = |p: usize| {
-            let tangent = if N::FRICTION { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
+            let tangent =
+                if layout.has_friction { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
             [record[layout.at(p, layout.normal_impulse)], tangent]
         };
-        let ([n0, t0], [n1, t1]) = (impulses(0), if N::POINTS == 2 { impulses(1) } else { [L::zero(); 2] });
-        if index[L::WIDTH - 1] != PADDING {
-            // SAFETY: `Problem::new` checked every contact index.
-            unsafe {
-                let quads = bytemuck::cast_slice_mut(contacts);
-                L::scatter_halves::<STRIDE, STATE_0, STATE_1>(quads, index, [n0, t0, n1, t1]);
-            }
+        let ([n0, t0], [n1, t1]) =
+            (impulses(0), if layout.points == 2 { impulses(1) } else { [L::zero(); 2] });
+        let filled = segment.filled(batch, L::WIDTH);
+        if filled == L::WIDTH {
+            let quads = bytemuck::cast_slice_mut(contacts);
+            L::scatter_halves::<STRIDE, STATE_0, STATE_1>(quads, index, [n0, t0, n1, t1]);
             continue;
         }
         let floats = [n0, t0, n1, t1];
         let floats: &[f32] = bytemuck::cast_slice(&floats);
-        for (lane, &contact) in index.iter().enumerate().take_while(|&(_, &contact)| contact != PADDING) {
+        for (lane, &contact) in index.entries()[..filled].iter().enumerate() {
             let at = |k: usize| floats[k * L::WIDTH + lane];
             let [first, second] = &mut contacts[contact as usize].manifold.points;
             (first.normal_impulse, first.tangent_impulse) = (at(0), at(1));
             (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
         }
     }
-}
-
-/// Writes accumulated impulses back to the contacts.
-pub struct Store;
-
-impl Pass for Store {
-    #[inline(always)]
-    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        store::<L, F>(on.rows, on.batches, on.contacts);
-    }
-}
-
-/// Writes the accumulated impulses of all segments back to their contacts.
-#[inline(never)]
-pub fn store<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    contacts: &mut [Contact],
-) {
-    over_segments!(store_segment, L, N; rows, batches, contacts);
 }

@@ -27,14 +27,15 @@
 //! Source: `catto2024solver2d` for the placement after the sweeps and for the threshold; the
 //! rebound speed is *derived* here.
 
-use super::batches::{Batches, PADDING, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::batches::{Batches, Segment, SegmentRecords};
+use super::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
 use super::pass::{Pass, PassInput};
-use super::sweep::{arms, over_segments, turn, with_arms};
+use super::sweep::turn;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, Lanes, held};
+use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, held};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
+use std::slice::ChunksExactMut;
 
 /// Side records: per batch, the acceleration a of approach (m/s²), then per point the energy e² E₀
 /// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
@@ -43,13 +44,21 @@ pub struct Bounces {
     buffer: Vec<Block>,
 }
 
-const fn stride<N: KernelFeatures>() -> usize {
-    1 + 2 * N::POINTS
+/// Vectors per side record.
+const fn stride(points: usize) -> usize {
+    1 + 2 * points
 }
 
 impl Bounces {
-    fn records<L: Lanes>(&mut self) -> &mut [L] {
-        bytemuck::cast_slice_mut(&mut self.buffer)
+    /// The side records of a segment, batch by batch.
+    ///
+    /// # Panics
+    /// If they were not prepared.
+    fn of<L: Lanes>(&mut self, segment: &Segment, points: usize) -> ChunksExactMut<'_, L> {
+        let (first, stride) = (segment.first_lane / L::WIDTH, stride(points));
+        let range = first * stride..(first + segment.batches) * stride;
+        let records = bytemuck::cast_slice_mut(&mut self.buffer).get_mut(range);
+        records.expect("bounces of these batches: `prepare` makes them").chunks_exact_mut(stride)
     }
 
     /// Bytes held.
@@ -59,7 +68,7 @@ impl Bounces {
 
     /// Bytes in use for `lanes` lanes of `points`-point contacts.
     pub fn bytes(lanes: usize, points: usize) -> usize {
-        4 * lanes * (1 + 2 * points)
+        4 * lanes * stride(points)
     }
 }
 
@@ -70,7 +79,6 @@ pub struct Begin {
 }
 
 impl Pass for Begin {
-    #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
     }
@@ -80,9 +88,8 @@ impl Pass for Begin {
 pub struct Track;
 
 impl Pass for Track {
-    #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        track::<L, F>(on.rows, on.batches, on.bounces);
+        track::<L, F>(on.batches, on.bounces);
     }
 }
 
@@ -93,7 +100,6 @@ pub struct Apply {
 }
 
 impl Pass for Apply {
-    #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         apply::<L, F>(on.rows, on.batches, on.bounces, self.h);
     }
@@ -103,158 +109,160 @@ impl Pass for Apply {
 pub struct Forget;
 
 impl Pass for Forget {
-    #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        forget::<L, F>(on.rows, on.batches, on.bounces);
+        forget::<L, F>(on.batches, on.bounces);
     }
 }
 
-/// Reads energies before anything moves. `velocity_increments` are the changes of velocity in free flight per
-/// substep `h` (s), a row per body.
-#[inline(never)]
+// What follows is compiled per width alone: layouts are looked up per segment, and a branch on
+// them per batch is not measurable beside the gathers.
+
+/// Reads energies before anything moves. `increments` are the changes of velocity in free flight
+/// per substep `h` (s), `[h aₓ, h a_y, h α, 0]` per row.
 pub fn prepare<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
+    rows: &[BodyRow],
     batches: &mut Batches,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    velocity_increments: &[[f32; 4]],
+    increments: &[[f32; 4]],
     h: f32,
 ) {
-    let floats = batches.contact.len() * stride::<N>();
+    let floats = batches.lanes() * stride(N::POINTS);
     bounces.buffer.resize(floats.div_ceil(16), Block::default());
-    over_segments!(prepare_segment, L, N; rows, batches, bounces, contacts, velocity_increments, h);
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        let layout = N::layout(segment.opposite);
+        prepare_segment::<L>(rows, batches, &segment, &layout, bounces, contacts, increments, h);
+    }
 }
 
-fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    rows: &mut [BodyRow],
+#[allow(clippy::too_many_arguments)]
+#[inline(never)]
+fn prepare_segment<L: Lanes>(
+    rows: &[BodyRow],
     batches: &mut Batches,
     segment: &Segment,
+    layout: &Layout,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    velocity_increments: &[[f32; 4]],
+    increments: &[[f32; 4]],
     h: f32,
 ) {
-    let first = segment.first_lane / L::WIDTH;
-    for batch in 0..segment.batches {
-        let record = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride);
+    let rows_of = row_a.batches().zip(row_b.batches());
+    let all = bounces.of::<L>(segment, layout.points).zip(records);
+    let all = all.zip(contact.batches::<L::Index>().zip(rows_of));
+    for (batch, ((bounce, record), (contact, (row_a, row_b)))) in all.enumerate() {
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(bounce);
         for lane in 0..L::WIDTH {
-            let at = segment.first_lane + batch * L::WIDTH + lane;
-            let contact = batches.contact[at];
             // Lanes without a contact have e = 0 and so no energy.
-            let (e, n) = match contact {
-                PADDING => (0.0, Vec2::ZERO),
-                _ => (contacts[contact as usize].restitution, contacts[contact as usize].manifold.normal),
+            let (e, n) = if lane < segment.filled(batch, L::WIDTH) {
+                let contact = &contacts[contact.entries()[lane] as usize];
+                (contact.restitution, contact.manifold.normal)
+            } else {
+                (0.0, Vec2::ZERO)
             };
-            let velocity_increment = |row: u32| {
-                Vec2::new(velocity_increments[row as usize][0], velocity_increments[row as usize][1])
-            };
-            floats[lane] =
-                -n.dot(velocity_increment(batches.row_b[at]) - velocity_increment(batches.row_a[at])) / h;
+            let increment = |row: u32| Vec2::new(increments[row as usize][0], increments[row as usize][1]);
+            let [a, b] = [row_a, row_b].map(|row| increment(row.entries()[lane]));
+            floats[lane] = -n.dot(b - a) / h;
             floats[L::WIDTH + lane] = e;
         }
-        let points = points::<L, N, O>(rows, batches, segment, batch);
-        let (a, e) = (record[0], record[1]);
-        for (p, [v, s]) in points.into_iter().enumerate().take(N::POINTS) {
+        let (a, e) = (bounce[0], bounce[1]);
+        for p in 0..layout.points {
+            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
             let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
             let fast = (L::splat(-RESTITUTION_THRESHOLD) - v).select_positive(energy, L::zero());
-            record[1 + 2 * p] = e * e * fast;
-            record[2 + 2 * p] = L::zero();
+            bounce[1 + 2 * p] = e * e * fast;
+            bounce[2 + 2 * p] = L::zero();
         }
     }
 }
 
-/// Normal velocity (m/s) and separation (m) of each point of a batch, as bodies now are.
+/// Normal velocity (m/s) and separation (m) of point `p` of a batch, as bodies now are.
 #[inline(always)]
-fn points<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn point<L: Lanes>(
     rows: &[BodyRow],
-    batches: &Batches,
-    segment: &Segment,
-    batch: usize,
-) -> [[L; 2]; 2] {
-    let layout = const { Layout::of::<N, O>() };
-    let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
-    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
-    let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-    // SAFETY: `Problem::new` checked every row index against the rows.
-    let b = unsafe { L::gather(rows, &batches.row_b[lanes.clone()]) };
-    let a = if O::HAS_ROW {
-        // SAFETY: as above.
-        unsafe { L::gather(rows, &batches.row_a[lanes]) }
-    } else {
-        [L::zero(); 8]
-    };
+    record: &[L],
+    layout: &Layout,
+    p: usize,
+    row_a: LaneIndex<L::Index>,
+    row_b: LaneIndex<L::Index>,
+) -> [L; 2] {
+    let b = L::gather(rows, row_b);
+    let a = if layout.a_has_row { L::gather(rows, row_a) } else { [L::zero(); 8] };
     let along_n = |at: usize| record[0].mul_add(b[at] - a[at], record[1] * (b[at + 1] - a[at + 1]));
     let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[6]), turn(b[6]));
-    std::array::from_fn(|p| {
-        if p >= N::POINTS {
-            return [L::zero(); 2];
+    let with_arms = |base: L, [a, b]: [L; 2], axis: usize| {
+        let mut v = base;
+        if layout.has_arms[0] {
+            v = b.mul_add(record[layout.at(p, layout.arm_b) + axis], v);
         }
-        let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
-        let separation = record[layout.at(p, layout.separation)] + along_n(4);
-        let separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
-        [
-            with_arms::<L, N, O>(along_n(0), [a[2], b[2]], arm_n),
-            with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t),
-        ]
-    })
+        if layout.has_arms[1] {
+            v = a.neg_mul_add(record[layout.at(p, layout.arm_a) + axis], v);
+        }
+        v
+    };
+    let separation = record[layout.at(p, layout.separation)] + along_n(4);
+    let separation = with_arms(separation, [sine_a, sine_b], 0);
+    [with_arms(along_n(0), [a[2], b[2]], 0), with_arms(separation, [versine_a, versine_b], 1)]
 }
 
 /// Notes the largest impulse of each point so far.
-#[inline(never)]
-pub fn track<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    bounces: &mut Bounces,
-) {
-    over_segments!(track_segment, L, N; rows, batches, bounces);
+pub fn track<L: Lanes, N: KernelFeatures>(batches: &mut Batches, bounces: &mut Bounces) {
+    each_record::<L>(batches, bounces, N::layout, |record, bounce, layout| {
+        for p in 0..layout.points {
+            bounce[2 + 2 * p] = bounce[2 + 2 * p].max(record[layout.at(p, layout.normal_impulse)]);
+        }
+    });
 }
 
-fn track_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    _rows: &mut [BodyRow],
+/// Calls `visit` with every record and its side record.
+#[inline(always)]
+fn each_record<L: Lanes>(
     batches: &mut Batches,
-    segment: &Segment,
     bounces: &mut Bounces,
+    layout_of: LayoutOf,
+    mut visit: impl FnMut(&mut [L], &mut [L], &Layout),
 ) {
-    let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    let buffer: &[L] = bytemuck::cast_slice(&batches.buffer);
-    for batch in 0..segment.batches {
-        let record = &buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-        let bounce = &mut bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
-        for p in 0..N::POINTS {
-            bounce[2 + 2 * p] = bounce[2 + 2 * p].max(record[layout.at(p, layout.normal_impulse)]);
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        let layout = layout_of(segment.opposite);
+        let records = batches.records_of::<L>(&segment, &layout).records.chunks_exact_mut(layout.stride);
+        for (record, bounce) in records.zip(bounces.of::<L>(&segment, layout.points)) {
+            visit(record, bounce, &layout);
         }
     }
 }
 
 /// The bounce itself, contact after contact in sweep order.
-#[inline(never)]
 pub fn apply<L: Lanes, N: KernelFeatures>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     bounces: &mut Bounces,
     h: f32,
 ) {
-    over_segments!(apply_segment, L, N; rows, batches, bounces, h);
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        apply_segment::<L>(rows, batches, &segment, &N::layout(segment.opposite), bounces, h);
+    }
 }
 
-fn apply_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+#[inline(never)]
+fn apply_segment<L: Lanes>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
+    layout: &Layout,
     bounces: &mut Bounces,
     h: f32,
 ) {
-    let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    for batch in 0..segment.batches {
-        let lanes = segment.first_lane + batch * L::WIDTH..segment.first_lane + (batch + 1) * L::WIDTH;
-        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
-        for p in 0..N::POINTS {
-            let [vn, separation] = points::<L, N, O>(rows, batches, segment, batch)[p];
-            let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-            let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
+    let moves = segment.opposite == OppositeKind::Dynamic;
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment, layout.points));
+    for ((record, bounce), (row_a, row_b)) in records.zip(row_a.batches().zip(row_b.batches())) {
+        for p in 0..layout.points {
+            let [vn, separation] = point::<L>(rows, record, layout, p, row_a, row_b);
             let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
             let half = a * L::splat(0.5 * h);
             let left = half * half + L::splat(2.0) * (energy - a * separation);
@@ -268,20 +276,15 @@ fn apply_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             let n = [record[0], record[1]];
             let arms = |at: usize| record[layout.at(p, at)];
             let (x, y) = (n[0] * delta, n[1] * delta);
-            // SAFETY: `Problem::new` checked every row index against the rows.
-            unsafe {
-                let index = &batches.row_b[lanes.clone()];
-                let b = L::gather(rows, index);
-                let w = if N::ROTATION { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
-                L::scatter_velocity(rows, index, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
-                if O::MOVES {
-                    let index = &batches.row_a[lanes.clone()];
-                    let a = L::gather(rows, index);
-                    let w =
-                        if N::ROTATION { (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]) } else { a[2] };
-                    let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
-                    L::scatter_velocity(rows, index, v);
-                }
+            let b = L::gather(rows, row_b);
+            let w = if layout.has_arms[0] { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
+            L::scatter_velocity(rows, row_b, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
+            if moves {
+                let a = L::gather(rows, row_a);
+                let turned = (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]);
+                let w = if layout.has_arms[1] { turned } else { a[2] };
+                let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
+                L::scatter_velocity(rows, row_a, v);
             }
         }
     }
@@ -294,36 +297,17 @@ fn bounced<L: Lanes>(energy: L, peak: L, yes: L, no: L) -> L {
 }
 
 /// Forgets the impulses of points that bounced: they say nothing about the next step.
-#[inline(never)]
-pub fn forget<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    bounces: &mut Bounces,
-) {
-    over_segments!(forget_segment, L, N; rows, batches, bounces);
-}
-
-fn forget_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    _rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
-    bounces: &mut Bounces,
-) {
-    let layout = const { Layout::of::<N, O>() };
-    let first = segment.first_lane / L::WIDTH;
-    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-    for batch in 0..segment.batches {
-        let record = &mut buffer[segment.first_vector + batch * layout.stride..][..layout.stride];
-        let bounce = &bounces.records::<L>()[(first + batch) * stride::<N>()..][..stride::<N>()];
-        for p in 0..N::POINTS {
+pub fn forget<L: Lanes, N: KernelFeatures>(batches: &mut Batches, bounces: &mut Bounces) {
+    each_record::<L>(batches, bounces, N::layout, |record, bounce, layout| {
+        for p in 0..layout.points {
             let mut forget = |at: usize| {
                 let at = layout.at(p, at);
                 record[at] = bounced(bounce[1 + 2 * p], bounce[2 + 2 * p], L::zero(), record[at]);
             };
             forget(layout.normal_impulse);
-            if N::FRICTION {
+            if layout.has_friction {
                 forget(layout.tangent_impulse);
             }
         }
-    }
+    });
 }

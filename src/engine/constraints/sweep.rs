@@ -72,12 +72,79 @@
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
 //! (gather, solve, scatter by colour); the contact frame is this crate's own.
 
-use super::batches::{Batches, Segment};
+use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{AnyPass, Pass, PassInput};
 use super::position::PositionSweep;
-use super::rules::NormalRule;
-use crate::engine::lanes::{BodyRow, Lanes, RowStore, prefetch};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
+
+/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
+macro_rules! over_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.segments().len() {
+            let segment = $batches.segments()[i];
+            match segment.opposite {
+                OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(super) use over_segments;
+
+/// As `over_segments!`, with a kinematic body a taken for a dynamic one: its inverse mass is zero,
+/// so that nothing changes it. For kernels that seldom run: an instance less.
+macro_rules! over_moving_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.segments().len() {
+            let segment = $batches.segments()[i];
+            match segment.opposite {
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                _ => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(super) use over_moving_segments;
+
+/// How a normal row's state becomes its new accumulated impulse.
+///
+/// `against_static` tells that body a is static or kinematic.
+pub trait NormalRule: Copy + Send + Sync + 'static {
+    /// Whether the sweep solves the friction rows as well.
+    const FRICTION: bool;
+    /// Whether the rule reads the separation.
+    const SEPARATION: bool = true;
+
+    /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
+    /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
+    ///
+    /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
+
+    /// The same slope (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
+    #[inline(always)]
+    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
+        mass
+    }
+
+    /// The new accumulated impulse (N·s), ≥ 0, at the normal velocity `vn` (m/s).
+    #[inline(always)]
+    fn normal_impulse<L: Lanes>(&self, against_static: bool, vn: L, separation: L, mass: L, old: L) -> L {
+        let [constant, slope] = self.line(against_static, separation, mass, old);
+        slope.neg_mul_add(vn, constant).max(L::zero())
+    }
+
+    /// One velocity sweep under this rule over all segments, in order.
+    ///
+    /// A method of the rule, so that the compiler puts its instances beside the rule: rules in
+    /// files of their own are compiled side by side, and again only if they change.
+    #[inline(never)]
+    fn sweep<L: Lanes, N: KernelFeatures>(self, rows: &mut [BodyRow], batches: &mut Batches) {
+        over_segments!(sweep_segment, L, N, Self, [BodyRow]; rows, batches, self);
+    }
+}
 
 /// The velocity sweep under a rule: Gauss–Seidel on the accumulated impulses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +153,33 @@ pub struct Sweep<R>(pub R);
 impl<R: NormalRule> Pass for Sweep<R> {
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R>(on.rows, on.batches, self.0);
+        self.0.sweep::<L, F>(on.rows, on.batches);
+    }
+}
+
+/// A velocity sweep under some rule: a pass that can say which law it solves.
+pub trait VelocitySweep: AnyPass {
+    /// Whether friction rows are solved.
+    fn has_friction(&self) -> bool;
+
+    /// [`NormalRule::normal_impulse`] of one row.
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32;
+
+    /// The same sweep, owned.
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync>;
+}
+
+impl<R: NormalRule> VelocitySweep for Sweep<R> {
+    fn has_friction(&self) -> bool {
+        R::FRICTION
+    }
+
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32 {
+        self.0.normal_impulse(against_static, vn, separation, mass, old)
+    }
+
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync> {
+        Box::new(*self)
     }
 }
 
@@ -109,38 +202,28 @@ pub(super) struct BodyPair<L> {
 }
 
 impl<L: Lanes> BodyPair<L> {
-    /// # Safety
-    /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    pub(super) unsafe fn gather<O: Opposite, S: RowStore + ?Sized>(
+    pub(super) fn gather<O: Opposite, S: RowStore + ?Sized>(
         rows: &S,
-        row_a: &[u32],
-        row_b: &[u32],
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
     ) -> Self {
-        // SAFETY: the caller keeps the indices in bounds.
-        let a = if O::HAS_ROW { unsafe { rows.gather(row_a) } } else { [L::zero(); 8] };
-        // SAFETY: the caller keeps the indices in bounds.
-        BodyPair { a, b: unsafe { rows.gather(row_b) } }
+        let a = if O::HAS_ROW { rows.gather(row_a) } else { [L::zero(); 8] };
+        BodyPair { a, b: rows.gather(row_b) }
     }
 
     /// Writes back the velocities of the bodies that answer to impulses.
-    ///
-    /// # Safety
-    /// Both index slices hold `L::WIDTH` entries that name rows of the store.
     #[inline(always)]
-    pub(super) unsafe fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
+    pub(super) fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
         &self,
         rows: &mut S,
-        row_a: &[u32],
-        row_b: &[u32],
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
     ) {
         let (a, b) = (&self.a, &self.b);
-        // SAFETY: the caller keeps the indices in bounds.
-        unsafe {
-            rows.scatter_velocity(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-            if O::MOVES {
-                rows.scatter_velocity(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-            }
+        rows.scatter_velocity(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+        if O::MOVES {
+            rows.scatter_velocity(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
         }
     }
 }
@@ -244,8 +327,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
     let layout = const { Layout::of::<N, O>() };
     let friction_rows = const { N::FRICTION && R::FRICTION };
     for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, S>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, S>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -315,8 +397,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
         }
 
         apply::<L, O>(&mut a, &mut b, n, [normal.sum, tangent.sum], w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, S>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, S>(rows, row_a, row_b);
     });
 }
 
@@ -366,8 +447,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let mut w = [a[W], b[W]];
@@ -383,14 +463,13 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             }
         }
         apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
-        // SAFETY: as above.
-        unsafe { BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b) };
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
     });
 }
 
 /// One position sweep over a segment, see [`super::position`].
 #[inline(always)]
-fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
+fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -398,8 +477,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        // SAFETY: `Passes::new` checked every row index against the rows.
-        let BodyPair { mut a, mut b } = unsafe { BodyPair::<L>::gather::<O, _>(rows, row_a, row_b) };
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
@@ -414,7 +492,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             let mut mass = record[layout.at(p, layout.normal_mass)];
-            if TURNED && N::ROTATION {
+            if sweep.turned && N::ROTATION {
                 let turned = |sine: L, versine: L, side: usize| {
                     sine.mul_add(arm_t[side], versine.neg_mul_add(arm_n[side], arm_n[side]))
                 };
@@ -436,13 +514,11 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool
         let (x, y) = (n[0] * sum, n[1] * sum);
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
-        // SAFETY: as above.
-        unsafe { L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]) };
+        L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
         if O::MOVES {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
-            // SAFETY: as above.
-            unsafe { L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]) };
+            L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
         }
     });
 }
@@ -457,45 +533,25 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
     rows: &mut S,
     batches: &mut Batches,
     segment: &Segment,
-    mut visit: impl FnMut(&mut S, &mut [L], &[u32], &[u32]),
+    mut visit: impl FnMut(&mut S, &mut [L], LaneIndex<L::Index>, LaneIndex<L::Index>),
 ) {
-    let stride = const { Layout::of::<N, O>().stride };
-    let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut batches.buffer);
-    let mut records = &mut buffer[segment.first_vector..][..segment.batches * stride];
-    let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
-    let row_a = batches.row_a[lanes.clone()].chunks_exact(L::WIDTH);
-    let row_b = batches.row_b[lanes].chunks_exact(L::WIDTH);
-    for (row_a, row_b) in row_a.zip(row_b) {
-        let (record, later) = records.split_at_mut(stride);
-        prefetch(later, (PREFETCH_BATCHES - 1) * stride..PREFETCH_BATCHES * stride);
+    let layout = const { Layout::of::<N, O>() };
+    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {
+        let (record, later) = records.split_at_mut(layout.stride);
+        prefetch(later, (PREFETCH_BATCHES - 1) * layout.stride..PREFETCH_BATCHES * layout.stride);
         visit(rows, record, row_a, row_b);
         records = later;
     }
 }
 
-/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
-macro_rules! over_segments {
-    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        for i in 0..$batches.segments.len() {
-            let segment = $batches.segments[i];
-            match segment.opposite {
-                OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-                OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-            }
-        }
-    };
-}
-pub(super) use over_segments;
-
 /// One velocity sweep over all segments, in order.
-#[inline(never)]
 pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     rule: R,
 ) {
-    over_segments!(sweep_segment, L, N, R, [BodyRow]; rows, batches, rule);
+    rule.sweep::<L, N>(rows, batches);
 }
 
 /// As [`sweep`], on rows that are kept in another way: to measure what that costs.
@@ -526,23 +582,10 @@ pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &m
 
 /// One position sweep over all segments, in order.
 #[inline(never)]
-pub fn position_sweep<L: Lanes, N: KernelFeatures, const TURNED: bool>(
+pub fn position_sweep<L: Lanes, N: KernelFeatures>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     sweep: PositionSweep,
 ) {
-    for i in 0..batches.segments.len() {
-        let segment = batches.segments[i];
-        match segment.opposite {
-            OppositeKind::Dynamic => {
-                position_segment::<L, N, OnDynamic, TURNED>(rows, batches, &segment, sweep);
-            }
-            OppositeKind::Kinematic => {
-                position_segment::<L, N, OnKinematic, TURNED>(rows, batches, &segment, sweep);
-            }
-            OppositeKind::Static => {
-                position_segment::<L, N, OnStatic, TURNED>(rows, batches, &segment, sweep);
-            }
-        }
-    }
+    over_moving_segments!(position_segment, L, N; rows, batches, sweep);
 }

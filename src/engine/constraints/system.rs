@@ -171,7 +171,7 @@ impl<'a> System<'a> {
     /// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point.
     fn each_record(&mut self, mut visit: impl FnMut(usize, &mut f32, Option<&mut f32>)) {
         for batches in &mut self.batches {
-            let width = batches.width;
+            let width = batches.width();
             batches.for_each_lane(self.features, |contact, layout, record, lane| {
                 for p in 0..layout.points.min(2) {
                     let normal = layout.at(p, layout.normal_impulse) * width + lane;

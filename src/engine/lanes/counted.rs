@@ -7,7 +7,7 @@
 //! tangential part of a motion (3 of some 140 operations against a dynamic body), and against a
 //! static one also the sine and versine of its turn (10 of some 100).
 
-use super::{BodyRow, Lanes, Quad};
+use super::{BodyRow, LaneIndex, Lanes, Quad};
 use bytemuck::{Pod, Zeroable};
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -116,6 +116,8 @@ impl Neg for Counted {
 impl Lanes for Counted {
     const WIDTH: usize = 1;
 
+    type Index = [u32; 1];
+
     fn splat(value: f32) -> Self {
         Counted(value)
     }
@@ -154,48 +156,44 @@ impl Lanes for Counted {
         self.0 > 0.0
     }
 
-    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::gather(rows, index) }.map(Counted)
+    fn gather(rows: &[BodyRow], index: LaneIndex<[u32; 1]>) -> [Self; 8] {
+        f32::gather(rows, index).map(Counted)
     }
 
-    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::scatter_velocity(rows, index, velocity.map(|v| v.0)) }
+    fn scatter_velocity(rows: &mut [BodyRow], index: LaneIndex<[u32; 1]>, velocity: [Self; 4]) {
+        f32::scatter_velocity(rows, index, velocity.map(|v| v.0))
     }
 
-    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::scatter_delta(rows, index, delta.map(|v| v.0)) }
+    fn scatter_delta(rows: &mut [BodyRow], index: LaneIndex<[u32; 1]>, delta: [Self; 4]) {
+        f32::scatter_delta(rows, index, delta.map(|v| v.0))
     }
 
-    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::gather_quads::<S, O>(quads, index) }.map(Counted)
+    fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 1]>) -> [Self; 4] {
+        f32::gather_quads::<S, O>(quads, index).map(Counted)
     }
 
-    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::scatter_quads::<S, O>(quads, index, v.map(|v| v.0)) }
-    }
-
-    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+    fn scatter_quads<const S: usize, const O: usize>(
         quads: &mut [Quad],
-        index: &[u32],
+        index: LaneIndex<[u32; 1]>,
         v: [Self; 4],
     ) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::scatter_halves::<S, O, P>(quads, index, v.map(|v| v.0)) }
+        f32::scatter_quads::<S, O>(quads, index, v.map(|v| v.0))
     }
 
-    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
-        // SAFETY: the caller keeps `index` in bounds.
-        Counted(unsafe { f32::load_at(values, index) })
+    fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+        quads: &mut [Quad],
+        index: LaneIndex<[u32; 1]>,
+        v: [Self; 4],
+    ) {
+        f32::scatter_halves::<S, O, P>(quads, index, v.map(|v| v.0))
     }
 
-    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { f32::store_at(values, index, v.0) }
+    fn load_at(values: &[f32], index: LaneIndex<[u32; 1]>) -> Self {
+        Counted(f32::load_at(values, index))
+    }
+
+    fn store_at(values: &mut [f32], index: LaneIndex<[u32; 1]>, v: Self) {
+        f32::store_at(values, index, v.0)
     }
 
     fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {

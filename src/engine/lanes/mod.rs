@@ -15,13 +15,15 @@
 
 mod aligned;
 mod counted;
+mod index;
 mod quads;
 mod rows;
 mod store;
 
 pub use aligned::{Block, LaneVec, held};
 pub use counted::{Counted, Operations};
-pub use quads::{Quad, prefetch_records};
+pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
+pub use quads::{Quad, prefetch, prefetch_records};
 pub use rows::BodyRow;
 pub use store::{RowColumns, RowStore};
 
@@ -98,29 +100,15 @@ pub fn target_features() -> &'static str {
     }
 }
 
-/// Asks for the cache lines of `values[range]`; past the end, nothing is asked for. A hint: it
-/// changes no value, and on targets without such an instruction it does nothing.
-#[inline(always)]
-pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
-    #[cfg(target_arch = "x86_64")]
-    if range.end <= values.len() {
-        let bytes = range.len() * size_of::<T>();
-        for line in 0..bytes.div_ceil(64) {
-            let address = values.as_ptr().wrapping_add(range.start).cast::<i8>().wrapping_add(64 * line);
-            // SAFETY: a prefetch never faults.
-            unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(address) };
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (values, range);
-}
-
 /// `WIDTH` floats that are worked on together.
 pub trait Lanes:
     Pod + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// The number of lanes.
     const WIDTH: usize;
+
+    /// An index per lane: `[u32; WIDTH]`.
+    type Index: Pod;
 
     /// The same value in every lane.
     fn splat(value: f32) -> Self;
@@ -148,54 +136,58 @@ pub trait Lanes:
 
     /// The rows of `WIDTH` bodies, transposed: `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    /// # Panics
+    /// If there are fewer rows than the bound of `index`.
     #[inline(always)]
-    unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { gather_halves(rows, index) }
+    fn gather(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
+        gather_halves(rows, index)
     }
 
     /// Writes back the first half `[vx, vy, ω, m⁻¹]` of `WIDTH` rows, in lane order.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    /// # Panics
+    /// If there are fewer rows than the bound of `index`.
     #[inline(always)]
-    unsafe fn scatter_velocity(rows: &mut [BodyRow], index: &[u32], velocity: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds; a row is two quads.
-        unsafe { Self::scatter_quads::<2, 0>(bytemuck::cast_slice_mut(rows), index, velocity) }
+    fn scatter_velocity(rows: &mut [BodyRow], index: LaneIndex<Self::Index>, velocity: [Self; 4]) {
+        Self::scatter_quads::<2, 0>(bytemuck::cast_slice_mut(rows), index, velocity)
     }
 
     /// Writes back the second half `[Δx, Δy, Δθ, I⁻¹]` of `WIDTH` rows, in lane order.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries, each less than `rows.len()`.
+    /// # Panics
+    /// If there are fewer rows than the bound of `index`.
     #[inline(always)]
-    unsafe fn scatter_delta(rows: &mut [BodyRow], index: &[u32], delta: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds; a row is two quads.
-        unsafe { Self::scatter_quads::<2, 1>(bytemuck::cast_slice_mut(rows), index, delta) }
+    fn scatter_delta(rows: &mut [BodyRow], index: LaneIndex<Self::Index>, delta: [Self; 4]) {
+        Self::scatter_quads::<2, 1>(bytemuck::cast_slice_mut(rows), index, delta)
     }
 
     /// Quad `O` of `WIDTH` records of `S` quads each, transposed.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries i, each with `i * S + O < quads.len()`.
-    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4];
+    /// # Panics
+    /// If there are fewer records than the bound of `index`.
+    fn gather_quads<const S: usize, const O: usize>(
+        quads: &[Quad],
+        index: LaneIndex<Self::Index>,
+    ) -> [Self; 4];
 
     /// Writes quad `O` of `WIDTH` records of `S` quads each, in lane order.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries i, each with `i * S + O < quads.len()`.
-    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]);
+    /// # Panics
+    /// If there are fewer records than the bound of `index`.
+    fn scatter_quads<const S: usize, const O: usize>(
+        quads: &mut [Quad],
+        index: LaneIndex<Self::Index>,
+        v: [Self; 4],
+    );
 
     /// Writes the second half of quad `O` (`v[0]`, `v[1]`) and of quad `P` (`v[2]`, `v[3]`) of
     /// `WIDTH` records of `S` quads each, in lane order.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries i, each with `i * S + max(O, P) < quads.len()`.
-    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+    /// # Panics
+    /// If there are fewer records than the bound of `index`.
+    fn scatter_halves<const S: usize, const O: usize, const P: usize>(
         quads: &mut [Quad],
-        index: &[u32],
+        index: LaneIndex<Self::Index>,
         v: [Self; 4],
     );
 
@@ -207,15 +199,15 @@ pub trait Lanes:
 
     /// `values[index[lane]]` in every lane.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries, each less than `values.len()`.
-    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self;
+    /// # Panics
+    /// If there are fewer values than the bound of `index`.
+    fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self;
 
     /// `values[index[lane]] = v[lane]`, in lane order.
     ///
-    /// # Safety
+    /// # Panics
     /// As [`Self::load_at`].
-    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self);
+    fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self);
 
     /// Zero in every lane.
     #[inline(always)]
@@ -226,6 +218,8 @@ pub trait Lanes:
 
 impl Lanes for f32 {
     const WIDTH: usize = 1;
+
+    type Index = [u32; 1];
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -268,25 +262,29 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    unsafe fn gather_quads<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [Self; 4] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { quads::gather_1::<S, O>(quads, index) }
+    fn gather_quads<const S: usize, const O: usize>(
+        quads: &[Quad],
+        index: LaneIndex<Self::Index>,
+    ) -> [Self; 4] {
+        quads::gather_1::<S, O>(quads, index)
     }
 
     #[inline(always)]
-    unsafe fn scatter_quads<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [Self; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { quads::scatter_1::<S, O>(quads, index, v) }
-    }
-
-    #[inline(always)]
-    unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+    fn scatter_quads<const S: usize, const O: usize>(
         quads: &mut [Quad],
-        index: &[u32],
+        index: LaneIndex<Self::Index>,
         v: [Self; 4],
     ) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { quads::scatter_halves_1::<S, O, P>(quads, index, v) }
+        quads::scatter_1::<S, O>(quads, index, v)
+    }
+
+    #[inline(always)]
+    fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+        quads: &mut [Quad],
+        index: LaneIndex<Self::Index>,
+        v: [Self; 4],
+    ) {
+        quads::scatter_halves_1::<S, O, P>(quads, index, v)
     }
 
     #[inline(always)]
@@ -300,15 +298,13 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { rows::load_each(values, index) }
+    fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self {
+        rows::load_each(values, index)
     }
 
     #[inline(always)]
-    unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { rows::store_each(values, index, v) }
+    fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self) {
+        rows::store_each(values, index, v)
     }
 }
 
@@ -322,11 +318,12 @@ macro_rules! wide_lanes {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
+            type Index = [u32; $width];
+
             $(
                 #[inline(always)]
-                unsafe fn gather(rows: &[BodyRow], index: &[u32]) -> [Self; 8] {
-                    // SAFETY: the caller keeps `index` in bounds.
-                    unsafe { rows::$gather(rows, index) }
+                fn gather(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
+                    rows::$gather(rows, index)
                 }
             )?
 
@@ -371,32 +368,29 @@ macro_rules! wide_lanes {
             }
 
             #[inline(always)]
-            unsafe fn gather_quads<const S: usize, const O: usize>(
+            fn gather_quads<const S: usize, const O: usize>(
                 quads: &[Quad],
-                index: &[u32],
+                index: LaneIndex<Self::Index>,
             ) -> [Self; 4] {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { quads::$gather_quads::<S, O>(quads, index) }
+                quads::$gather_quads::<S, O>(quads, index)
             }
 
             #[inline(always)]
-            unsafe fn scatter_quads<const S: usize, const O: usize>(
+            fn scatter_quads<const S: usize, const O: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<Self::Index>,
                 v: [Self; 4],
             ) {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { quads::$scatter::<S, O>(quads, index, v) }
+                quads::$scatter::<S, O>(quads, index, v)
             }
 
             #[inline(always)]
-            unsafe fn scatter_halves<const S: usize, const O: usize, const P: usize>(
+            fn scatter_halves<const S: usize, const O: usize, const P: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<Self::Index>,
                 v: [Self; 4],
             ) {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { quads::$halves::<S, O, P>(quads, index, v) }
+                quads::$halves::<S, O, P>(quads, index, v)
             }
 
             #[inline(always)]
@@ -410,15 +404,13 @@ macro_rules! wide_lanes {
             }
 
             #[inline(always)]
-            unsafe fn load_at(values: &[f32], index: &[u32]) -> Self {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { rows::$load(values, index) }
+            fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self {
+                rows::$load(values, index)
             }
 
             #[inline(always)]
-            unsafe fn store_at(values: &mut [f32], index: &[u32], v: Self) {
-                // SAFETY: the caller keeps `index` in bounds.
-                unsafe { rows::$store(values, index, v) }
+            fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self) {
+                rows::$store(values, index, v)
             }
         }
     };
@@ -431,14 +423,10 @@ wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16,
     columns: load_at_16, store_at_16, rows: gather_16);
 
 /// Rows by their two halves.
-///
-/// # Safety
-/// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
 #[inline(always)]
-unsafe fn gather_halves<L: Lanes>(rows: &[BodyRow], index: &[u32]) -> [L; 8] {
+fn gather_halves<L: Lanes>(rows: &[BodyRow], index: LaneIndex<L::Index>) -> [L; 8] {
     let quads: &[Quad] = bytemuck::cast_slice(rows);
-    // SAFETY: the caller keeps `index` in bounds; a row is two quads.
-    let (v, d) = unsafe { (L::gather_quads::<2, 0>(quads, index), L::gather_quads::<2, 1>(quads, index)) };
+    let (v, d) = (L::gather_quads::<2, 0>(quads, index), L::gather_quads::<2, 1>(quads, index));
     [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
 }
 
@@ -509,8 +497,9 @@ mod tests {
             delta: std::array::from_fn(|k| (10 * i + 4 + k) as f32),
         };
         let rows: Vec<BodyRow> = (0..40).map(row).collect();
-        // SAFETY: the indices are distinct, below 40, and at least `WIDTH` of them.
-        let v = unsafe { L::gather(&rows, index) };
+        let mut room = [0; MOST_LANES];
+        let at = IndexList::new(index).batch_at::<L::Index>(0, &mut room);
+        let v = L::gather(&rows, at);
         for (c, v) in v.iter().enumerate() {
             for (lane, got) in floats(*v).into_iter().enumerate() {
                 prop_assert_eq!(got, (10 * index[lane] as usize + c) as f32);
@@ -518,11 +507,8 @@ mod tests {
         }
         let plus = |v: L| v + L::splat(0.5);
         let (mut velocities, mut deltas) = (rows.clone(), rows.clone());
-        // SAFETY: as above.
-        unsafe {
-            L::scatter_velocity(&mut velocities, index, [plus(v[0]), plus(v[1]), plus(v[2]), plus(v[3])]);
-            L::scatter_delta(&mut deltas, index, [plus(v[4]), plus(v[5]), plus(v[6]), plus(v[7])]);
-        }
+        L::scatter_velocity(&mut velocities, at, [plus(v[0]), plus(v[1]), plus(v[2]), plus(v[3])]);
+        L::scatter_delta(&mut deltas, at, [plus(v[4]), plus(v[5]), plus(v[6]), plus(v[7])]);
         for i in 0..rows.len() {
             let hit = index[..L::WIDTH].contains(&(i as u32));
             let add = if hit { 0.5 } else { 0.0 };
@@ -532,11 +518,8 @@ mod tests {
             prop_assert_eq!(deltas[i].velocity, rows[i].velocity);
         }
         let mut columns = RowColumns::from_rows(&rows);
-        // SAFETY: as above.
-        unsafe {
-            prop_assert_eq!(columns.gather::<L>(index).map(floats), v.map(floats));
-            columns.scatter_velocity(index, [plus(v[0]), plus(v[1]), plus(v[2]), v[3]]);
-        }
+        prop_assert_eq!(columns.gather::<L>(at).map(floats), v.map(floats));
+        columns.scatter_velocity(at, [plus(v[0]), plus(v[1]), plus(v[2]), v[3]]);
         for (got, row) in velocities.iter_mut().zip(&rows) {
             got.velocity[3] = row.velocity[3];
         }

@@ -1,11 +1,13 @@
-//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere. With [`super::rows`],
-//! this is all the unsafe code that lanes need.
+//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere.
 //!
 //! A record is `STRIDE` quads; quad `OFFSET` of `W` records is loaded and transposed in
 //! registers. The transposes stay inside 128-bit lanes: 128-bit lane `q` of vector `k` is loaded
 //! from record `4q + k`, so that one 4 × 4 transpose of each 128-bit lane (8 shuffles for any
 //! width) puts component `c` of records `0..W`, in order, into vector `c`.
 
+#![allow(unsafe_code)] // Loads and stores at addresses; [`super::index`] upholds what they rest on.
+
+use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
 use wide::{f32x4, f32x8, f32x16};
 
@@ -14,34 +16,54 @@ use wide::{f32x4, f32x8, f32x16};
 #[repr(C, align(16))]
 pub struct Quad(pub [f32; 4]);
 
-/// Quad `OFFSET` of record `index[lane]`.
+/// Quad `OFFSET` of record `i`.
 ///
 /// # Safety
-/// `lane < index.len()` and `index[lane] * STRIDE + OFFSET < quads.len()`.
+/// `i * STRIDE + OFFSET < quads.len()`.
 #[inline(always)]
-unsafe fn at<const STRIDE: usize, const OFFSET: usize>(
-    quads: &[Quad],
-    index: &[u32],
-    lane: usize,
-) -> *const f32 {
-    debug_assert!(lane < index.len() && index[lane] as usize * STRIDE + OFFSET < quads.len());
-    // SAFETY: both bounds are the caller's promise.
-    unsafe { quads.as_ptr().add(*index.get_unchecked(lane) as usize * STRIDE + OFFSET).cast() }
+unsafe fn at<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) -> *const f32 {
+    debug_assert!(i as usize * STRIDE + OFFSET < quads.len());
+    // SAFETY: the caller's promise.
+    unsafe { quads.as_ptr().add(i as usize * STRIDE + OFFSET).cast() }
 }
 
 /// As [`at`], to write.
 ///
 /// # Safety
-/// `lane < index.len()` and `index[lane] * STRIDE + OFFSET < quads.len()`.
+/// `i * STRIDE + OFFSET < quads.len()`.
 #[inline(always)]
-unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(
-    quads: &mut [Quad],
-    index: &[u32],
-    lane: usize,
-) -> *mut f32 {
-    debug_assert!(lane < index.len() && index[lane] as usize * STRIDE + OFFSET < quads.len());
-    // SAFETY: both bounds are the caller's promise.
-    unsafe { quads.as_mut_ptr().add(*index.get_unchecked(lane) as usize * STRIDE + OFFSET).cast() }
+unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(quads: &mut [Quad], i: u32) -> *mut f32 {
+    debug_assert!(i as usize * STRIDE + OFFSET < quads.len());
+    // SAFETY: the caller's promise.
+    unsafe { quads.as_mut_ptr().add(i as usize * STRIDE + OFFSET).cast() }
+}
+
+/// Checks that quad `OFFSET` exists of every record in `index`; returns the indices.
+#[inline(always)]
+fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
+    quads: &[Quad],
+    index: LaneIndex<'a, I>,
+) -> &'a I {
+    const { assert!(OFFSET < STRIDE) };
+    assert_fits(index.bound(), quads.len(), STRIDE);
+    index.array()
+}
+
+/// Asks for the cache lines of `values[range]`; past the end, nothing is asked for. A hint: it
+/// changes no value, and on targets without such an instruction it does nothing.
+#[inline(always)]
+pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
+    #[cfg(target_arch = "x86_64")]
+    if range.end <= values.len() {
+        let bytes = range.len() * size_of::<T>();
+        for line in 0..bytes.div_ceil(64) {
+            let address = values.as_ptr().wrapping_add(range.start).cast::<i8>().wrapping_add(64 * line);
+            // SAFETY: a hint; it faults at no address.
+            unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(address) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, range);
 }
 
 /// Asks for records of `STRIDE` quads, up to two cache lines of each, before they are needed.
@@ -61,73 +83,91 @@ pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterato
     let _ = (quads, index);
 }
 
-/// # Safety
-/// `index` holds at least 1 entry, whose quad exists.
 #[inline(always)]
-pub unsafe fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [f32; 4] {
-    // SAFETY: the caller keeps `index` in bounds; a quad is four floats.
-    unsafe { *at::<S, O>(quads, index, 0).cast::<[f32; 4]>() }
+pub fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 1]>) -> [f32; 4] {
+    let [i] = *checked::<_, S, O>(quads, index);
+    // SAFETY: `checked`; a quad is four floats.
+    unsafe { *at::<S, O>(quads, i).cast::<[f32; 4]>() }
 }
 
-/// # Safety
-/// `index` holds at least 1 entry, whose quad exists.
 #[inline(always)]
-pub unsafe fn scatter_1<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [f32; 4]) {
-    // SAFETY: the caller keeps `index` in bounds; a quad is four floats.
-    unsafe { *at_mut::<S, O>(quads, index, 0).cast::<[f32; 4]>() = v }
-}
-
-/// # Safety
-/// `index` holds at least 1 entry, whose quads exist.
-#[inline(always)]
-pub unsafe fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
+pub fn scatter_1<const S: usize, const O: usize>(
     quads: &mut [Quad],
-    index: &[u32],
+    index: LaneIndex<[u32; 1]>,
     v: [f32; 4],
 ) {
-    // SAFETY: the caller keeps `index` in bounds; the second half of a quad is two floats.
+    let [i] = *checked::<_, S, O>(quads, index);
+    // SAFETY: `checked`; a quad is four floats.
+    unsafe { *at_mut::<S, O>(quads, i).cast::<[f32; 4]>() = v }
+}
+
+#[inline(always)]
+pub fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
+    quads: &mut [Quad],
+    index: LaneIndex<[u32; 1]>,
+    v: [f32; 4],
+) {
+    let [i] = *checked::<_, S, O>(quads, index);
+    checked::<_, S, P>(quads, index);
+    // SAFETY: `checked`.
+    unsafe { store_halves::<S, O, P>(quads, i, v) }
+}
+
+/// `v[..2]` to the second half of quad `O` of record `i`, `v[2..]` to that of quad `P`.
+///
+/// # Safety
+/// `i * S + max(O, P) < quads.len()`.
+#[inline(always)]
+unsafe fn store_halves<const S: usize, const O: usize, const P: usize>(
+    quads: &mut [Quad],
+    i: u32,
+    v: [f32; 4],
+) {
+    // SAFETY: the caller's promise; the second half of a quad is two floats.
     unsafe {
-        *at_mut::<S, O>(quads, index, 0).add(2).cast::<[f32; 2]>() = [v[0], v[1]];
-        *at_mut::<S, P>(quads, index, 0).add(2).cast::<[f32; 2]>() = [v[2], v[3]];
+        *at_mut::<S, O>(quads, i).add(2).cast::<[f32; 2]>() = [v[0], v[1]];
+        *at_mut::<S, P>(quads, i).add(2).cast::<[f32; 2]>() = [v[2], v[3]];
     }
 }
 
-/// # Safety
-/// `index` holds at least 4 entries, whose quads exist.
 #[inline(always)]
-pub unsafe fn gather_4<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [f32x4; 4] {
-    // SAFETY: the caller keeps `index` in bounds; quads are aligned as `f32x4` is.
+pub fn gather_4<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 4]>) -> [f32x4; 4] {
+    let index = checked::<_, S, O>(quads, index);
+    // SAFETY: `checked`; quads are aligned as `f32x4` is.
     f32x4::transpose(unsafe {
         [
-            *at::<S, O>(quads, index, 0).cast::<f32x4>(),
-            *at::<S, O>(quads, index, 1).cast::<f32x4>(),
-            *at::<S, O>(quads, index, 2).cast::<f32x4>(),
-            *at::<S, O>(quads, index, 3).cast::<f32x4>(),
+            *at::<S, O>(quads, index[0]).cast::<f32x4>(),
+            *at::<S, O>(quads, index[1]).cast::<f32x4>(),
+            *at::<S, O>(quads, index[2]).cast::<f32x4>(),
+            *at::<S, O>(quads, index[3]).cast::<f32x4>(),
         ]
     })
 }
 
-/// # Safety
-/// `index` holds at least 4 entries, whose quads exist.
 #[inline(always)]
-pub unsafe fn scatter_4<const S: usize, const O: usize>(quads: &mut [Quad], index: &[u32], v: [f32x4; 4]) {
+pub fn scatter_4<const S: usize, const O: usize>(
+    quads: &mut [Quad],
+    index: LaneIndex<[u32; 4]>,
+    v: [f32x4; 4],
+) {
+    let index = checked::<_, S, O>(quads, index);
     for (lane, quad) in f32x4::transpose(v).into_iter().enumerate() {
-        // SAFETY: the caller keeps `index` in bounds; quads are aligned as `f32x4` is.
-        unsafe { *at_mut::<S, O>(quads, index, lane).cast::<f32x4>() = quad }
+        // SAFETY: `checked`; quads are aligned as `f32x4` is.
+        unsafe { *at_mut::<S, O>(quads, index[lane]).cast::<f32x4>() = quad }
     }
 }
 
-/// # Safety
-/// `index` holds at least 4 entries, whose quads exist.
 #[inline(always)]
-pub unsafe fn scatter_halves_4<const S: usize, const O: usize, const P: usize>(
+pub fn scatter_halves_4<const S: usize, const O: usize, const P: usize>(
     quads: &mut [Quad],
-    index: &[u32],
+    index: LaneIndex<[u32; 4]>,
     v: [f32x4; 4],
 ) {
+    checked::<_, S, P>(quads, index);
+    let index = checked::<_, S, O>(quads, index);
     for (lane, quad) in f32x4::transpose(v).into_iter().enumerate() {
-        // SAFETY: the caller keeps lane `lane` of `index` in bounds.
-        unsafe { scatter_halves_1::<S, O, P>(quads, &index[lane..], quad.to_array()) }
+        // SAFETY: `checked`.
+        unsafe { store_halves::<S, O, P>(quads, index[lane], quad.to_array()) }
     }
 }
 
@@ -169,25 +209,31 @@ macro_rules! registers {
             /// Quads of records `k`, `4 + k`, …, one per 128-bit lane.
             ///
             /// # Safety
-            /// `index` holds an entry for every lane, whose quad exists.
+            /// Quad `O` exists of every record in `index`.
             #[inline(always)]
-            unsafe fn load<const S: usize, const O: usize>(quads: &[Quad], index: &[u32], k: usize) -> $register {
+            unsafe fn load<const S: usize, const O: usize>(
+                quads: &[Quad],
+                index: &[u32; 4 * $lanes],
+                k: usize,
+            ) -> $register {
                 // SAFETY: SSE is a target feature of this build.
                 let mut $quads = [unsafe { _mm_setzero_ps() }; $lanes];
                 for (q, quad) in $quads.iter_mut().enumerate() {
-                    // SAFETY: the caller keeps `index` in bounds; quads are aligned.
-                    *quad = unsafe { _mm_load_ps(at::<S, O>(quads, index, 4 * q + k)) };
+                    // SAFETY: the caller's promise; quads are aligned.
+                    *quad = unsafe { _mm_load_ps(at::<S, O>(quads, index[4 * q + k])) };
                 }
                 // SAFETY: the instructions are target features of this build.
                 unsafe { $join }
             }
 
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quad exists.
             #[inline(always)]
-            pub unsafe fn $gather<const S: usize, const O: usize>(quads: &[Quad], index: &[u32]) -> [$float; 4] {
-                // SAFETY: the caller keeps `index` in bounds. Calls written out, because a
-                // closure under `map` is not always inlined.
+            pub fn $gather<const S: usize, const O: usize>(
+                quads: &[Quad],
+                index: LaneIndex<[u32; 4 * $lanes]>,
+            ) -> [$float; 4] {
+                let index = checked::<_, S, O>(quads, index);
+                // SAFETY: `checked`. Calls written out, because a closure under `map` is not
+                // always inlined.
                 let t = transpose(unsafe {
                     [
                         load::<S, O>(quads, index, 0),
@@ -211,38 +257,37 @@ macro_rules! registers {
                 [row(t[0]), row(t[1]), row(t[2]), row(t[3])]
             }
 
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quad exists.
             #[inline(always)]
-            pub unsafe fn $scatter<const S: usize, const O: usize>(
+            pub fn $scatter<const S: usize, const O: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<[u32; 4 * $lanes]>,
                 v: [$float; 4],
             ) {
+                let index = checked::<_, S, O>(quads, index);
                 for (k, row) in rows(v).into_iter().enumerate() {
                     for (q, quad) in row.into_iter().enumerate() {
-                        // SAFETY: the caller keeps `index` in bounds; quads are aligned.
-                        unsafe { _mm_store_ps(at_mut::<S, O>(quads, index, 4 * q + k), quad) }
+                        // SAFETY: `checked`; quads are aligned.
+                        unsafe { _mm_store_ps(at_mut::<S, O>(quads, index[4 * q + k]), quad) }
                     }
                 }
             }
 
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quads exist.
             #[inline(always)]
-            pub unsafe fn $halves<const S: usize, const O: usize, const P: usize>(
+            pub fn $halves<const S: usize, const O: usize, const P: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<[u32; 4 * $lanes]>,
                 v: [$float; 4],
             ) {
+                checked::<_, S, P>(quads, index);
+                let index = checked::<_, S, O>(quads, index);
                 for (k, row) in rows(v).into_iter().enumerate() {
                     for (q, quad) in row.into_iter().enumerate() {
-                        // SAFETY: the caller keeps `index` in bounds; the second half of a
-                        // quad is the two floats that each instruction stores.
+                        // SAFETY: `checked`; the second half of a quad is the two floats that
+                        // each instruction stores.
                         unsafe {
                             let quad = _mm_castps_pd(quad);
-                            _mm_storel_pd(at_mut::<S, O>(quads, index, 4 * q + k).add(2).cast(), quad);
-                            _mm_storeh_pd(at_mut::<S, P>(quads, index, 4 * q + k).add(2).cast(), quad);
+                            _mm_storel_pd(at_mut::<S, O>(quads, index[4 * q + k]).add(2).cast(), quad);
+                            _mm_storeh_pd(at_mut::<S, P>(quads, index[4 * q + k]).add(2).cast(), quad);
                         }
                     }
                 }
@@ -322,69 +367,55 @@ mod halves {
     use super::*;
 
     macro_rules! halves {
-        ($whole:ident, $half:ident, $gather:ident, $scatter:ident, $halves:ident, $gather_half:ident, $scatter_half:ident,
-         $halves_half:ident, $lanes:literal) => {
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quad exists.
+        ($whole:ident, $half:ident, $width:literal, $gather:ident, $scatter:ident, $halves:ident,
+         $gather_half:ident, $scatter_half:ident, $halves_half:ident) => {
             #[inline(always)]
-            pub unsafe fn $gather<const S: usize, const O: usize>(
+            pub fn $gather<const S: usize, const O: usize>(
                 quads: &[Quad],
-                index: &[u32],
+                index: LaneIndex<[u32; $width]>,
             ) -> [$whole; 4] {
-                // SAFETY: the caller keeps the indices in bounds.
-                let (a, b) = unsafe {
-                    (
-                        super::$gather_half::<S, O>(quads, index),
-                        super::$gather_half::<S, O>(quads, &index[$lanes..]),
-                    )
-                };
+                let [low, high] = index.halves();
+                let (a, b) =
+                    (super::$gather_half::<S, O>(quads, low), super::$gather_half::<S, O>(quads, high));
                 std::array::from_fn(|c| bytemuck::cast([a[c], b[c]]))
             }
 
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quad exists.
             #[inline(always)]
-            pub unsafe fn $scatter<const S: usize, const O: usize>(
+            pub fn $scatter<const S: usize, const O: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<[u32; $width]>,
                 v: [$whole; 4],
             ) {
                 let v: [[$half; 2]; 4] = bytemuck::cast(v);
-                // SAFETY: the caller keeps the indices in bounds.
-                unsafe {
-                    super::$scatter_half::<S, O>(quads, index, v.map(|v| v[0]));
-                    super::$scatter_half::<S, O>(quads, &index[$lanes..], v.map(|v| v[1]));
-                }
+                let [low, high] = index.halves();
+                super::$scatter_half::<S, O>(quads, low, v.map(|v| v[0]));
+                super::$scatter_half::<S, O>(quads, high, v.map(|v| v[1]));
             }
 
-            /// # Safety
-            /// `index` holds an entry for every lane, whose quads exist.
             #[inline(always)]
-            pub unsafe fn $halves<const S: usize, const O: usize, const P: usize>(
+            pub fn $halves<const S: usize, const O: usize, const P: usize>(
                 quads: &mut [Quad],
-                index: &[u32],
+                index: LaneIndex<[u32; $width]>,
                 v: [$whole; 4],
             ) {
                 let v: [[$half; 2]; 4] = bytemuck::cast(v);
-                // SAFETY: the caller keeps the indices in bounds.
-                unsafe {
-                    super::$halves_half::<S, O, P>(quads, index, v.map(|v| v[0]));
-                    super::$halves_half::<S, O, P>(quads, &index[$lanes..], v.map(|v| v[1]));
-                }
+                let [low, high] = index.halves();
+                super::$halves_half::<S, O, P>(quads, low, v.map(|v| v[0]));
+                super::$halves_half::<S, O, P>(quads, high, v.map(|v| v[1]));
             }
         };
     }
 
-    halves!(f32x8, f32x4, gather_8, scatter_8, scatter_halves_8, gather_4, scatter_4, scatter_halves_4, 4);
+    halves!(f32x8, f32x4, 8, gather_8, scatter_8, scatter_halves_8, gather_4, scatter_4, scatter_halves_4);
     halves!(
         f32x16,
         f32x8,
+        16,
         gather_16,
         scatter_16,
         scatter_halves_16,
         gather_8,
         scatter_8,
-        scatter_halves_8,
-        8
+        scatter_halves_8
     );
 }

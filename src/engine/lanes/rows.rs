@@ -3,6 +3,9 @@
 //! A row is two quads, and [`super::quads`] moves it by halves. Sixteen bodies are gathered by whole
 //! rows instead, which takes half the loads. Single columns are moved to compare with rows.
 
+#![allow(unsafe_code)] // Loads and stores at addresses; [`super::index`] upholds what they rest on.
+
+use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
 
 /// What sweeps read and write of a body: its velocity and its motion since the step began.
@@ -16,29 +19,21 @@ pub struct BodyRow {
 }
 
 /// `values[index[lane]]` in every lane, one after the other.
-///
-/// # Safety
-/// `index` holds at least as many entries as `V` floats, each less than `values.len()`.
 #[inline(always)]
-pub unsafe fn load_each<V: Pod>(values: &[f32], index: &[u32]) -> V {
-    let mut v = V::zeroed();
-    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut v));
-    for (lane, float) in floats.iter_mut().enumerate() {
-        // SAFETY: the caller keeps `index` in bounds.
-        *float = unsafe { *values.get_unchecked(*index.get_unchecked(lane) as usize) };
-    }
-    v
+pub fn load_each<V: Pod, const W: usize>(values: &[f32], index: LaneIndex<[u32; W]>) -> V {
+    assert_fits(index.bound(), values.len(), 1);
+    // SAFETY: every entry is below the bound.
+    bytemuck::cast(index.array().map(|i| unsafe { *values.get_unchecked(i as usize) }))
 }
 
 /// `values[index[lane]] = v[lane]`, in lane order.
-///
-/// # Safety
-/// `index` holds at least as many entries as `V` floats, each less than `values.len()`.
 #[inline(always)]
-pub unsafe fn store_each<V: Pod>(values: &mut [f32], index: &[u32], v: V) {
-    for (lane, float) in bytemuck::cast_slice::<V, f32>(&[v]).iter().enumerate() {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { *values.get_unchecked_mut(*index.get_unchecked(lane) as usize) = *float };
+pub fn store_each<V: Pod, const W: usize>(values: &mut [f32], index: LaneIndex<[u32; W]>, v: V) {
+    assert_fits(index.bound(), values.len(), 1);
+    let floats: [f32; W] = bytemuck::cast(v);
+    for (&i, float) in index.array().iter().zip(floats) {
+        // SAFETY: every entry is below the bound.
+        unsafe { *values.get_unchecked_mut(i as usize) = float };
     }
 }
 
@@ -48,56 +43,51 @@ pub use self::{load_each as load_at_16, store_each as store_at_16};
 pub use avx512::{gather_16, load_at_16, store_at_16};
 
 /// Without instructions for 16 lanes, by halves.
-///
-/// # Safety
-/// `index` holds at least 16 entries, each less than `rows.len()`.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
 #[inline(always)]
-pub unsafe fn gather_16(rows: &[BodyRow], index: &[u32]) -> [wide::f32x16; 8] {
-    // SAFETY: the caller keeps the 16 indices in bounds.
-    unsafe { super::gather_halves(rows, index) }
+pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [wide::f32x16; 8] {
+    super::gather_halves(rows, index)
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 mod avx512 {
     use super::super::quads::avx512::{from, into, transpose};
-    use super::BodyRow;
+    use super::{BodyRow, LaneIndex, assert_fits};
     use std::arch::x86_64::*;
     use wide::f32x16;
 
-    /// The row of `index[lane]`.
+    /// Row `i`.
     ///
     /// # Safety
-    /// `lane < index.len()` and `index[lane] < rows.len()`.
+    /// `i < rows.len()`.
     #[inline(always)]
-    unsafe fn row(rows: &[BodyRow], index: &[u32], lane: usize) -> *const f32 {
-        debug_assert!(lane < index.len() && (index[lane] as usize) < rows.len());
-        // SAFETY: both bounds are the caller's promise.
-        unsafe { rows.as_ptr().add(*index.get_unchecked(lane) as usize).cast() }
+    unsafe fn row(rows: &[BodyRow], i: u32) -> __m256 {
+        debug_assert!((i as usize) < rows.len());
+        // SAFETY: the caller's promise; a row is eight floats, aligned to 32 bytes.
+        unsafe { _mm256_load_ps(rows.as_ptr().add(i as usize).cast()) }
     }
 
     /// Whole rows of bodies `i` and `i + 4`, one per 256-bit half.
     ///
     /// # Safety
-    /// `index` holds at least `i + 5` entries, each less than `rows.len()`.
+    /// Every entry of `index` is less than `rows.len()`.
     #[inline(always)]
-    unsafe fn load(rows: &[BodyRow], index: &[u32], i: usize) -> __m512 {
-        // SAFETY: the caller keeps the indices in bounds; a row is eight floats, aligned to 32 bytes.
+    unsafe fn load(rows: &[BodyRow], index: &[u32; 16], i: usize) -> __m512 {
+        // SAFETY: the caller's promise; the instructions are target features of this build.
         unsafe {
-            let low = _mm512_castps256_ps512(_mm256_load_ps(row(rows, index, i)));
-            _mm512_insertf32x8::<1>(low, _mm256_load_ps(row(rows, index, i + 4)))
+            let low = _mm512_castps256_ps512(row(rows, index[i]));
+            _mm512_insertf32x8::<1>(low, row(rows, index[i + 4]))
         }
     }
 
     /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles. By half rows, 32 loads,
     /// 24 of them with an insert, and 16 shuffles, sweeps are 6 % slower. Masked broadcasts in
     /// place of the inserts changed nothing.
-    ///
-    /// # Safety
-    /// `index` holds at least 16 entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather_16(rows: &[BodyRow], index: &[u32]) -> [f32x16; 8] {
-        // SAFETY: the caller keeps the 16 indices in bounds.
+    pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [f32x16; 8] {
+        assert_fits(index.bound(), rows.len(), 1);
+        let index = index.array();
+        // SAFETY: every entry is below the bound.
         unsafe {
             // In 128-bit lanes: velocities of bodies 0..4, deltas of the same, then of 4..8.
             let p = transpose([
@@ -119,24 +109,25 @@ mod avx512 {
         }
     }
 
-    /// # Safety
-    /// `index` holds at least 16 entries, each less than `values.len()` and than 2³¹.
+    /// The instructions take indices as signed: no list of values that are read so is as long as 2³¹.
+    const SIGNED: usize = 1 << 31;
+
     #[inline(always)]
-    pub unsafe fn load_at_16(values: &[f32], index: &[u32]) -> f32x16 {
-        // SAFETY: the caller keeps the 16 indices in bounds; the load of indices is unaligned.
+    pub fn load_at_16(values: &[f32], index: LaneIndex<[u32; 16]>) -> f32x16 {
+        assert_fits(index.bound(), values.len().min(SIGNED), 1);
+        // SAFETY: every entry is below the bound, and so not negative; the load of indices is unaligned.
         from(unsafe {
-            let index = _mm512_loadu_si512(index.as_ptr().cast());
+            let index = _mm512_loadu_si512(index.array().as_ptr().cast());
             _mm512_i32gather_ps::<4>(index, values.as_ptr())
         })
     }
 
-    /// # Safety
-    /// `index` holds at least 16 entries, each less than `values.len()` and than 2³¹.
     #[inline(always)]
-    pub unsafe fn store_at_16(values: &mut [f32], index: &[u32], v: f32x16) {
+    pub fn store_at_16(values: &mut [f32], index: LaneIndex<[u32; 16]>, v: f32x16) {
+        assert_fits(index.bound(), values.len().min(SIGNED), 1);
         // SAFETY: as above.
         unsafe {
-            let index = _mm512_loadu_si512(index.as_ptr().cast());
+            let index = _mm512_loadu_si512(index.array().as_ptr().cast());
             _mm512_i32scatter_ps::<4>(values.as_mut_ptr(), index, into(v));
         }
     }

@@ -1,33 +1,31 @@
 //! Where sweeps keep the rows of bodies: packed, as solvers do, or in columns, to compare.
 
-use super::{BodyRow, LaneVec, Lanes};
+use super::{BodyRow, LaneIndex, LaneVec, Lanes};
 
 /// Rows of bodies that a sweep gathers from and scatters to.
 pub trait RowStore {
     /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]` of the rows that `index` names.
     ///
-    /// # Safety
-    /// `index` holds at least `WIDTH` entries, each of them a row of the store.
-    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8];
+    /// # Panics
+    /// If the store has fewer rows than the bound of `index`.
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8];
 
     /// Writes back `[vx, vy, ω, m⁻¹]`, in lane order.
     ///
-    /// # Safety
+    /// # Panics
     /// As [`Self::gather`].
-    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]);
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]);
 }
 
 impl RowStore for [BodyRow] {
     #[inline(always)]
-    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { L::gather(self, index) }
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self, index)
     }
 
     #[inline(always)]
-    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
-        // SAFETY: the caller keeps `index` in bounds.
-        unsafe { L::scatter_velocity(self, index, velocity) }
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        L::scatter_velocity(self, index, velocity)
     }
 }
 
@@ -63,17 +61,15 @@ impl RowColumns {
 
 impl RowStore for RowColumns {
     #[inline(always)]
-    unsafe fn gather<L: Lanes>(&self, index: &[u32]) -> [L; 8] {
-        // SAFETY: the caller keeps `index` in bounds; all columns are equally long.
-        self.columns.each_ref().map(|column| unsafe { L::load_at(column, index) })
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        self.columns.each_ref().map(|column| L::load_at(column, index))
     }
 
     #[inline(always)]
-    unsafe fn scatter_velocity<L: Lanes>(&mut self, index: &[u32], velocity: [L; 4]) {
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
         // The inverse mass does not change, and a column can be left alone where half a row cannot.
         for (column, v) in self.columns.iter_mut().zip(velocity).take(3) {
-            // SAFETY: the caller keeps `index` in bounds; all columns are equally long.
-            unsafe { L::store_at(column, index, v) };
+            L::store_at(column, index, v);
         }
     }
 }

@@ -6,7 +6,9 @@ use super::hulls::Hulls;
 use super::lanes::{PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{LaneWidth, Lanes, Quad, held, prefetch_records};
+use crate::engine::lanes::{
+    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, held, prefetch_records,
+};
 use crate::engine::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
@@ -158,8 +160,7 @@ pub struct Input<'a> {
 /// stands room for one more batch, in which such manifolds are made.
 ///
 /// # Panics
-/// If a job names a body, shape or contact that does not exist: the check on which the gathers
-/// and scatters below rest.
+/// If a job names a body, shape or contact that does not exist, or lists are not equally long.
 pub fn update(
     kind: Kind,
     width: LaneWidth,
@@ -169,16 +170,21 @@ pub fn update(
     change: impl FnMut(u32, &Contact),
 ) -> usize {
     let count = jobs.name.len();
-    // The largest of each list is found in lanes, where a search for the first bad one would not be.
-    let below = |list: &[u32], limit: usize| {
-        let largest = list.iter().fold(0, |most, &i| i.max(most));
-        assert!(list.len() == count && (count == 0 || (largest as usize) < limit));
+    let below = |list, limit: usize, what: &str| {
+        let list = IndexList::new(list);
+        assert!(list.entries().len() == count, "{count} pairs, and {what} for {}", list.entries().len());
+        assert!(list.bound() <= limit, "a pair of {what} {} of {limit}", list.bound() - 1);
+        list
     };
-    jobs.bodies.iter().for_each(|list| below(list, input.poses.len()));
-    jobs.shapes.iter().for_each(|list| below(list, input.shapes.rows.len()));
     let made = contacts.len();
+    let indices = JobIndices {
+        bodies: jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies")),
+        shapes: jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes")),
+    };
+    // No contact is the largest number, and with one more the smallest.
     let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
-    assert!(jobs.contact.len() == count && beyond as usize <= made);
+    assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
+    assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
     contacts.resize(made + width.lanes(), Contact::default());
     let run = match width {
         LaneWidth::W1 => run::<f32>,
@@ -186,34 +192,40 @@ pub fn update(
         LaneWidth::W8 => run::<f32x8>,
         LaneWidth::W16 => run::<f32x16>,
     };
-    let points = run(kind, jobs, input, contacts, made, change);
+    let points = run(kind, jobs, indices, input, contacts, made, change);
     contacts.truncate(made);
     points
+}
+
+/// The lists that kernels gather by.
+#[derive(Clone, Copy)]
+struct JobIndices<'a> {
+    bodies: [IndexList<'a>; 2],
+    shapes: [IndexList<'a>; 2],
 }
 
 fn run<L: Lanes>(
     kind: Kind,
     jobs: &Jobs,
+    indices: JobIndices,
     input: Input,
     contacts: &mut [Contact],
     made: usize,
     change: impl FnMut(u32, &Contact),
 ) -> usize {
     let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
-    // SAFETY, of all closures: `update` checked all indices; there are as many rows as hulls, and
-    // padding repeats a pair.
     match kind {
-        Kind::Rectangles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             rectangles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
         }),
-        Kind::Circles => run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+        Kind::Circles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             circles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
         }),
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
-            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
                 pair.collide(&poses, speculative)
@@ -221,7 +233,7 @@ fn run<L: Lanes>(
         }
         Kind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, contacts, made, change, |bodies, shapes| unsafe {
+            run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 pair.collide(&poses, speculative)
@@ -229,7 +241,7 @@ fn run<L: Lanes>(
         }
         Kind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, contacts, made, change, |bodies, [a, b]| unsafe {
+            run_kernel(jobs, indices, contacts, made, change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
                 pair.collide(&poses, speculative).swapped()
@@ -243,32 +255,24 @@ fn run<L: Lanes>(
 #[inline(always)]
 fn run_kernel<L: Lanes>(
     jobs: &Jobs,
+    indices: JobIndices,
     contacts: &mut [Contact],
     made: usize,
     mut change: impl FnMut(u32, &Contact),
-    mut kernel: impl FnMut([&[u32]; 2], [&[u32]; 2]) -> Touch<L>,
+    mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> Touch<L>,
 ) -> usize {
     let mut points = 0_u32;
     let count = jobs.name.len();
     for first in (0..count).step_by(L::WIDTH) {
         // The last batch is filled up with its first pair, whose result goes to the spare room, as
         // do those of pairs without a contact. No impulse is ever left there.
-        let mut padded = [[0; 16]; 4];
-        let lists = [&jobs.bodies[0], &jobs.bodies[1], &jobs.shapes[0], &jobs.shapes[1]];
+        let [a, b, c, d] = &mut [[0; MOST_LANES]; 4];
+        let bodies = [indices.bodies[0].batch_at(first, a), indices.bodies[1].batch_at(first, b)];
+        let shapes = [indices.shapes[0].batch_at(first, c), indices.shapes[1].batch_at(first, d)];
         let filled = (count - first).min(L::WIDTH);
-        let ends = lists.map(|list| &list[first..]);
-        let [body_a, body_b, shape_a, shape_b] = if filled == L::WIDTH {
-            ends
-        } else {
-            for (padded, list) in padded.iter_mut().zip(ends) {
-                padded.fill(list[0]);
-                padded[..filled].copy_from_slice(list);
-            }
-            [&padded[0][..], &padded[1][..], &padded[2][..], &padded[3][..]]
-        };
-        let mut known = [NO_CONTACT; 16];
+        let mut known = [NO_CONTACT; MOST_LANES];
         known[..filled].copy_from_slice(&jobs.contact[first..first + filled]);
-        let mut target = [0; 16];
+        let mut target = [0; MOST_LANES];
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
@@ -276,12 +280,10 @@ fn run_kernel<L: Lanes>(
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
-        let touch = kernel([body_a, body_b], [shape_a, shape_b]);
-        // SAFETY: targets are contacts that `update` checked, or in the spare room behind them;
-        // no two lanes have the same.
-        unsafe { merge(&touch, bytemuck::cast_slice_mut(contacts), &target) };
+        let touch = kernel(bodies, shapes);
+        merge(&touch, bytemuck::cast_slice_mut(contacts), LaneIndex::new(&target));
         // Counts in memory once more, so that a batch without changes is one comparison.
-        let mut count = [0.0_f32; 16];
+        let mut count = [0.0_f32; MOST_LANES];
         count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);
         let mut is_changed = false;
         for (&count, &known) in count.iter().zip(&known) {
@@ -305,22 +307,15 @@ fn run_kernel<L: Lanes>(
 /// Integers are moved and compared as the bits of floats: equal bits of numbers below 2²³ are
 /// equal (tiny) floats. The name of an old point that is not in use is NaN, which equals nothing.
 ///
-/// # Safety
-/// `target` holds at least `L::WIDTH` entries, all different, each a contact of which `contacts`
-/// has all quads.
+/// No two lanes have the same target.
 #[inline(always)]
-unsafe fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: &[u32]) {
+fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: LaneIndex<L::Index>) {
     use quad::*;
-    // SAFETY: the caller's promise.
-    let (header, old) = unsafe {
-        (
-            L::gather_quads::<STRIDE, HEADER>(contacts, target),
-            [
-                L::gather_quads::<STRIDE, STATE_0>(contacts, target),
-                L::gather_quads::<STRIDE, STATE_1>(contacts, target),
-            ],
-        )
-    };
+    let header = L::gather_quads::<STRIDE, HEADER>(contacts, target);
+    let old = [
+        L::gather_quads::<STRIDE, STATE_0>(contacts, target),
+        L::gather_quads::<STRIDE, STATE_1>(contacts, target),
+    ];
     let (zero, nothing) = (L::zero(), L::splat(f32::NAN));
     let count = touch.count.integer_bits();
     let two = L::splat(2.0).integer_bits();
@@ -340,12 +335,9 @@ unsafe fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: &[u32
         |p: usize| [touch.anchor_a[p][0], touch.anchor_a[p][1], touch.anchor_b[p][0], touch.anchor_b[p][1]];
     let header = [touch.normal[0], touch.normal[1], count, header[3]];
     let (state_0, state_1) = (state(0), state(1));
-    // SAFETY: the caller's promise.
-    unsafe {
-        L::scatter_quads::<STRIDE, ANCHORS_0>(contacts, target, anchors(0));
-        L::scatter_quads::<STRIDE, STATE_0>(contacts, target, state_0);
-        L::scatter_quads::<STRIDE, ANCHORS_1>(contacts, target, anchors(1));
-        L::scatter_quads::<STRIDE, STATE_1>(contacts, target, state_1);
-        L::scatter_quads::<STRIDE, HEADER>(contacts, target, header);
-    }
+    L::scatter_quads::<STRIDE, ANCHORS_0>(contacts, target, anchors(0));
+    L::scatter_quads::<STRIDE, STATE_0>(contacts, target, state_0);
+    L::scatter_quads::<STRIDE, ANCHORS_1>(contacts, target, anchors(1));
+    L::scatter_quads::<STRIDE, STATE_1>(contacts, target, state_1);
+    L::scatter_quads::<STRIDE, HEADER>(contacts, target, header);
 }

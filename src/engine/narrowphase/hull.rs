@@ -1,7 +1,6 @@
 //! Polygons, capsules and segments as the lane kernels read them.
 
-use super::lanes::only;
-use crate::engine::lanes::{Lanes, Quad};
+use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES, Quad};
 use crate::engine::params::MAX_POLYGON_VERTICES;
 use crate::engine::shapes::Shape;
 use bytemuck::{Pod, Zeroable};
@@ -66,48 +65,41 @@ impl<L: Lanes> Hull<L> {
     }
 
     /// Reads the heads of `L::WIDTH` hulls and returns the largest number of slots that one has.
-    ///
-    /// # Safety
-    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather_heads(&mut self, rows: &[HullRow], index: &[u32]) -> usize {
-        if let Some(row) = only(index, L::WIDTH) {
+    pub fn gather_heads(&mut self, rows: &[HullRow], index: LaneIndex<L::Index>) -> usize {
+        if let Some(row) = index.only() {
             self.head = rows[row].head.map(L::splat);
             return (rows[row].head[1] as usize + 1).min(MAX_POLYGON_VERTICES);
         }
-        // SAFETY: the caller keeps the indices in bounds.
-        self.head = unsafe { L::gather_quads::<STRIDE, 0>(bytemuck::cast_slice(rows), index) };
+        self.head = L::gather_quads::<STRIDE, 0>(bytemuck::cast_slice(rows), index);
         let last = bytemuck::cast_slice(std::slice::from_ref(&self.head[1]));
         let most = last.iter().fold(0.0_f32, |most, &last| if last > most { last } else { most });
         (most as usize + 1).min(MAX_POLYGON_VERTICES)
     }
 
     /// Reads the first `count` corners of `L::WIDTH` hulls and moves each by `place`.
-    ///
-    /// # Safety
-    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather_corners(
+    pub fn gather_corners(
         &mut self,
         rows: &[HullRow],
-        index: &[u32],
+        index: LaneIndex<L::Index>,
         count: usize,
         place: impl Fn([L; 4]) -> [L; 4],
     ) {
-        if let Some(row) = only(index, L::WIDTH) {
+        if let Some(row) = index.only() {
             for (corner, from) in self.corners[..count].iter_mut().zip(&rows[row].corners) {
                 *corner = place(from.map(L::splat));
             }
             return;
         }
         let quads: &[Quad] = bytemuck::cast_slice(rows);
-        let mut first = [0; 16];
-        for (first, &row) in first.iter_mut().zip(&index[..L::WIDTH]) {
+        let mut first = [0; MOST_LANES];
+        for (first, &row) in first.iter_mut().zip(index.entries()) {
             *first = row * STRIDE as u32 + 1;
         }
+        let first = LaneIndex::new(&first);
         for (slot, corner) in self.corners[..count].iter_mut().enumerate() {
-            // SAFETY: the caller keeps the indices in bounds, and a row has more slots than `count`.
-            *corner = place(unsafe { L::gather_quads::<1, 0>(&quads[slot..], &first) });
+            *corner = place(L::gather_quads::<1, 0>(&quads[slot..], first));
         }
     }
 }

@@ -7,7 +7,7 @@
 
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate};
-use crate::engine::lanes::Lanes;
+use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 
 /// Hulls as a, circles as b.
 pub struct HullCircle<L> {
@@ -25,19 +25,12 @@ impl<L: Lanes> HullCircle<L> {
     }
 
     /// Reads `L::WIDTH` pairs.
-    ///
-    /// # Safety
-    /// Both lists hold at least `L::WIDTH` entries, those of `a` less than `hulls.len()`, those of
-    /// `b` less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather(&mut self, hulls: &[HullRow], rows: &[ShapeRow], [a, b]: [&[u32]; 2]) {
-        // SAFETY: the caller keeps the indices in bounds.
-        unsafe {
-            self.count = self.hull.gather_heads(hulls, a);
-            self.hull.gather_corners(hulls, a, self.count, |corner| corner);
-            let [place, size] = ShapeRow::gather::<L>(rows, b);
-            self.circle = ([place[0], place[1]], size[2]);
-        }
+    pub fn gather(&mut self, hulls: &[HullRow], rows: &[ShapeRow], [a, b]: [LaneIndex<L::Index>; 2]) {
+        self.count = self.hull.gather_heads(hulls, a);
+        self.hull.gather_corners(hulls, a, self.count, |corner| corner);
+        let [place, size] = ShapeRow::gather::<L>(rows, b);
+        self.circle = ([place[0], place[1]], size[2]);
     }
 
     /// Their contacts; those farther apart than `speculative` (m) are left out.
@@ -93,8 +86,7 @@ impl HullCircle<f32> {
     /// A single pair.
     pub fn new(hull: HullRow, row: ShapeRow) -> Self {
         let mut pair = Self::empty();
-        // SAFETY: one index each, less than 1.
-        unsafe { pair.gather(&[hull], &[row], [&[0], &[0]]) };
+        pair.gather(&[hull], &[row], [LaneIndex::new(&[0; MOST_LANES]); 2]);
         pair
     }
 }

@@ -19,7 +19,7 @@
 use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, Touch, dot, perp, rotate, unrotate};
-use crate::engine::lanes::Lanes;
+use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 
 /// Hulls a and b and the incident one of the two, along a's axes from b's centre of mass.
 pub struct Hulls<L> {
@@ -37,25 +37,18 @@ impl<L: Lanes> Hulls<L> {
     }
 
     /// Reads `L::WIDTH` pairs, which stand at `poses`.
-    ///
-    /// # Safety
-    /// Both lists hold at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather(&mut self, poses: &Poses<L>, rows: &[HullRow], [a, b]: [&[u32]; 2]) {
+    pub fn gather(&mut self, poses: &Poses<L>, rows: &[HullRow], [a, b]: [LaneIndex<L::Index>; 2]) {
         let [rotation_a, rotation_b] = poses.rotation;
         let offset = unrotate(rotation_a, poses.centers);
         let relative = unrotate(rotation_a, rotation_b);
-        // SAFETY: the caller keeps the indices in bounds.
-        unsafe {
-            let [hull_a, hull_b] = &mut self.hulls;
-            self.count = hull_a.gather_heads(rows, a).max(hull_b.gather_heads(rows, b));
-            hull_a
-                .gather_corners(rows, a, self.count, |[x, y, nx, ny]| [x - offset[0], y - offset[1], nx, ny]);
-            hull_b.gather_corners(rows, b, self.count, |[x, y, nx, ny]| {
-                let ([x, y], [nx, ny]) = (rotate(relative, [x, y]), rotate(relative, [nx, ny]));
-                [x, y, nx, ny]
-            });
-        }
+        let [hull_a, hull_b] = &mut self.hulls;
+        self.count = hull_a.gather_heads(rows, a).max(hull_b.gather_heads(rows, b));
+        hull_a.gather_corners(rows, a, self.count, |[x, y, nx, ny]| [x - offset[0], y - offset[1], nx, ny]);
+        hull_b.gather_corners(rows, b, self.count, |[x, y, nx, ny]| {
+            let ([x, y], [nx, ny]) = (rotate(relative, [x, y]), rotate(relative, [nx, ny]));
+            [x, y, nx, ny]
+        });
     }
 
     /// Their contacts; points farther apart than `speculative` (m) are left out.
@@ -114,8 +107,7 @@ impl Hulls<f32> {
     /// A single pair, which stands at `poses`.
     pub fn new(poses: &Poses<f32>, rows: [HullRow; 2]) -> Self {
         let mut hulls = Self::empty();
-        // SAFETY: one index each, less than 2.
-        unsafe { hulls.gather(poses, &rows, [&[0], &[1]]) };
+        hulls.gather(poses, &rows, [LaneIndex::new(&[0; MOST_LANES]), LaneIndex::new(&[1; MOST_LANES])]);
         hulls
     }
 }

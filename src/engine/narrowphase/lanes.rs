@@ -2,7 +2,7 @@
 
 use super::batch::Class;
 use crate::engine::contacts::{Manifold, ManifoldPoint};
-use crate::engine::lanes::{Lanes, Quad};
+use crate::engine::lanes::{LaneIndex, Lanes, Quad};
 use crate::engine::shapes::{Polygon, Pose, Shape};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
@@ -78,15 +78,11 @@ impl ShapeRow {
 
 impl ShapeRow {
     /// `place` and `size` of `L::WIDTH` rows.
-    ///
-    /// # Safety
-    /// `index` holds at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather<L: Lanes>(rows: &[ShapeRow], index: &[u32]) -> [[L; 4]; 2] {
+    pub fn gather<L: Lanes>(rows: &[ShapeRow], index: LaneIndex<L::Index>) -> [[L; 4]; 2] {
         // Spreading a single row, as hulls do, was tried: 0 % on the washer's equal boxes.
         let rows: &[Quad] = bytemuck::cast_slice(rows);
-        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
-        unsafe { [L::gather_quads::<2, 0>(rows, index), L::gather_quads::<2, 1>(rows, index)] }
+        [L::gather_quads::<2, 0>(rows, index), L::gather_quads::<2, 1>(rows, index)]
     }
 }
 
@@ -101,21 +97,15 @@ pub struct Poses<L> {
 
 impl<L: Lanes> Poses<L> {
     /// Reads the poses of `L::WIDTH` pairs of bodies.
-    ///
-    /// # Safety
-    /// Both lists hold at least `L::WIDTH` entries, each less than `poses.len()`.
     #[inline(always)]
-    pub unsafe fn gather(poses: &[PoseRow], [a, b]: [&[u32]; 2]) -> Self {
+    pub fn gather(poses: &[PoseRow], [a, b]: [LaneIndex<L::Index>; 2]) -> Self {
         let poses: &[Quad] = bytemuck::cast_slice(poses);
-        // SAFETY: the caller keeps the indices in bounds; a row is two quads.
-        unsafe {
-            let (p, q) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
-            let (r, s) = (L::gather_quads::<2, 1>(poses, a), L::gather_quads::<2, 1>(poses, b));
-            Poses {
-                // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
-                centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
-                rotation: [[r[0], r[1]], [s[0], s[1]]],
-            }
+        let (p, q) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
+        let (r, s) = (L::gather_quads::<2, 1>(poses, a), L::gather_quads::<2, 1>(poses, b));
+        Poses {
+            // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
+            centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
+            rotation: [[r[0], r[1]], [s[0], s[1]]],
         }
     }
 
@@ -146,14 +136,10 @@ pub struct ShapePair<L> {
 
 impl<L: Lanes> ShapePair<L> {
     /// Reads `L::WIDTH` pairs of shapes.
-    ///
-    /// # Safety
-    /// Both lists hold at least `L::WIDTH` entries, each less than `rows.len()`.
     #[inline(always)]
-    pub unsafe fn gather(poses: Poses<L>, rows: &[ShapeRow], [a, b]: [&[u32]; 2]) -> Self {
-        // SAFETY: the caller keeps the indices in bounds.
-        let ([place_a, size_a], [place_b, size_b]) =
-            unsafe { (ShapeRow::gather(rows, a), ShapeRow::gather(rows, b)) };
+    pub fn gather(poses: Poses<L>, rows: &[ShapeRow], [a, b]: [LaneIndex<L::Index>; 2]) -> Self {
+        let [place_a, size_a] = ShapeRow::gather(rows, a);
+        let [place_b, size_b] = ShapeRow::gather(rows, b);
         ShapePair { poses, place: [place_a, place_b], size: [size_a, size_b] }
     }
 }
@@ -232,11 +218,4 @@ pub fn perp<L: Lanes>(v: [L; 2]) -> [L; 2] {
 #[inline(always)]
 pub fn abs<L: Lanes>(x: L) -> L {
     x.max(-x)
-}
-
-/// The one number in the first `width` entries of `index`, if there is only one.
-#[inline(always)]
-pub fn only(index: &[u32], width: usize) -> Option<usize> {
-    let different = index[..width].iter().fold(0, |bits, &i| bits | (i ^ index[0]));
-    (different == 0).then_some(index[0] as usize)
 }

@@ -20,6 +20,7 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
+use crate::engine::constraints::jacobi::JacobiRule;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::{Rigid, Soft};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, Parameter, Parameters};
@@ -71,17 +72,17 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, relaxation, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-    let soft = Soft::rule(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
-    let rigid = Rigid::rule(h);
+    let soft = JacobiRule::Soft(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
+    let rigid = JacobiRule::Rigid(Rigid::new(h));
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
-            passes.jacobi_sweep(Phase::Solve, &soft, relaxation);
+            passes.jacobi_sweep(Phase::Solve, soft, relaxation);
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {
-            passes.jacobi_sweep(Phase::Relax, &rigid, relaxation);
+            passes.jacobi_sweep(Phase::Relax, rigid, relaxation);
         }
         passes.end_substep(substep);
     }

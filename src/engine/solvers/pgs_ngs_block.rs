@@ -44,7 +44,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rigid = Rigid::rule(passes.h());
+    let rigid = Rigid::new(passes.h());
     let positions = PositionSweep {
         fraction: passes.parameter(0),
         slop: LINEAR_SLOP,
@@ -55,7 +55,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_velocities();
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
-            passes.block_sweep(Phase::Solve, &rigid);
+            passes.block_sweep(Phase::Solve, rigid);
         }
         passes.integrate_positions();
         for _ in 0..budget.position_iterations {

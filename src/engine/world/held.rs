@@ -21,7 +21,7 @@ use super::World;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, Timings};
-use crate::engine::constraints::{Batches, Features, WorkCount, Workspace};
+use crate::engine::constraints::{Features, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
@@ -74,7 +74,7 @@ impl World {
         self.frozen_step();
         self.timings = timings;
         let rows = self.work.rows.clone();
-        let buffers = [&self.work.lanes, &self.work.serial].map(|batches| used(batches).to_vec());
+        let buffers = [&self.work.lanes, &self.work.serial].map(|batches| batches.records().to_vec());
         let contacts = self.contacts.clone();
         HeldWorld { world: self, before, contacts, rows, buffers }
     }
@@ -111,11 +111,6 @@ impl World {
         }
         WorkCount::default()
     }
-}
-
-/// The blocks of a slab that hold records.
-fn used(batches: &Batches) -> &[Block] {
-    &batches.buffer[..(batches.vectors * batches.width).div_ceil(16)]
 }
 
 impl HeldWorld<'_> {
@@ -167,7 +162,7 @@ impl HeldWorld<'_> {
         let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
         rows.clone_from(&self.rows);
         for (batches, saved) in [lanes, serial].into_iter().zip(&self.buffers) {
-            batches.buffer[..saved.len()].copy_from_slice(saved);
+            batches.records_mut()[..saved.len()].copy_from_slice(saved);
         }
     }
 
@@ -205,7 +200,7 @@ impl HeldWorld<'_> {
             Phase::Prepare | Phase::Restitution | Phase::Store => laps[phase as usize].min(1),
             _ => laps[phase as usize],
         };
-        let counted_contacts = self.world.work.lanes.contact.len();
+        let counted_contacts = self.world.work.lanes.lanes();
         let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
         let rows = count.row_updates / passes.max(1) as usize;
         (passes > 0).then_some(Probe { phase, passes, rows, operations, counted_contacts })

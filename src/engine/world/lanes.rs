@@ -31,7 +31,7 @@ impl World {
         }
         self.counts.colors = self.assignment.colors;
         self.counts.overflow = self.assignment.overflow;
-        self.counts.lane_slots = work.lanes.contact.len() + work.serial.contact.len();
+        self.counts.lane_slots = work.lanes.lanes() + work.serial.lanes();
         self.counts.constraint_bytes = work.lanes.bytes() + work.serial.bytes();
         if features.restitution {
             let points = if features.two_points { 2 } else { 1 };

@@ -81,8 +81,7 @@ impl World {
         let w = &self.work;
         let mut records = Vec::new();
         for batches in [&w.lanes, &w.serial] {
-            records.extend(arrays![batches.segments, batches.contact, batches.row_a, batches.row_b]);
-            records.push((held(&batches.buffer), 4 * batches.vectors * batches.width));
+            records.extend(batches.memory());
         }
         records.push(opaque(w.lane_bounces.held_bytes() + w.serial_bounces.held_bytes()));
         Memory {

@@ -166,10 +166,10 @@ fn constraints(frozen: &HeldWorld<'_>, per_lane: impl Fn(&Layout, OppositeKind) 
     let (work, features) = (frozen.workspace(), frozen.features());
     let mut sum = Traffic::default();
     for batches in [&work.lanes, &work.serial] {
-        for segment in &batches.segments {
+        for segment in batches.segments() {
             let layout = Layout::for_features(&features, segment.opposite);
             let PerLane { floats, rows } = per_lane(&layout, segment.opposite);
-            let lanes = (segment.batches * batches.width) as f64;
+            let lanes = (segment.batches * batches.width()) as f64;
             sum.read += lanes * (4.0 * (floats[0] + rows[0]) as f64 + ROW * rows[0] as f64);
             sum.written += lanes * (4.0 * floats[1] as f64 + HALF * rows[1] as f64);
         }

@@ -14,8 +14,7 @@
 //! `x_B + T x_N = q̄`. The lexicographic rule compares rows of (q̄ | B⁻¹) / T_·c; the columns of B⁻¹
 //! are those of w₁ … w_n: unit vectors while basic, columns of T otherwise.
 
-use faer::Mat;
-use faer::linalg::solvers::Solve;
+use super::dense::{Lu, Matrix};
 use std::cmp::Ordering;
 
 /// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
@@ -57,7 +56,7 @@ const ZERO: f64 = 1e-13;
 /// A, q and the covering vector d > 0 should be scaled so that their largest entries are of order 1.
 /// In exact arithmetic any d does; where rounding spoils one path, another d takes a different one.
 /// `a` must be square, as long as `q` and `d`.
-pub fn lemke(a: &Mat<f64>, q: &[f64], d: &[f64], limit: usize) -> Lemke {
+pub fn lemke(a: &Matrix, q: &[f64], d: &[f64], limit: usize) -> Lemke {
     let n = q.len();
     let end = |outcome, pivots| Lemke { outcome, pivots };
     if q.iter().all(|&x| x >= 0.0) {
@@ -108,7 +107,7 @@ struct Tableau {
 
 impl Tableau {
     /// w basic, z and z₀ not: T = (−A | −d), q̄ = q.
-    fn new(a: &Mat<f64>, q: &[f64], d: &[f64]) -> Self {
+    fn new(a: &Matrix, q: &[f64], d: &[f64]) -> Self {
         let n = q.len();
         let mut t = Tableau {
             n,
@@ -183,7 +182,7 @@ impl Tableau {
     }
 
     /// Recomputes T and q̄ from the data for the present basis; false if it is singular.
-    fn rebuild(&mut self, a: &Mat<f64>, q: &[f64], d: &[f64]) -> bool {
+    fn rebuild(&mut self, a: &Matrix, q: &[f64], d: &[f64]) -> bool {
         let n = self.n;
         // Columns of (I | −A | −d), the coefficients of (w, z, z₀).
         let coefficient = |i: usize, variable: usize| {
@@ -195,22 +194,19 @@ impl Tableau {
                 -d[i]
             }
         };
-        let basis = Mat::from_fn(n, n, |i, j| coefficient(i, self.basic[j]));
-        let right = Mat::from_fn(n, n + 2, |i, j| match self.nonbasic.get(j) {
+        // Unit columns first, which cost the factorisation nothing.
+        self.basic.sort_unstable();
+        let basis = Matrix::from_fn(n, n, |i, j| coefficient(i, self.basic[j]));
+        let right = Matrix::from_fn(n, n + 2, |i, j| match self.nonbasic.get(j) {
             Some(&v) => coefficient(i, v),
             None => q[i],
         });
-        let lu = basis.partial_piv_lu();
-        let mut x = lu.solve(&right);
-        // One step of refinement: x += B⁻¹ (right − B x).
-        x += lu.solve(&right - &basis * &x);
-        if !(0..n + 2).all(|j| (0..n).all(|i| x[(i, j)].is_finite())) {
+        let Some(lu) = Lu::new(basis) else { return false };
+        let cells = lu.solve(&right).into_cells();
+        if !cells.iter().all(|x| x.is_finite()) {
             return false;
         }
-        self.cells.clear();
-        for i in 0..n {
-            self.cells.extend((0..n + 2).map(|j| x[(i, j)]));
-        }
+        self.cells = cells;
         true
     }
 
@@ -236,7 +232,7 @@ mod tests {
     use super::*;
 
     fn solve(a: &[&[f64]], q: &[f64]) -> Outcome {
-        let a = Mat::from_fn(q.len(), q.len(), |i, j| a[i][j]);
+        let a = Matrix::from_fn(q.len(), q.len(), |i, j| a[i][j]);
         lemke(&a, q, &vec![1.0; q.len()], 100).outcome
     }
 
@@ -266,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_limit_is_a_status() {
-        let a = Mat::from_fn(3, 3, |i, j| if i == j { 2.0 } else { 1.0 });
+        let a = Matrix::from_fn(3, 3, |i, j| if i == j { 2.0 } else { 1.0 });
         assert_eq!(lemke(&a, &[-1.0, -2.0, -3.0], &[1.0; 3], 0).outcome, Outcome::IterationLimit);
     }
 
@@ -274,7 +270,7 @@ mod tests {
     fn ties_do_not_cycle() {
         // All right-hand sides equal and A of rank one plus nothing: every ratio is a tie.
         let n = 30;
-        let a = Mat::from_fn(n, n, |_, _| 1.0);
+        let a = Matrix::from_fn(n, n, |_, _| 1.0);
         let Outcome::Solution(z) = lemke(&a, &vec![-1.0; n], &vec![1.0; n], 1000).outcome else {
             panic!("no solution")
         };
@@ -290,8 +286,12 @@ mod tests {
             (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
         for n in [5, 40, 260] {
-            let b = Mat::from_fn(n, n, |_, _| next());
-            let a = &b * b.transpose() + Mat::<f64>::identity(n, n);
+            let entries: Vec<f64> = (0..n * n).map(|_| next()).collect();
+            let b = Matrix::from_fn(n, n, |i, j| entries[j * n + i]);
+            let a = Matrix::from_fn(n, n, |i, j| {
+                let product: f64 = b.row(i).iter().zip(b.row(j)).map(|(x, y)| x * y).sum();
+                product + f64::from(u8::from(i == j))
+            });
             let q: Vec<f64> = (0..n).map(|_| next()).collect();
             let run = lemke(&a, &q, &vec![1.0; n], 20 * n);
             let Outcome::Solution(z) = run.outcome else { panic!("{n}: no solution") };

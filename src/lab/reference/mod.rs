@@ -1,23 +1,26 @@
 //! What the answer should have been: exact and certified solutions of one contact problem.
 //!
 //! Reading order: [`problem`] states the problem, [`residual`] the law and how far from it an
-//! answer is. [`stewart_trinkle`] solves small problems exactly through [`lcp`]; [`sweeps`],
-//! [`nncg`] and [`newton`] solve large ones. [`certify`] accepts an answer only with a
-//! certificate. [`statics`] asks without any time step whether rest is possible at all.
-//! [`frozen`] keeps problems in files, [`gallery`] holds problems solved by hand, [`rates`]
-//! measures convergence in iterations and in the step size.
+//! answer is. [`stewart_trinkle`] solves small problems exactly through [`lcp`] and [`dense`];
+//! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
+//! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
+//! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by
+//! hand, [`rates`] measures convergence in iterations and in the step size.
 //!
 //! Nothing here knows the simulation's own solvers, so that it can judge them.
 
 pub mod certify;
+pub mod dense;
 pub mod frozen;
 pub mod gallery;
 pub mod lcp;
 pub mod newton;
 pub mod nncg;
+pub mod nnls;
 pub mod problem;
 pub mod rates;
 pub mod residual;
+pub mod sparse;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;

@@ -26,10 +26,8 @@
 
 use super::problem::{Block, ContactProblem, Pair, ProblemContact};
 use super::residual::{OwnRow, Target, clamp, positive};
+use super::sparse;
 use super::sweeps::{Run, Status, Stop, Sweep, pgs};
-use faer::Col;
-use faer::linalg::solvers::Solve;
-use faer::sparse::{SparseColMat, Triplet};
 
 /// Symmetric sweeps before the first Newton step; doubled every time that a problem is left unsolved.
 const SWEEPS: usize = 20;
@@ -193,7 +191,7 @@ impl<'a> Proximal<'a> {
             _ => 0.0,
         };
 
-        let mut entries: Vec<Triplet<usize, usize, f64>> = Vec::new();
+        let mut entries: Vec<sparse::Entry> = Vec::new();
         for (body, touching) in contacts_of_bodies(self.problem, states).iter().enumerate() {
             let b = &self.problem.bodies[body];
             let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
@@ -204,32 +202,25 @@ impl<'a> Proximal<'a> {
                     };
                     for (d, &row) in index[*i].iter().enumerate().filter(|(_, r)| **r != usize::MAX) {
                         let normal = index[*j][0];
-                        let val = (g(d, 0) + slope(*j) * g(d, 1)) * scale[row] * scale[normal];
-                        entries.push(Triplet { row, col: normal, val });
+                        let value = (g(d, 0) + slope(*j) * g(d, 1)) * scale[row] * scale[normal];
+                        entries.push((normal, row, value));
                         if states[*j] == State::Stick {
-                            let col = index[*j][1];
-                            entries.push(Triplet { row, col, val: g(d, 1) * scale[row] * scale[col] });
+                            let tangent = index[*j][1];
+                            entries.push((tangent, row, g(d, 1) * scale[row] * scale[tangent]));
                         }
                     }
                 }
             }
         }
         let free = self.problem.velocities(&vec![[0.0; 2]; states.len()]);
-        let mut right = Col::<f64>::zeros(n);
+        let mut right = vec![0.0; n];
         for (u, &(i, d)) in unknowns.iter().enumerate() {
             let law = if d == 0 { self.law[i] } else { OwnRow::default() };
             let velocity = self.problem.contacts[i].velocity(&free)[d] + law.bias;
             right[u] = -velocity * scale[u] + self.shift * self.center[i][d] / scale[u];
-            let val = law.compliance * scale[u] * scale[u] + self.shift;
-            entries.push(Triplet { row: u, col: u, val });
+            entries.push((u, u, law.compliance * scale[u] * scale[u] + self.shift));
         }
-        let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).ok()?;
-        let factors = matrix.sp_lu().ok()?;
-        let mut x = factors.solve(&right);
-        x += factors.solve(&right - &matrix * &x);
-        if !x.iter().all(|x| x.is_finite()) {
-            return None;
-        }
+        let x = sparse::solve(entries, &right)?;
         let mut impulses = vec![[0.0; 2]; states.len()];
         for (u, &(i, d)) in unknowns.iter().enumerate() {
             impulses[i][d] = x[u] * scale[u];

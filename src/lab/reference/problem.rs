@@ -17,8 +17,8 @@
 //!
 //! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
 
+use super::dense::Matrix;
 use crate::lab::error::Error;
-use faer::Mat;
 use serde::{Deserialize, Serialize};
 
 /// Velocity of a body: (m/s, m/s, rad/s).
@@ -220,8 +220,8 @@ impl ContactProblem {
     }
 
     /// Dense G, rows and columns (n₀, t₀, n₁, t₁, …), 1/kg.
-    pub fn delassus(&self) -> Mat<f64> {
-        let mut g = Mat::zeros(2 * self.contacts.len(), 2 * self.contacts.len());
+    pub fn delassus(&self) -> Matrix {
+        let mut g = Matrix::zeros(2 * self.contacts.len(), 2 * self.contacts.len());
         let mut v = vec![[0.0; 3]; self.bodies.len()];
         for (j, c) in self.contacts.iter().enumerate() {
             for direction in 0..2 {

@@ -1,17 +1,35 @@
 //! Statics: is rest possible at all, and how much may be added before it is not?
 //!
 //! Rest under loads f (N·s over a step, or N) is possible exactly if impulses within their friction
-//! cones balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. That is a linear program, so the answer
-//! needs no time step and no iteration of contact laws. If rest is impossible every correct
-//! solver must show motion; if it is possible, rest is *a* solution, with friction not always the
-//! only one.
+//! cones balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. So the answer needs no time step and no
+//! iteration of contact laws. If rest is impossible every correct solver must show motion; if it is
+//! possible, rest is *a* solution, with friction not always the only one.
 //!
-//! The loads are divided by their largest component and rotations by a length, so that the
-//! tolerances of the simplex method (10⁻⁸ or so) have a meaning.
+//! The cone of a contact is spanned by its edges n ± µ t, and the loads that the contacts can give are
+//! the cone K of all edges together. Rest is possible exactly if −f lies in K, which the point of K
+//! nearest to −f decides ([`super::nnls`]). If it does not, what remains, r, is a velocity of the
+//! bodies at which f works and no contact can: the mechanism of collapse.
+//!
+//! **How much load.** Every r that makes no acute angle with an edge allows rest under b + α d only
+//! while r·(b + α d) ≥ 0. So begin with the r of d alone, and while rest is impossible at the α that
+//! this inequality allows, go on with the r found there. α falls to the largest possible one in as
+//! many steps as there are mechanisms on the way, each of which cuts off all α beyond a face of K.
+//!
+//! Moments are divided by the longest arm and loads by their length, so that tolerances have a meaning.
+//!
+//! **Source**: the static and the kinematic theorem of limit analysis, in Livesley 1978, *Limit analysis
+//! of structures formed from rigid blocks*, there as a linear program and its dual.
 
+use super::nnls::{dot, norm, remainder};
 use super::problem::{ContactProblem, Velocity};
 use crate::lab::error::Error;
-use good_lp::{Expression, ProblemVariables, ResolutionError, Solution, SolverModel, constraint, variable};
+
+/// Remainder, relative to the load, up to which it counts as balanced.
+const BALANCED: f64 = 1e-10;
+/// Rounds of least squares allowed per edge; typical runs need less than one.
+const ROUNDS_PER_EDGE: usize = 20;
+/// Mechanisms allowed on the way to a collapse load; typical runs meet two to ten.
+const MECHANISMS: usize = 1000;
 
 /// How far a disturbance may grow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,16 +44,9 @@ pub enum Collapse {
 
 /// Whether contacts with a gap of at most `closed` (m) can hold the bodies at rest under `loads`
 /// (as [`ContactProblem::loads`]).
-///
-/// Maximises α in Jᵀ λ + α f = 0, 0 ≤ α ≤ 1. Cones scale, so the maximum is 0 or 1, and no
-/// tolerance decides.
 pub fn rest_is_possible(problem: &ContactProblem, loads: &[Velocity], closed: f64) -> Result<bool, Error> {
-    let none = vec![[0.0; 3]; loads.len()];
-    match maximise(problem, &none, loads, Some(1.0), closed)? {
-        Collapse::At(share) => Ok(share > 0.5),
-        Collapse::Never => Ok(true),
-        Collapse::NoRest => Ok(false),
-    }
+    let cone = Cone::new(problem, closed)?;
+    Ok(cone.mechanism(&cone.column("loads", loads)?)?.is_none())
 }
 
 /// The largest α with rest under `loads` + α `disturbance`.
@@ -45,74 +56,99 @@ pub fn collapse(
     disturbance: &[Velocity],
     closed: f64,
 ) -> Result<Collapse, Error> {
-    if !rest_is_possible(problem, loads, closed)? {
+    let cone = Cone::new(problem, closed)?;
+    let (loads, disturbance) = (cone.column("loads", loads)?, cone.column("disturbance", disturbance)?);
+    if cone.mechanism(&loads)?.is_some() {
         return Ok(Collapse::NoRest);
     }
-    maximise(problem, loads, disturbance, None, closed)
+    // What can be balanced can be balanced any number of times; and if every α can be, so can the limit
+    // of (loads + α disturbance)/α.
+    let Some(mut mechanism) = cone.mechanism(&disturbance)? else { return Ok(Collapse::Never) };
+    for _ in 0..MECHANISMS {
+        // The disturbance drives the mechanism (r·d < 0), the loads resist it (r·b ≥ 0).
+        let share = (dot(&mechanism, &loads) / -dot(&mechanism, &disturbance)).max(0.0);
+        let together: Vec<f64> = loads.iter().zip(&disturbance).map(|(b, d)| b + share * d).collect();
+        match cone.mechanism(&together)? {
+            Some(next) if share > 0.0 => mechanism = next,
+            _ => return Ok(Collapse::At(share)),
+        }
+    }
+    Err(Error::invalid(problem.name.clone(), format!("no collapse load in {MECHANISMS} mechanisms")))
 }
 
-/// Largest α ≥ 0 (≤ `cap`) with Jᵀ λ + base + α direction = 0 within the cones.
-fn maximise(
-    problem: &ContactProblem,
-    base: &[Velocity],
-    direction: &[Velocity],
-    cap: Option<f64>,
-    closed: f64,
-) -> Result<Collapse, Error> {
-    problem.validate()?;
-    for (name, loads) in [("loads", base), ("disturbance", direction)] {
-        let wrong = || format!("{} entries for {} bodies", loads.len(), problem.bodies.len());
-        if loads.len() != problem.bodies.len() {
-            return Err(Error::invalid(name, wrong()));
+/// What contacts can give the bodies.
+struct Cone<'a> {
+    problem: &'a ContactProblem,
+    /// Components that must balance, (body, 0..3): those of infinite mass are held by themselves.
+    rows: Vec<(usize, usize)>,
+    /// By which moments are divided (m).
+    arm: f64,
+    /// Edges of length 1.
+    edges: Vec<Vec<f64>>,
+}
+
+impl<'a> Cone<'a> {
+    fn new(problem: &'a ContactProblem, closed: f64) -> Result<Self, Error> {
+        problem.validate()?;
+        let components = problem.bodies.iter().enumerate().flat_map(|(body, b)| {
+            let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+            (0..3).filter(move |&k| inverse[k] > 0.0).map(move |k| (body, k))
+        });
+        let rows = components.collect();
+        let closed: Vec<_> = problem.contacts.iter().filter(|c| c.gap <= closed).collect();
+        let arms = closed.iter().flat_map(|c| c.sides()).flat_map(|(_, [n, t])| [n[2].abs(), t[2].abs()]);
+        let arm = arms.reduce(f64::max).filter(|&arm| arm > 0.0).unwrap_or(1.0);
+        let mut cone = Cone { problem, rows, arm, edges: Vec::new() };
+        for c in closed {
+            let slopes: &[f64] = if c.friction > 0.0 { &[c.friction, -c.friction] } else { &[0.0] };
+            for slope in slopes {
+                let mut loads = vec![[0.0; 3]; problem.bodies.len()];
+                for (body, [n, t]) in c.sides() {
+                    loads[body] = [0, 1, 2].map(|k| n[k] + slope * t[k]);
+                }
+                let edge = cone.in_rows(&loads);
+                // A side that answers to some impulses may be held against this one.
+                let length = norm(&edge);
+                if length > 0.0 {
+                    cone.edges.push(edge.into_iter().map(|x| x / length).collect());
+                }
+            }
+        }
+        Ok(cone)
+    }
+
+    fn in_rows(&self, loads: &[Velocity]) -> Vec<f64> {
+        let unit = [1.0, 1.0, self.arm];
+        self.rows.iter().map(|&(body, k)| loads[body][k] / unit[k]).collect()
+    }
+
+    /// Loads in the rows of this cone, if they are loads of the problem.
+    fn column(&self, name: &str, loads: &[Velocity]) -> Result<Vec<f64>, Error> {
+        if loads.len() != self.problem.bodies.len() {
+            let message = format!("{} entries for {} bodies", loads.len(), self.problem.bodies.len());
+            return Err(Error::invalid(name, message));
         }
         if let Some(i) = loads.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             return Err(Error::invalid(format!("{name}[{i}]"), format!("{:?} is not finite", loads[i])));
         }
-    }
-    let largest = |loads: &[Velocity]| loads.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let unit = if largest(base) > 0.0 { largest(base) } else { largest(direction) };
-    if largest(direction) == 0.0 {
-        return Ok(Collapse::Never);
+        Ok(self.in_rows(loads))
     }
 
-    let mut variables = ProblemVariables::new();
-    let share = variables.add(cap.map_or(variable().min(0.0), |cap| variable().min(0.0).max(cap)));
-    let mut balance: Vec<[Expression; 3]> = (0..problem.bodies.len())
-        .map(|b| [0, 1, 2].map(|k| share * (direction[b][k] / unit) + base[b][k] / unit))
-        .collect();
-    let mut cones = Vec::new();
-    for c in problem.contacts.iter().filter(|c| c.gap <= closed) {
-        let normal = variables.add(variable().min(0.0));
-        let tangent = (c.friction > 0.0).then(|| variables.add(variable()));
-        for (body, [n, t]) in c.sides() {
-            for k in 0..3 {
-                balance[body][k] += n[k] * normal;
-                if let Some(tangent) = tangent {
-                    balance[body][k] += t[k] * tangent;
-                }
+    /// The mechanism by which contacts give way under `load`, of any length; none if they bear it.
+    fn mechanism(&self, load: &[f64]) -> Result<Option<Vec<f64>>, Error> {
+        let length = norm(load);
+        if length == 0.0 {
+            return Ok(None);
+        }
+        let wanted: Vec<f64> = load.iter().map(|x| -x / length).collect();
+        let limit = ROUNDS_PER_EDGE * self.edges.len() + 100;
+        match remainder(&self.edges, &wanted, limit) {
+            Some(rest) => Ok((norm(&rest) > BALANCED).then_some(rest)),
+            None => {
+                let message = format!("statics found no balance in {limit} rounds");
+                Err(Error::invalid(self.problem.name.clone(), message))
             }
         }
-        if let Some(tangent) = tangent {
-            cones.push(constraint!(tangent <= c.friction * normal));
-            cones.push(constraint!(-tangent <= c.friction * normal));
-        }
-    }
-    let mut model = variables.maximise(share).using(good_lp::microlp);
-    for (body, balance) in problem.bodies.iter().zip(balance) {
-        // Components of infinite mass are held by themselves.
-        let held = [body.inv_mass, body.inv_mass, body.inv_inertia].map(|inverse| inverse == 0.0);
-        for (sum, _) in balance.into_iter().zip(held).filter(|(_, held)| !held) {
-            model.add_constraint(constraint!(sum == 0.0));
-        }
-    }
-    cones.into_iter().for_each(|cone| {
-        model.add_constraint(cone);
-    });
-    match model.solve() {
-        Ok(solution) => Ok(Collapse::At(solution.value(share))),
-        Err(ResolutionError::Unbounded) => Ok(Collapse::Never),
-        Err(ResolutionError::Infeasible) => Ok(Collapse::NoRest),
-        Err(e) => Err(Error::invalid(problem.name.clone(), format!("the linear program failed: {e}"))),
     }
 }
 

@@ -22,10 +22,10 @@
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
 
+use super::dense::Matrix;
 use super::lcp::{Outcome, lemke};
 use super::problem::{ContactProblem, Pair};
 use super::residual::{Target, natural_map};
-use faer::Mat;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
@@ -61,7 +61,7 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<P
         }
     };
     let slip = |k: usize| nc + 2 * nf + k;
-    let mut a = Mat::from_fn(n, n, |row, column| match (impulse_row(row), impulse_row(column)) {
+    let mut a = Matrix::from_fn(n, n, |row, column| match (impulse_row(row), impulse_row(column)) {
         (Some((i, di, si)), Some((j, dj, sj))) => {
             let compliance = if row == column && di == 0 { target.row(problem, i).compliance } else { 0.0 };
             si * sj * (g[(2 * i + di, 2 * j + dj)] + compliance) * scale[i][di] * scale[j][dj]

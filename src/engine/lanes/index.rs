@@ -1,0 +1,208 @@
+//! Indices with a bound: what gathers and scatters go by.
+//!
+//! A gather reads `rows[index[lane]]` in all lanes at once and checks no lane by itself. It checks that
+//! the **bound** of the indices does not exceed the number of rows, which is one comparison, the same for
+//! all batches of a list. What makes that enough is the invariant of the three types below: *every
+//! entry is less than the bound*. Their fields are private, entries are only added by what raises
+//! the bound with them, and nothing lends an entry to be changed. This file is safe code; the
+//! unsafe code of [`super::quads`] and [`super::rows`] rests on it and on nothing else.
+
+use bytemuck::Pod;
+use std::ops::{Deref, Range};
+
+/// Where the entries of `list` end: one more than the largest. No slice of anything is so long that
+/// the saturated bound of `u32::MAX` fits where addresses have 32 bits.
+fn bound_of(list: &[u32]) -> usize {
+    // Found in lanes, where a search for the first bad entry would not be.
+    let largest = list.iter().fold(0, |most, &i| i.max(most));
+    if list.is_empty() { 0 } else { (largest as usize).saturating_add(1) }
+}
+
+/// A growable list of indices.
+#[derive(Clone, Debug, Default)]
+pub struct Indices {
+    entries: Vec<u32>,
+    bound: usize,
+}
+
+impl Indices {
+    /// Empties the list; its memory is kept.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+        self.bound = 0;
+    }
+
+    /// Appends an entry.
+    #[inline]
+    pub fn push(&mut self, index: u32) {
+        self.bound = self.bound.max((index as usize).saturating_add(1));
+        self.entries.push(index);
+    }
+
+    /// Appends `index` until there are `len` entries. A longer list stays as it is.
+    pub fn fill_to(&mut self, len: usize, index: u32) {
+        if len > self.entries.len() {
+            self.bound = self.bound.max((index as usize).saturating_add(1));
+            self.entries.resize(len, index);
+        }
+    }
+
+    /// The entries with their bound.
+    pub fn list(&self) -> IndexList<'_> {
+        IndexList { entries: &self.entries, bound: self.bound }
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        super::held(&self.entries)
+    }
+}
+
+impl Deref for Indices {
+    type Target = [u32];
+    fn deref(&self) -> &[u32] {
+        &self.entries
+    }
+}
+
+/// A borrowed list of indices, or a part of one.
+#[derive(Clone, Copy, Debug)]
+pub struct IndexList<'a> {
+    entries: &'a [u32],
+    bound: usize,
+}
+
+impl<'a> IndexList<'a> {
+    /// Finds the bound of `entries`.
+    pub fn new(entries: &'a [u32]) -> Self {
+        IndexList { entries, bound: bound_of(entries) }
+    }
+
+    /// Every entry is less.
+    #[inline(always)]
+    pub fn bound(self) -> usize {
+        self.bound
+    }
+
+    /// The entries.
+    #[inline(always)]
+    pub fn entries(self) -> &'a [u32] {
+        self.entries
+    }
+
+    /// A part of the list.
+    ///
+    /// # Panics
+    /// If the list does not have it.
+    #[inline(always)]
+    pub fn part(self, range: Range<usize>) -> Self {
+        IndexList { entries: &self.entries[range], bound: self.bound }
+    }
+
+    /// The list batch by batch.
+    ///
+    /// # Panics
+    /// If the last batch is not whole.
+    #[inline(always)]
+    pub fn batches<I: Pod>(self) -> impl ExactSizeIterator<Item = LaneIndex<'a, I>> {
+        let bound = self.bound;
+        bytemuck::cast_slice(self.entries).iter().map(move |entries| LaneIndex { entries, bound })
+    }
+
+    /// The batch that begins at entry `first`. If the list ends before the batch does, it is made in
+    /// `room` and filled up with that entry.
+    ///
+    /// # Panics
+    /// If there is no entry `first`.
+    #[inline(always)]
+    pub fn batch_at<'b, I: Pod>(self, first: usize, room: &'b mut [u32; MOST_LANES]) -> LaneIndex<'b, I>
+    where
+        'a: 'b,
+    {
+        let (rest, bound) = (&self.entries[first..], self.bound);
+        let lanes = size_of::<I>() / size_of::<u32>();
+        if let Some(whole) = rest.get(..lanes) {
+            return LaneIndex { entries: first_of(whole), bound };
+        }
+        room.fill(rest[0]);
+        room[..rest.len()].copy_from_slice(rest);
+        LaneIndex { entries: first_of(room), bound }
+    }
+}
+
+/// The most lanes that there are.
+pub const MOST_LANES: usize = 16;
+
+/// The beginning of `list` as one batch.
+#[inline(always)]
+fn first_of<I: Pod>(list: &[u32]) -> &I {
+    &bytemuck::cast_slice(list)[0]
+}
+
+/// The indices of one batch. `I` is `[u32; WIDTH]` ([`super::Lanes::Index`]).
+#[derive(Clone, Copy, Debug)]
+pub struct LaneIndex<'a, I> {
+    entries: &'a I,
+    bound: usize,
+}
+
+impl<'a, I: Pod> LaneIndex<'a, I> {
+    /// The first entries of `list`, as many as there are lanes; finds their bound.
+    #[inline(always)]
+    pub fn new(list: &'a [u32; MOST_LANES]) -> Self {
+        let entries = first_of::<I>(list);
+        LaneIndex { entries, bound: bound_of(bytemuck::cast_slice(std::slice::from_ref(entries))) }
+    }
+
+    /// Every entry is less.
+    #[inline(always)]
+    pub fn bound(self) -> usize {
+        self.bound
+    }
+
+    /// The entries, an array.
+    #[inline(always)]
+    pub fn array(self) -> &'a I {
+        self.entries
+    }
+
+    /// The entries.
+    #[inline(always)]
+    pub fn entries(self) -> &'a [u32] {
+        bytemuck::cast_slice(std::slice::from_ref(self.entries))
+    }
+
+    /// The one index in all lanes, if there is only one.
+    #[inline(always)]
+    pub fn only(self) -> Option<usize> {
+        let entries = self.entries();
+        let different = entries.iter().fold(0, |bits, &i| bits | (i ^ entries[0]));
+        (different == 0).then_some(entries[0] as usize)
+    }
+}
+
+impl<'a, const W: usize> LaneIndex<'a, [u32; W]> {
+    /// The first and the second half of the lanes.
+    #[inline(always)]
+    pub(super) fn halves<const H: usize>(self) -> [LaneIndex<'a, [u32; H]>; 2] {
+        let [a, b]: &[[u32; H]; 2] = bytemuck::cast_ref(self.entries);
+        [a, b].map(|entries| LaneIndex { entries, bound: self.bound })
+    }
+}
+
+/// Whether records of `stride` parts each, `parts` in all, are as many as `bound` asks for.
+///
+/// # Panics
+/// If not.
+#[inline(always)]
+pub(super) fn assert_fits(bound: usize, parts: usize, stride: usize) {
+    if bound > parts / stride {
+        beyond(bound, parts / stride);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn beyond(bound: usize, rows: usize) -> ! {
+    panic!("index {} where there are {rows} rows", bound - 1)
+}
