@@ -175,7 +175,7 @@ pub struct RunArgs {
     /// Lays out random scenes
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Write step,time,body,x,y,angle,vx,vy,omega
+    /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
     #[arg(long, value_name = "FILE.csv")]
     pub state: Option<PathBuf>,
     /// Write contact points with their impulses (N·s over the step)

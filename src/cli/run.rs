@@ -9,6 +9,7 @@ use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::metrics::Observation;
+use crate::lab::metrics::state::Angles;
 use crate::lab::overrides;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, si};
@@ -46,6 +47,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
 
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
+    let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
     let mut times = Times::default();
     for step in 1..=scene.steps {
         let due = args.every.map_or(step == scene.steps, |every| step % every == 0);
@@ -59,6 +61,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         times.add(&world.timings);
         observation.observe(&world);
         watch.observe(&world);
+        angles.add(&world);
         if let Some(blow_up) = observation.blown_up() {
             return Ok(Ending::Diverged(blow_up.into()));
         }
@@ -66,7 +69,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
             truth.observer.observe(&world);
         }
         if due && let Some(sheet) = &mut state {
-            write_state(sheet, &world, scene.dt)?;
+            write_state(sheet, &world, &angles, scene.dt)?;
         }
         if due && let Some(sheet) = &mut contacts {
             write_contacts(sheet, &world, &starts)?;
@@ -237,13 +240,13 @@ impl Sheet {
     }
 }
 
-/// A line per body: origin, angle and velocity of the centre of mass.
-fn write_state(sheet: &mut Sheet, world: &World, dt: f64) -> Result<(), Error> {
+/// A line per body: origin, angle with all turns since the start, velocity of the centre of mass.
+fn write_state(sheet: &mut Sheet, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
         let omega = world.bodies.angular_velocity[i];
-        let pose = (origin[0], origin[1], world.bodies.angle(i));
+        let pose = (origin[0], origin[1], angles.of(i));
         sheet.row((world.step_index, time, i, pose, velocity.x, velocity.y, omega))?;
     }
     Ok(())

@@ -6,7 +6,7 @@
 //!
 //! | error | says | computed in |
 //! |---|---|---|
-//! | penetration | how deep bodies overlap *after* the step, found by colliding anew | [`Observation`] |
+//! | penetration | how deep bodies overlap *after* the step, pairs searched anew | [`overlaps`] |
 //! | excess penetration | what of that soft contacts do not account for, at rest | [`softness`] |
 //! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
 //! | complementarity, cone, dissipation | which part of the law is broken | [`violation`] |
@@ -32,14 +32,13 @@ pub mod velocity;
 pub mod violation;
 
 use crate::engine::bodies::BodyKind;
-use crate::engine::contacts::Contact;
-use crate::engine::narrowphase::collide;
-use crate::engine::params::SPECULATIVE_DISTANCE;
+use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::world::{Divergence, World};
 use balance::{Balance, ratio, weight};
 use distribution::Distribution;
 use glam::{DVec2, Vec2};
 use law::{BodyStep, PointStep};
+use overlaps::Overlaps;
 use rest::Rest;
 use softness::{Depths, RestDepths};
 use state::BodyState;
@@ -51,15 +50,15 @@ use violation::Violation;
 pub struct Errors {
     /// Steps observed.
     pub steps: u64,
-    /// Contact points observed, over all steps.
+    /// Points at which shapes were as near as a contact after a step, over all steps.
     pub points: u64,
     /// Deepest overlap (m).
     pub penetration_max: f64,
-    /// Mean overlap of contact points, open ones counted as zero (m).
+    /// Mean overlap of such points, open ones counted as zero (m).
     pub penetration_mean: f64,
     /// Root mean square of the same (m).
     pub penetration_rms: f64,
-    /// What 99 % of the contact points do not exceed (m).
+    /// What 99 % of such points do not exceed (m).
     pub penetration_p99: f64,
     /// Deepest overlap, in half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
@@ -143,6 +142,7 @@ pub struct Observation {
     /// Dynamic bodies that have weight.
     heavy: usize,
     steps: u64,
+    overlaps: Overlaps,
     penetration: Distribution,
     normal: Residuals,
     tangent: Residuals,
@@ -176,6 +176,7 @@ impl Observation {
             heavy: previous.iter().filter(|b| b.inv_mass > 0.0 && b.force.length() > 0.0).count(),
             previous,
             steps: 0,
+            overlaps: Overlaps::default(),
             penetration: Distribution::default(),
             normal: Residuals::default(),
             tangent: Residuals::default(),
@@ -228,22 +229,24 @@ impl Observation {
         self.blown_up
     }
 
-    /// Collides the step's contacts anew, where their bodies are now.
+    /// Finds what overlaps where bodies are now: bodies that met within the step had no contact.
     fn add_penetrations(&mut self, world: &World, points: &[([usize; 2], PointStep)]) {
-        let mut depths = Depths::default();
-        let mut steps = points;
-        for contact in &world.contacts {
-            let (own, rest) = steps.split_at(contact.manifold.count as usize);
-            steps = rest;
-            let [a, b] = [contact.shape_a, contact.shape_b].map(|s| &world.shapes[s as usize]);
-            let [pose_a, pose_b] =
-                world.bodies.relative_poses(contact.body_a as usize, contact.body_b as usize);
-            let manifold = collide(a, &pose_a, b, &pose_b, SPECULATIVE_DISTANCE);
-            for point in manifold.points() {
-                self.penetration.add(-point.separation as f64);
-                let floor = self.floor(world, contact, own, point.feature_id);
-                depths.add(-point.separation as f64, floor);
+        let (mut depths, mut found) = (Depths::default(), Vec::new());
+        // Pairs and contacts ascend alike.
+        let (mut contacts, mut steps) = (world.contacts.iter().peekable(), points);
+        self.overlaps.find(world, |[a, b], manifold| {
+            while let Some(contact) = contacts.next_if(|c| c.key() < pair_key(a, b)) {
+                steps = &steps[contact.manifold.count as usize..];
             }
+            let known = contacts.peek().filter(|c| c.key() == pair_key(a, b));
+            let known = known.map(|&contact| (contact, steps));
+            found.extend(manifold.points().iter().map(|&point| (known, point)));
+        });
+        for (known, point) in found {
+            let depth = -point.separation as f64;
+            self.penetration.add(depth);
+            let floor = known.map_or(0.0, |(contact, own)| self.floor(world, contact, own, point.feature_id));
+            depths.add(depth, floor);
         }
         self.depths.add(depths, self.dt);
     }

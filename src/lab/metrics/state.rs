@@ -1,7 +1,9 @@
 //! The state of a body in double precision, and what can be summed over it.
 
 use crate::engine::bodies::{Bodies, BodyKind};
+use crate::engine::world::World;
 use glam::{DVec2, Vec2};
+use std::f64::consts::TAU;
 
 /// One body at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +95,51 @@ pub fn shadow_energy_change(before: &BodyState, after: &BodyState, h: f64) -> f6
         + 0.5 * h * force.dot(after.velocity - before.velocity)
         - torque * after.turn_since(before)
         + 0.5 * h * torque * (after.angular_velocity - before.angular_velocity)
+}
+
+/// Angles of bodies since the start, however many turns they have made; a rotation alone tells an
+/// angle but for whole turns.
+#[derive(Clone, Debug)]
+pub struct Angles {
+    dt: f64,
+    /// rad
+    angles: Vec<f64>,
+    /// Directions and spins after the last step.
+    last: Vec<(DVec2, f64)>,
+}
+
+impl Angles {
+    /// Begins with these angles (rad), by body; missing ones are zero.
+    pub fn new(world: &World, start: impl IntoIterator<Item = f64>) -> Self {
+        let last = states(&world.bodies);
+        let mut angles: Vec<f64> = start.into_iter().collect();
+        angles.resize(last.len(), 0.0);
+        Angles { dt: world.settings.dt as f64, angles, last }
+    }
+
+    /// Adds the step that the world has just taken: of all turns that end in its direction, a body
+    /// has made the one that is nearest to its mean spin.
+    pub fn add(&mut self, world: &World) {
+        let now = states(&world.bodies);
+        let steps = self.last.iter().zip(&now);
+        for (angle, ((before, spin_before), (after, spin_after))) in self.angles.iter_mut().zip(steps) {
+            let expected = 0.5 * (spin_before + spin_after) * self.dt;
+            let turn = before.perp_dot(*after).atan2(before.dot(*after));
+            *angle += turn + TAU * ((expected - turn) / TAU).round();
+        }
+        self.last = now;
+    }
+
+    /// The angle of body `i` (rad).
+    pub fn of(&self, i: usize) -> f64 {
+        self.angles[i]
+    }
+}
+
+/// Direction and spin (rad/s) of every body.
+fn states(bodies: &Bodies) -> Vec<(DVec2, f64)> {
+    let of = |i: usize| (bodies.pose(i).rotation.as_dvec2(), bodies.angular_velocity[i] as f64);
+    (0..bodies.len()).map(of).collect()
 }
 
 #[cfg(test)]
