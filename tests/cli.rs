@@ -1,5 +1,6 @@
 //! The program as a user meets it: what it refuses, and what a small study leaves behind.
 
+use simpulse::engine::solvers::VARIANTS;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -55,8 +56,8 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
-        (&["run", "stack:2", "--contact-hertz", "-3"], &["contact_hertz", "-3"]),
-        (&["study", "--contact-hertz", "nan"], &["contact_hertz", "NaN"]),
+        (&["run", "stack:2", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
+        (&["study", "--set", "contact_hertz=nan"], &["contact_hertz", "NaN"]),
         (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
         (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
@@ -181,8 +182,8 @@ fn a_small_study_leaves_whole_files() {
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // 2 scenes × 3 solvers × 3 budgets × (natural order and 2 widths).
-    assert_eq!(rows.len(), 2 * 3 * 3 * 3);
+    // 2 scenes × all solvers × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 2 * VARIANTS.len() * 3 * 3);
     for row in &rows {
         for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
             let value: f64 = row[column(name)].parse().unwrap();
