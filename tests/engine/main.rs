@@ -6,3 +6,4 @@ mod motion;
 mod narrow_batches;
 mod narrowphase;
 mod shapes;
+mod soundness;

@@ -5,7 +5,10 @@
 //! from record `4q + k`, so that one 4 × 4 transpose of each 128-bit lane (8 shuffles for any
 //! width) puts component `c` of records `0..W`, in order, into vector `c`.
 
-#![allow(unsafe_code)] // Loads and stores at addresses; [`super::index`] upholds what they rest on.
+#![allow(
+    unsafe_code,
+    reason = "loads and stores by index, which `index` keeps in bounds; vector instructions"
+)]
 
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
