@@ -7,3 +7,5 @@ mod narrow_batches;
 mod narrowphase;
 mod shapes;
 mod soundness;
+mod structure;
+mod tutorial;

@@ -3,10 +3,12 @@
 //! without a read or write out of place. Run it under valgrind as well (README, Benches).
 
 use simpulse::engine::clock::Clock;
-use simpulse::engine::constraints::problem::{Problem, StepInput};
 use simpulse::engine::constraints::restitution::{self, Bounces};
+use simpulse::engine::constraints::rules::Rigid;
 use simpulse::engine::constraints::sweep::{self, position_sweep, sweep, sweep_store, warm_start};
-use simpulse::engine::constraints::{Batches, Features, Kernel, Layout, OppositeKind, Workspace, prepare};
+use simpulse::engine::constraints::{
+    Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace, prepare,
+};
 use simpulse::engine::contacts::{Contact, quad};
 use simpulse::engine::lanes::{
     BodyRow, Counted, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns,
@@ -17,7 +19,6 @@ use simpulse::engine::narrowphase::hull::{Hull, HullRow};
 use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
 use simpulse::engine::params::Budget;
 use simpulse::engine::shapes::Shape;
-use simpulse::engine::solvers::soft_step::RigidRule;
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use wide::{f32x4, f32x8, f32x16};
@@ -25,7 +26,9 @@ use wide::{f32x4, f32x8, f32x16};
 type Full = Kernel<true, true, 2>;
 type Bare = Kernel<false, false, 1>;
 
-const RULE: RigidRule = RigidRule { inv_h: 60.0 };
+const RULE: Rigid = Rigid { inv_h: 60.0 };
+const POSITION: PositionSweep =
+    PositionSweep { fraction: 0.2, slop: 0.005, max_correction: 0.2, turned: true };
 /// As far out as an index can point, and just past the end of the rows below.
 const FAR: [u32; 3] = [u32::MAX, 1_000_000_000, ROWS as u32];
 /// Rows of the good batches, the inert one among them, and contacts.
@@ -117,11 +120,11 @@ fn row_passes<L: Lanes>() -> [Pass; 7] {
             sweep_store::<L, Full, _, _>(&mut RowColumns::from_rows(&g.rows), &mut g.batches, RULE);
         }),
         ("warm_start", |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
-        ("position_sweep", |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, 0.2)),
+        ("position_sweep", |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
         ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
         ("restitution::prepare", |g| {
             restitution::prepare::<L, Full>(
-                &mut g.rows,
+                &g.rows,
                 &mut g.batches,
                 &mut g.bounces,
                 &g.contacts,
@@ -139,10 +142,10 @@ fn row_passes<L: Lanes>() -> [Pass; 7] {
 fn contact_passes<L: Lanes>() -> [Pass; 3] {
     [
         ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
-        ("store", |g| prepare::store::<L, Full>(&mut g.rows, &mut g.batches, &mut g.contacts)),
+        ("store", |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
         ("restitution::prepare", |g| {
             restitution::prepare::<L, Full>(
-                &mut g.rows,
+                &g.rows,
                 &mut g.batches,
                 &mut g.bounces,
                 &g.contacts,
@@ -157,10 +160,10 @@ fn contact_passes<L: Lanes>() -> [Pass; 3] {
 fn bounce_passes<L: Lanes>() -> [Pass; 2] {
     [
         ("restitution::track", |g| {
-            restitution::track::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces);
+            restitution::track::<L, Full>(&mut g.batches, &mut g.bounces);
         }),
         ("restitution::forget", |g| {
-            restitution::forget::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces);
+            restitution::forget::<L, Full>(&mut g.batches, &mut g.bounces);
         }),
     ]
 }
@@ -273,8 +276,8 @@ fn wrong_layout<L: Lanes>() {
     let mut g = Given::new(good(L::WIDTH)).with_bounces::<L>();
     panics(words, || sweep::<L, Bare, _>(&mut g.rows, &mut g.batches, RULE));
     panics(words, || prepare::prepare::<L, Bare>(&mut g.rows, &mut g.batches, &g.contacts));
-    panics(words, || prepare::store::<L, Bare>(&mut g.rows, &mut g.batches, &mut g.contacts));
-    panics(words, || restitution::track::<L, Bare>(&mut g.rows, &mut g.batches, &mut g.bounces));
+    panics(words, || prepare::store::<L, Bare>(&mut g.batches, &mut g.contacts));
+    panics(words, || restitution::track::<L, Bare>(&mut g.batches, &mut g.bounces));
     panics(words, || g.batches.for_each_lane(&Features::NONE, |_, _, _, _| {}));
     // A layout that no kernel has.
     for stride in [0, 1, usize::MAX / 2, usize::MAX] {
@@ -403,14 +406,14 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         features: Features::FULL,
         budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
         h: 0.01,
-        contact_hertz: 30.0,
+        parameters: [0.0; 8],
         record_impulses: true,
         points: 0,
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };
         let mut contacts = vec![Contact::default(); contacts];
-        Problem::<f32x8, Full>::new(&mut work, &mut contacts, &mut Clock::start(false), &input).finish();
+        Passes::new(&mut work, &mut contacts, &mut Clock::start(false), &input, LaneWidth::W8).finish();
     };
     panics("batches name row 24 of 24", || new(batches(8, 9, 9, 24), good(1), CONTACTS));
     panics("batches name row 24 of 24", || new(good(8), batches(1, 9, 24, 10), CONTACTS));

@@ -13,7 +13,7 @@ use crate::engine::constraints::observe::ObservedRule;
 use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::batch::Class;
+use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
 use collide::Narrow;
