@@ -328,7 +328,7 @@ mod tests {
     fn the_list_says_what_is_required_and_what_is_skipped() {
         let cases = verify::select(&["B2.box".to_string(), "A18".to_string()]).unwrap();
         let text = list(&cases);
-        for part in ["A18.law", "not required of soft_step", "(law of soft_step)", "B20 (bridge"] {
+        for part in ["A18.law", "not required of soft_step", "(soft contacts only)", "B20 (bridge"] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
     }

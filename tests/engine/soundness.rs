@@ -3,9 +3,11 @@
 //! without a read or write out of place. Run it under valgrind as well (README, Benches).
 
 use simpulse::engine::clock::Clock;
-use simpulse::engine::constraints::restitution::{self, Bounces};
+use simpulse::engine::constraints::bounces::Bounces;
+use simpulse::engine::constraints::position::position_sweep;
+use simpulse::engine::constraints::restitution;
 use simpulse::engine::constraints::rules::Rigid;
-use simpulse::engine::constraints::sweep::{self, position_sweep, sweep, sweep_store, warm_start};
+use simpulse::engine::constraints::sweep::{self, sweep, sweep_store, warm_start};
 use simpulse::engine::constraints::{
     Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace, prepare,
 };

@@ -202,7 +202,8 @@ fn every_source_has_an_entry() {
     for (path, text) in files(&root().join("src")) {
         for word in text.split('`').skip(1).step_by(2) {
             let year = word.trim_start_matches(|c: char| c.is_ascii_lowercase());
-            let is_key = year.len() >= 4
+            let is_key = word.is_ascii()
+                && year.len() >= 4
                 && year.len() < word.len()
                 && year[..4].chars().all(|c| c.is_ascii_digit())
                 && (year.starts_with("19") || year.starts_with("20"))
