@@ -83,6 +83,9 @@ fn bad_requests_are_refused_in_one_line() {
         (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
         (&["study", "--repeats", "0"], &["repeats", "0"]),
         (&["study", "--steps", "0"], &["steps", "0"]),
+        (&["study", "--tolerance", "penetration=5"], &["tolerance", "'5'", "unit"]),
+        (&["study", "--tolerance", "penetraton=5mm"], &["'penetraton'", "'penetration'"]),
+        (&["study", "--tolerance", "5mm"], &["tolerance", "'5mm'"]),
         (&["studdy"], &["studdy"]),
     ];
     for (args, parts) in table {

@@ -50,7 +50,7 @@ pub struct AdviseArgs {
     /// Distance to the scene's known truth allowed
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub max_truth: Option<String>,
-    /// Contact-law residual allowed, root mean square in the scene's weight × step
+    /// Contact-law residual allowed, root mean square in the mean weight of a body × step
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub max_residual: Option<String>,
     /// Solvers [default: all]
@@ -179,7 +179,10 @@ fn text(plan: &Plan, advice: &Advice) -> String {
             text += &format!("{}\n{}\n", name(nearest), evidence(nearest, advice));
             let over = match nearest.excess.is_finite() {
                 true => format!("it is over its worst limit by a factor of {}", digits(nearest.excess)),
-                false => "it failed, or never came to its truth".to_string(),
+                false => match nearest.broken {
+                    Some(broken) => format!("it {broken}"),
+                    None => "it failed, or never came to its truth".to_string(),
+                },
             };
             text += &format!("{over}\n");
         }
@@ -275,11 +278,16 @@ fn finalists(advice: &Advice) -> String {
                 format!("{}{:.1} %", if tied { "= " } else { "" }, 100.0 * by)
             }),
             error(&|e| si(e.penetration_max, "m")),
-            error(&|e| ratio(e.law_rms)),
+            error(&|e| ratio(e.law_rms_body)),
             trial
                 .truth
                 .map_or("—".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
-            if trial.is_good() { "kept" } else { "broken" }.to_string(),
+            match trial.broken {
+                Some(broken) => broken.mark.word(),
+                None if trial.is_good() => "kept",
+                None => "broken",
+            }
+            .to_string(),
         ]);
     }
     for (i, column) in table.column_iter_mut().enumerate() {
@@ -307,6 +315,7 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
             "errors": t.errors,
             "truth": t.truth,
             "failure": t.failure,
+            "broken": t.broken,
             "in_limits": Some(t.excess).filter(|e| e.is_finite()),
             "keeps_limits": t.is_good(),
         })

@@ -9,8 +9,10 @@ use crate::cli::verify::VerifyArgs;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::Order;
+use crate::lab::advise::limits::quantity;
 use crate::lab::error::Error;
 use crate::lab::overrides::Override;
+use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::budget::BudgetGrid;
 use clap::{Args, Parser, Subcommand};
@@ -109,6 +111,10 @@ pub struct StudyArgs {
     /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
+    /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,truth=0.1
+    /// (`simpulse scene NAME` lists them; a truth in its own unit)
+    #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…")]
+    pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
@@ -213,12 +219,33 @@ impl StudyArgs {
                 position_iterations: self.position_iterations.clone(),
             },
             overrides: self.set.clone(),
+            tolerances: tolerances(&self.tolerance)?,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),
             seed: self.seed,
         })
     }
+}
+
+/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that is no limit.
+fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
+    let mut tolerances = GivenTolerances::default();
+    for text in given {
+        let refused = || Error::invalid("tolerance", format!("'{text}' is not NAME=VALUE"));
+        let (name, value) = text.split_once('=').ok_or_else(refused)?;
+        let (place, unit) = match name.trim() {
+            "penetration" => (&mut tolerances.penetration, "m"),
+            "residual" => (&mut tolerances.residual, ""),
+            "truth" => (&mut tolerances.truth, ""),
+            other => {
+                let known = ["penetration", "residual", "truth"].into_iter();
+                return Err(Error::unknown("tolerance", other, known));
+            }
+        };
+        *place = Some(quantity("tolerance", value, unit)?);
+    }
+    Ok(tolerances)
 }
 
 /// Each value once, in the order given.

@@ -17,6 +17,7 @@ use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::report;
 use crate::lab::scenes::CATALOG;
+use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::study::{self, Progress, ablation, budget, open_scene};
 use args::{Cli, Command, SceneArgs, StudyArgs};
 use clap::Parser;
@@ -171,8 +172,23 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
         scene.steps,
         scene.dt
     );
-    if let Some(truth) = loaded.truth {
+    if let Some(truth) = &loaded.truth {
         text += &format!("known: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
+    }
+    text += "holds if nothing blows up and no body passes through a static one";
+    for demand in loaded.demands {
+        text += &format!("; {}", demand.meaning());
+    }
+    text += "\ntolerances\n";
+    let (own, unit) = (loaded.tolerances, loaded.truth.as_ref().map_or("", |t| t.unit));
+    let lines = [
+        ("penetration", Some((own.penetration, "m"))),
+        ("residual", Some((own.residual, "body weights"))),
+        ("truth", own.truth.map(|t| (t, unit))),
+    ];
+    for (name, line) in lines {
+        let Some((Tolerance { value, reason }, unit)) = line else { continue };
+        text += &format!("  {name:<12} {:>10.4} {unit}: {reason}\n", value);
     }
     Ok(text)
 }

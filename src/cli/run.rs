@@ -12,6 +12,7 @@ use crate::lab::metrics::Observation;
 use crate::lab::overrides;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, si};
+use crate::lab::scenes::holds::Watch;
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
 use std::path::Path;
 
@@ -44,6 +45,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     let mut contacts = args.contacts.as_deref().map(|path| Sheet::new(path, &CONTACTS)).transpose()?;
 
     let mut observation = Observation::new(&world);
+    let mut watch = Watch::new(&world, loaded.demands);
     let mut times = Times::default();
     for step in 1..=scene.steps {
         let due = args.every.map_or(step == scene.steps, |every| step % every == 0);
@@ -56,6 +58,7 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         }
         times.add(&world.timings);
         observation.observe(&world);
+        watch.observe(&world);
         if let Some(blow_up) = observation.blown_up() {
             return Ok(Ending::Diverged(blow_up.into()));
         }
@@ -77,6 +80,10 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     if let Some(truth) = &loaded.truth {
         text += &truth_line(&TruthError::of(truth));
     }
+    text += &match watch.broken() {
+        Some(broken) => format!("  does not hold: {broken}\n"),
+        None => "  holds\n".to_string(),
+    };
     for sheet in [state, contacts].into_iter().flatten() {
         text += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;

@@ -223,7 +223,7 @@ fn truths_expect_what_arithmetic_says() {
 
 /// Runs a scene of the catalogue to its end; the final error of its truth.
 fn error_after_run(name: &str, solver: &str, substeps: u32, record_impulses: bool) -> Option<f64> {
-    let Loaded { scene, truth } = load(name).unwrap_or_else(|e| panic!("{e}"));
+    let Loaded { scene, truth, .. } = load(name).unwrap_or_else(|e| panic!("{e}"));
     let mut settings =
         Settings { record_impulses, ..Settings::new(solvers::find(solver).expect("a solver")) };
     settings.budget.substeps = substeps;
@@ -275,6 +275,18 @@ fn loads_are_known_only_where_impulses_are_recorded() {
     assert_eq!(error_after_run("disc_column:3", "pgs", 1, false), None);
     // The column starts in balance: 30 N, of which f32 keeps seven digits.
     assert!(error_after_run("disc_column:3", "pgs", 1, true).expect("an error") < 3e-4);
+}
+
+#[test]
+fn what_is_known_has_a_tolerance_and_every_tolerance_a_reason() {
+    for entry in CATALOG {
+        let loaded = load(entry.name).unwrap_or_else(|e| panic!("{e}"));
+        let own = loaded.tolerances;
+        assert_eq!(own.truth.is_some(), loaded.truth.is_some(), "{}", entry.name);
+        for tolerance in [Some(own.penetration), Some(own.residual), own.truth].into_iter().flatten() {
+            assert!(tolerance.value > 0.0 && !tolerance.reason.is_empty(), "{}: {tolerance:?}", entry.name);
+        }
+    }
 }
 
 #[test]

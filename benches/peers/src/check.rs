@@ -63,7 +63,7 @@ pub struct Checker {
 
 impl Checker {
     /// For a scene of the catalogue. Errors: a scene that is not valid.
-    pub fn new(Loaded { scene, truth }: Loaded) -> Result<Self, String> {
+    pub fn new(Loaded { scene, truth, .. }: Loaded) -> Result<Self, String> {
         let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
         let mirror = scene.build(settings).map_err(|e| e.to_string())?;
         let shapes = || mirror.shapes.iter().zip(&mirror.shape_body);

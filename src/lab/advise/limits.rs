@@ -13,7 +13,7 @@ pub struct Limits {
     pub time_ns: Option<f64>,
     /// Distance to the truth, in the truth's unit.
     pub truth: Option<f64>,
-    /// Contact-law residual, root mean square (1).
+    /// Contact-law residual, root mean square in body weights (1).
     pub residual: Option<f64>,
 }
 
@@ -24,7 +24,7 @@ impl Limits {
         let distance = truth.and_then(|t| t.error).unwrap_or(f64::INFINITY);
         let pairs = [
             (errors.penetration_max, self.penetration),
-            (errors.law_rms, self.residual),
+            (errors.law_rms_body, self.residual),
             (distance, self.truth),
         ];
         pairs.into_iter().fold(0.0, |worst: f64, (value, limit)| worst.max(in_limits(value, limit)))
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn the_worst_limit_counts() {
-        let errors = Errors { penetration_max: 2e-3, law_rms: 0.5, ..Errors::default() };
+        let errors = Errors { penetration_max: 2e-3, law_rms_body: 0.5, ..Errors::default() };
         let truth = TruthError { quantity: "", unit: "m", expected: 0.0, error: Some(3.0) };
         let limits = Limits { penetration: Some(1e-3), residual: Some(1.0), ..Limits::default() };
         assert_eq!(limits.of_errors(&errors, None), 2.0);

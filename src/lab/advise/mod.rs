@@ -23,6 +23,7 @@ use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::scenes::holds::Broken;
 use crate::lab::study::interleave::{Sample, race};
 use crate::lab::study::pareto::tie;
 use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
@@ -117,6 +118,8 @@ pub struct Trial {
     pub truth: Option<TruthError>,
     /// Why there is no result.
     pub failure: Option<Failure>,
+    /// The first demand of the scene that was not met: no limit is kept by what fell.
+    pub broken: Option<Broken>,
     /// The largest of errors and time in their limits: up to 1 is good enough.
     pub excess: f64,
 }
@@ -267,7 +270,7 @@ fn fastest<'a>(laps: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<Ti
 }
 
 fn excess(limits: &Limits, trial: &Trial) -> f64 {
-    let Some(errors) = &trial.errors else { return f64::INFINITY };
+    let Some(errors) = trial.errors.as_ref().filter(|_| trial.broken.is_none()) else { return f64::INFINITY };
     limits.of_errors(errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()))
 }
 
@@ -281,7 +284,15 @@ mod tests {
         let setting =
             Setting { solver, order: Order::Colored, budget: solver.budget, parameters: solver.defaults() };
         let time = Some(Time { lanes: 8, median_ns: time, spread_ns: 0.0 });
-        Trial { setting, time, errors: Some(Errors::default()), truth: None, failure: None, excess }
+        Trial {
+            setting,
+            time,
+            errors: Some(Errors::default()),
+            truth: None,
+            failure: None,
+            broken: None,
+            excess,
+        }
     }
 
     #[test]

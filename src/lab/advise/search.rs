@@ -223,6 +223,7 @@ impl<'a> Search<'a> {
             errors: outcome.errors.ok(),
             truth: outcome.truth,
             failure: outcome.errors.err().map(Failure::from),
+            broken: outcome.broken,
             excess: f64::INFINITY,
         };
         if trial.errors.is_some() {

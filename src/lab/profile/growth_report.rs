@@ -21,7 +21,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
     let phases = phases(rows);
     let mut header = vec!["scene", "bodies", "contacts", "step", "±"];
     header.extend(phases.iter().map(|p| p.name()));
-    header.extend(["pen.max", "law"]);
+    header.extend(["pen.max", "law", "per body"]);
     let mut times = table(&header);
     for row in rows {
         let mut cells = vec![row.scene.clone(), row.bodies.to_string(), row.counts.contacts.to_string()];
@@ -30,6 +30,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         cells.extend(phases.iter().map(|&p| digits(row.per_contact(row.phases[p as usize]))));
         cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max, "m")));
         cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms)));
+        cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms_body)));
         times.add_row(cells);
     }
     let mut text = format!(
@@ -126,7 +127,7 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
         let name = component.name.replace(' ', "_");
         header.extend([format!("{name}_held_bytes"), format!("{name}_used_bytes")]);
     }
-    header.extend(["penetration_max", "law_rms"].map(String::from));
+    header.extend(["penetration_max", "law_rms", "law_rms_body"].map(String::from));
     writer.write_record(&header).map_err(failed)?;
     for row in rows {
         let c = &row.counts;
@@ -143,7 +144,7 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
         let error = |of: fn(&crate::lab::metrics::Errors) -> f64| {
             row.errors.as_ref().map_or(String::new(), |e| of(e).to_string())
         };
-        record.extend([error(|e| e.penetration_max), error(|e| e.law_rms)]);
+        record.extend([error(|e| e.penetration_max), error(|e| e.law_rms), error(|e| e.law_rms_body)]);
         writer.write_record(&record).map_err(failed)?;
     }
     writer.into_inner().map_err(|e| Error::invalid("growth.csv", e.to_string()))

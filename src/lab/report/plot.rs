@@ -1,12 +1,15 @@
 //! `speed_vs_error.svg`: time against error, a row of panels per scene.
 //!
-//! Both axes are logarithmic. One colour per solver, one curve through its budgets, one
-//! marker shape per budget; every point is the fastest lane width of its setting.
+//! Both axes are logarithmic. One colour per solver, one marker shape per budget, a white dot on
+//! those in natural order; every marker is the fastest lane width of its setting. A line of steps
+//! shows the least time in which the solver has at most that error: settings are different runs,
+//! and between them there is nothing.
 
 use super::axes::{
     Area, Drawn, GRID, INK, Scale, color, marker, solver_legend, wrapped, write, write_upwards,
 };
 use super::units::si_short;
+use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::study::Record;
 use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of};
@@ -59,7 +62,13 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
         marker(area, (x + 6, 44), budget, &INK)?;
         x += 20;
     }
-    write(area, "budgets, smallest first; fastest lane width of each", (x + 6, 44), 14, HPos::Left)
+    write(
+        area,
+        "budgets, smallest first, at their fastest lane width; white dot: natural order",
+        (x + 6, 44),
+        14,
+        HPos::Left,
+    )
 }
 
 fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record], solvers: &[&str]) -> Drawn {
@@ -99,10 +108,19 @@ fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record], s
 }
 
 fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64) -> (i32, i32)) -> Drawn {
-    let line: Vec<(i32, i32)> = curve.samples.iter().map(|s| at(s.time, s.error)).collect();
+    let mut line: Vec<(i32, i32)> = Vec::new();
+    for sample in curve.front() {
+        let next = at(sample.time, sample.error);
+        line.extend(line.last().map(|&(x, _)| (x, next.1)));
+        line.push(next);
+    }
     area.draw(&PathElement::new(line, color.stroke_width(2)))?;
     for sample in &curve.samples {
-        marker(area, at(sample.time, sample.error), sample.budget, color)?;
+        let place = at(sample.time, sample.error);
+        marker(area, place, sample.budget, color)?;
+        if sample.record.order == Order::Natural {
+            area.draw(&Circle::new(place, 2, WHITE.filled()))?;
+        }
     }
     Ok(())
 }

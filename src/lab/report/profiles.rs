@@ -2,11 +2,11 @@
 
 use super::axes::{Area, Drawn, GRID, INK, Scale, color, solver_legend, write, write_upwards};
 use super::table::{finish, table};
-use super::units::{digits, ratio, si, si_short};
+use super::units::{digits, si};
 use crate::lab::error::Error;
 use crate::lab::study::Record;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
-use crate::lab::study::profile::{Profile, TOLERANCES};
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, Sample, solvers_of};
+use crate::lab::study::profile::Profile;
 use crate::lab::study::slices::{Slice, equal_error, equal_time};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -22,17 +22,13 @@ const BOTTOM: i32 = 56;
 const FACTORS: [f64; 3] = [1.0, 1.5, 4.0];
 
 fn profiles(records: &[Record]) -> Vec<Profile> {
-    let profile = |axis| Profile::of(records, axis, &TOLERANCES);
+    let profile = |axis| Profile::of(records, axis);
     ErrorAxis::ALL.into_iter().map(profile).filter(|p| p.scenes > 0).collect()
 }
 
 /// What counts as solved along an axis.
 fn tolerance(axis: ErrorAxis) -> String {
-    match axis {
-        ErrorAxis::Penetration => format!("{} within {}", axis.name(), si_short(TOLERANCES.penetration, "m")),
-        ErrorAxis::Law => format!("{} within {}", axis.name(), ratio(TOLERANCES.law)),
-        ErrorAxis::Truth => format!("{} within {} %", axis.name(), 100.0 * TOLERANCES.truth),
-    }
+    format!("{} in tolerance", axis.name())
 }
 
 /// The picture as SVG text.
@@ -122,7 +118,7 @@ pub fn slice_tables(records: &[Record]) -> String {
     let solvers = solvers_of(records);
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
     let mut text = String::new();
-    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice>, equal_time: bool| {
+    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice<'_>>, equal_time: bool| {
         let mut header = vec!["error", "scene", "at"];
         header.extend(&solvers);
         header.push(if equal_time { "least error" } else { "least time" });
@@ -135,9 +131,13 @@ pub fn slice_tables(records: &[Record]) -> String {
         }
         text += &format!("{heading}\n{}", finish(rows, 2));
     };
-    add("Equal time: the error that each solver has then (— outside its budgets)", equal_time, true);
     add(
-        "\nEqual error: µs per step to it (— outside its budgets; = tied within the noise)",
+        "Equal time: the least error of a setting that takes at most that long (— none does)",
+        equal_time,
+        true,
+    );
+    add(
+        "\nEqual error: µs per step of the fastest setting whose error is at most that (— none; = tied)",
         equal_error,
         false,
     );
@@ -151,10 +151,10 @@ fn slice_row(slice: &Slice, axis: &str, equal_time: bool) -> Vec<String> {
     };
     let time = |ns: f64| digits(1e-3 * ns);
     let at = if equal_time { format!("{} µs", time(slice.at)) } else { error(slice.at) };
-    let mut cells = vec![axis.to_string(), slice.scene.clone(), at];
-    let show = |[value, _]: [f64; 2]| if equal_time { error(value) } else { time(value) };
+    let mut cells = vec![axis.to_string(), slice.scene.to_string(), at];
+    let show = |s: Sample| if equal_time { error(s.error) } else { time(s.time) };
     cells.extend(slice.values.iter().map(|(_, value)| value.map_or("—".to_string(), show)));
-    cells.push(slice.best().join(" = "));
+    cells.push(slice.best.join(" = "));
     cells
 }
 
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn the_profile_has_its_table_and_its_picture() {
         let text = profile_table(&two_solvers());
-        assert!(text.contains("deepest penetration within 10 mm") && text.contains("1 of 1"), "{text}");
+        assert!(text.contains("deepest penetration in tolerance") && text.contains("1 of 1"), "{text}");
         assert_eq!(text.matches("100 %").count(), 16, "{text}");
         let picture = svg(&two_solvers()).unwrap();
         assert!(picture.contains("share of 1 scenes") && !picture.to_lowercase().contains("nan"));

@@ -11,7 +11,7 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 pub const LEGEND: &str = "\
 lanes: nat is one after the other in natural order, numbers are lanes in coloured order.  ± is the median
 deviation of a repeat.  ns/row: a sweep, per row that it solves.  ×: times faster than 1 lane.
-law: contact-law residual in the scene's weight × step.  energy, moment.: gained or lost, relative.  rest:
+law: contact-law residual in the scene's weight × step, and in a body's.  energy, moment.: gained or lost, relative.  rest:
 rms speed of the last second.  occ.: lanes that hold a contact.  front: on the front of time against
 p penetration, l law residual, t truth; errors are the same for all coloured widths of a budget.
 ";
@@ -48,8 +48,8 @@ pub fn scene_table(records: &[Record]) -> String {
     }
     text += "\n";
     let mut rows = table(&[
-        "solver", "budget", "lanes", "µs/step", "±", "ns/row", "×", "pen.max", "mean", "law", "energy",
-        "moment.", "rest", "truth", "sweeps", "col.", "occ.", "front",
+        "solver", "budget", "lanes", "µs/step", "±", "ns/row", "×", "holds", "pen.max", "mean", "law",
+        "/body", "energy", "moment.", "rest", "truth", "sweeps", "col.", "occ.", "front",
     ]);
     let mut notes = String::new();
     let mut previous: Option<&Record> = None;
@@ -91,7 +91,7 @@ fn row(record: &Record, same_budget: bool, same_order: bool) -> Vec<String> {
         vec![unless(same_budget, record.solver), unless(same_budget, &record.budget_text), lanes(record)];
     let Some(lap) = &record.lap else {
         cells.push("failed".to_string());
-        cells.resize(18, String::new());
+        cells.resize(20, String::new());
         return cells;
     };
     cells.extend([
@@ -103,9 +103,11 @@ fn row(record: &Record, same_budget: bool, same_order: bool) -> Vec<String> {
     let errors = record.errors.filter(|_| !same_order);
     let error = |show: &dyn Fn(&Errors) -> String| errors.as_ref().map_or(String::new(), show);
     cells.extend([
+        record.mark().map_or("yes", |mark| mark.word()).to_string(),
         error(&|e| si(e.penetration_max, "m")),
         error(&|e| si(e.penetration_mean, "m")),
         error(&|e| ratio(e.law_rms)),
+        error(&|e| ratio(e.law_rms_body)),
         error(&|e| ratio(e.energy_change)),
         error(&|e| ratio(e.momentum)),
         error(&|e| si(e.rest_velocity, "m/s")),
@@ -157,11 +159,13 @@ pub fn ablation_table(costs: &[NeedCost]) -> String {
 pub fn error_line(errors: Option<&Errors>) -> String {
     match errors {
         Some(e) => format!(
-            "errors of the last {} steps: penetration {} at most, {} in the mean; law residual {}\n",
+            "errors of the last {} steps: penetration {} at most, {} in the mean; law residual {} of the \
+             scene's weight, {} of a body's\n",
             e.steps,
             si(e.penetration_max, "m"),
             si(e.penetration_mean, "m"),
-            ratio(e.law_rms)
+            ratio(e.law_rms),
+            ratio(e.law_rms_body)
         ),
         None => "errors: none observed, since no step was taken\n".to_string(),
     }
@@ -179,6 +183,7 @@ pub fn error_list(errors: &Errors) -> String {
         ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
         ("soft contacts give way, last second", e.soft_floor.map(length)),
         ("penetration beyond that", e.penetration_excess.map(length)),
+        ("law residual, rms, body weights", Some(ratio(e.law_rms_body))),
         ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
         ("law residual, normal, max", Some(ratio(e.law_normal_max))),
         ("law residual, tangential, rms", Some(ratio(e.law_tangent_rms))),
@@ -208,13 +213,14 @@ pub fn error_list(errors: &Errors) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::study::record::tests::{failed, record};
+    use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
     fn errors_stand_once_per_budget_and_failures_below() {
         let mut wrong = record(8, 1, 10.0, 1.234e-3);
         wrong.bits_equal = Some(false);
-        let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1)]);
+        let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1), fell(8, 3, 5.0, 0.1)]);
+        assert!(text.contains(" fell ") && text.contains(" yes "), "{text}");
         assert_eq!(text.matches("1.23 mm").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
         assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));

@@ -1,6 +1,8 @@
 //! C11: an arch of 17 stones that only friction and its own weight hold up.
 
+use super::holds::Demand;
 use super::parts::ground_line;
+use super::tolerance::Tolerances;
 use super::truth::stands;
 use super::{Entry, Scene, SceneBody, SceneShape};
 
@@ -48,7 +50,10 @@ pub(super) const ARCH: Entry = Entry::new("arch", "an arch of 17 stones with fou
     }
     Scene::new("arch", bodies)
 })
-.known(|scene, _| stands(scene));
+.known(|scene, _| stands(scene))
+.holds(&[Demand::Stands])
+// Eight joints up to the keystone, its own, and four boxes.
+.within(|_, _| Tolerances::standard().joints(13.0));
 
 /// The points are the stone's in the world; its body stands at the origin.
 fn stone(points: [[f64; 2]; 4]) -> SceneBody {

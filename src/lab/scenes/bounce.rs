@@ -8,7 +8,9 @@
 //! sampling. What is left is the solver's own: when in the step it applies the
 //! restitution, and how much energy that makes or loses.
 
+use super::holds::Demand;
 use super::parts::ground_line;
+use super::tolerance::Tolerances;
 use super::truth::{Observer, Truth, View, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::params::{DEFAULT_GRAVITY, RESTITUTION_THRESHOLD};
@@ -24,14 +26,25 @@ pub(super) const BOUNCE: Entry =
     Entry::new("bounce", "a disc dropped from 10 m that bounces with e = 0.5 until too slow", |_| {
         scene("bounce", 10.0, 0.5).steps(300)
     })
-    .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)));
+    .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)))
+    .holds(&[Demand::GainsNoEnergy])
+    .within(|scene, apex| tolerances(scene, 10.0, apex));
 
 pub(super) const ELASTIC: Entry =
     Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces for ever", |_| {
         // Twenty bounces take 18.3 s, or 20 s if each adds h times its speed to the apex.
         scene("bounce_elastic", 1.0, 1.0).steps(1320)
     })
-    .known(|scene, _| truth("apexes of twenty bounces", scene, 1.0, 1.0, 20));
+    .known(|scene, _| truth("apexes of twenty bounces", scene, 1.0, 1.0, 20))
+    .holds(&[Demand::GainsNoEnergy])
+    .within(|scene, apex| tolerances(scene, 1.0, apex));
+
+/// From `height` (m), rising to `apex` (m) after the first impact.
+fn tolerances(scene: &Scene, height: f64, apex: f64) -> Tolerances {
+    Tolerances::impacts(scene, height)
+        .residual(2.0, "a rebound is held against the approach at the step's start: up to 1 + e weights")
+        .truth((2.0 * G * apex).sqrt() * scene.dt, "a rebound that is a step early or late")
+}
 
 fn scene(name: &str, height: f64, restitution: f64) -> Scene {
     let disc = SceneShape::disc(RADIUS).restitution(restitution);

@@ -5,6 +5,8 @@
 //! leaves with v cos φ = 0.8 v along the line, the other with v sin φ = 0.6 v
 //! across it.
 
+use super::holds::Demand;
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 
@@ -26,7 +28,9 @@ pub(super) const OBLIQUE: Entry =
     .known(|scene, _| {
         let truth = Worst::from_time(scene, 0.75, |view| Some(error(view)));
         Truth::new("outgoing speeds, from 0.75 s on", "m/s", 0.8 * SPEED, truth)
-    });
+    })
+    .holds(&[Demand::GainsNoEnergy])
+    .within(|scene, speed| Tolerances::fast(scene, SPEED).percent(speed));
 
 /// The worse of the two speeds.
 fn error(view: &View) -> f64 {

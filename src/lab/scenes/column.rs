@@ -1,6 +1,8 @@
 //! B1, B5, C8, C15: columns of discs and of boxes.
 
+use super::holds::Demand;
 use super::parts::{ground_box, ground_line};
+use super::tolerance::Tolerances;
 use super::truth::{rests_at, rests_on_ground};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
@@ -12,14 +14,18 @@ pub(super) const DISCS: Entry = Entry::new("disc_column", "discs of 1 kg on top 
     column("disc_column", count, ground_line(20.0), &disc)
 })
 .sized(10, 1, 1000, "discs")
-.known(|scene, _| rests_on_ground(scene));
+.known(|scene, _| rests_on_ground(scene))
+.holds(&[Demand::Stands])
+.within(|_, load| Tolerances::standard().percent(load));
 
 /// Unit boxes, centres at i + ½. The error is how far the topmost has sunk.
 pub(super) const BOXES: Entry = Entry::new("stack", "boxes on top of each other", |count| {
     column("stack", count, ground_box(20.0), &SceneShape::rectangle(0.5, 0.5))
 })
 .sized(20, 1, 1000, "boxes")
-.known(|scene, count| rests_at(scene, count as usize, f64::from(count) - 0.5));
+.known(|scene, count| rests_at(scene, count as usize, f64::from(count) - 0.5))
+.holds(&[Demand::Stands])
+.within(|_, height| Tolerances::standard().joints(height + 0.5));
 
 pub(super) fn column(name: &str, count: u32, ground: SceneBody, shape: &SceneShape) -> Scene {
     let bodies = (0..count).map(|i| SceneBody::dynamic([0.0, f64::from(i) + 0.5], shape.clone()));
@@ -34,7 +40,10 @@ pub(super) const ZIGZAG: Entry = Entry::new("vertical_stack", "15 boxes dropped 
     let boxes = (0..15).map(|i| SceneBody::dynamic([shift(i), 0.55 + 1.1 * f64::from(i)], shape()));
     Scene::new("vertical_stack", std::iter::once(ground_box(100.0)).chain(boxes).collect())
 })
-.known(|scene, _| rests_at(scene, 15, 14.5));
+.known(|scene, _| rests_at(scene, 15, 14.5))
+.holds(&[Demand::StaysStacked])
+// The topmost starts at 15.95 m.
+.within(|scene, height| Tolerances::impacts(scene, 15.95 - height).joints(15.0));
 
 /// An unstable equilibrium, but exactly centred: rounding that treats left and
 /// right alike keeps it, so the topmost of 10 discs of radius 1 rests at 19 m.
@@ -42,4 +51,7 @@ pub(super) const CIRCLES: Entry = Entry::new("circle_stack", "10 discs dropped o
     let discs = (0..10).map(|i| SceneBody::dynamic([0.0, 4.0 + 3.0 * f64::from(i)], SceneShape::disc(1.0)));
     Scene::new("circle_stack", std::iter::once(ground_line(40.0)).chain(discs).collect())
 })
-.known(|scene, _| rests_at(scene, 10, 19.0));
+.known(|scene, _| rests_at(scene, 10, 19.0))
+.holds(&[Demand::StaysStacked])
+// The topmost starts at 31 m.
+.within(|scene, height| Tolerances::impacts(scene, 31.0 - height).joints(10.0));

@@ -1,6 +1,8 @@
 //! D: bodies of two crossed triangles each, dropped into a yard.
 
+use super::holds::{Demand, Outside};
 use super::parts::{below_floor, yard};
+use super::tolerance::Tolerances;
 use super::truth::{Truth, Worst};
 use super::{Entry, Geometry, Scene, SceneBody, SceneShape, Segment};
 
@@ -26,7 +28,10 @@ pub(super) const COMPOUNDS: Entry =
     .known(|scene, _| {
         let below = Worst::from_step(u64::from(scene.steps), |view| Some(below_floor(view) as f64));
         Truth::new("bodies below the floor at the end", "bodies", 0.0, below)
-    });
+    })
+    .holds(&[Demand::Contains(Outside(below_floor))])
+    // A body fills 1.5 m² of its 4.5, and half of what is left between piled ones: the rows sink by half.
+    .within(|scene, _| Tolerances::impacts(scene, 0.5 * 2.25 * 150.0).truth(0.5, "none"));
 
 /// Leaning to the left for −1, to the right for 1.
 fn triangle(side: f64) -> SceneShape {

@@ -6,7 +6,9 @@
 //! and 10^6 + ½ still is an `f32`, so the far scene starts exactly as the near one.
 
 use super::column::column;
+use super::holds::Demand;
 use super::parts::ground_box;
+use super::tolerance::Tolerances;
 use super::truth::{Observer, Truth, largest};
 use super::{Entry, Scene, SceneShape};
 use crate::engine::bodies::Bodies;
@@ -22,7 +24,9 @@ pub(super) const STACK: Entry =
         let [x, y] = shift(exponent);
         let twin = Twin { scene: moved(scene.clone(), [-x, -y]), shift: [x, y], world: None, worst: None };
         Truth::new("distance to the same stack at the origin, all steps", "m", 0.0, twin)
-    });
+    })
+    .holds(&[Demand::Stands])
+    .within(|_, _| Tolerances::standard().joints(1.0));
 
 fn shift(exponent: u32) -> [f64; 2] {
     let distance = 10.0_f64.powi(exponent as i32);

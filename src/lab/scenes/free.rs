@@ -1,5 +1,7 @@
 //! A0 and A16: bodies that touch nothing, so that only the integrator can be wrong.
 
+use super::holds::Demand;
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::params::DEFAULT_GRAVITY;
@@ -18,7 +20,9 @@ pub(super) const FALL: Entry = Entry::new("free_fall", "a disc thrown up, for tw
         end,
         Worst::from_step(1, |view| Some(view.center(0)[1] - height(view))),
     )
-});
+})
+.holds(&[Demand::GainsNoEnergy])
+.within(|_, _| Tolerances::standard().truth(1e-3, "a millimetre: nothing but rounding is left"));
 
 /// m/s, along both axes
 const START_SPEED: f64 = 5.0;
@@ -42,7 +46,9 @@ pub(super) const SPIN: Entry = Entry::new("free_spin", "a box that spins freely 
     };
     let end = spin * f64::from(scene.steps) * scene.dt;
     Truth::new("angle turned, all steps", "rad", end, Worst::from_step(1, off))
-});
+})
+.holds(&[Demand::GainsNoEnergy])
+.within(|_, _| Tolerances::standard().truth(1e-2, "half a degree begins to be seen"));
 
 /// θ = ω t, but a rotation only tells θ mod 2π. The error of each single step is
 /// below half a turn (at 180 rad/s and 1/60 s a step turns 3 rad, and a body that

@@ -8,6 +8,7 @@
 //! first ramp.
 
 use super::parts::ground_line;
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::params::DEFAULT_GRAVITY;
@@ -43,6 +44,11 @@ pub(super) const RAMP: Entry =
         let off = move |view: &View| slide.error(view, end);
         let quantity = "acceleration down the first ramp, worst of five boxes, 2 s to 2.5 s";
         Truth::new(quantity, "m/s²", 0.0, Worst::from_time(scene, START, off))
+    })
+    .within(|scene, _| {
+        // The box at x = 1 m starts at 28 m, over a ramp that is 21 m high there.
+        let downhill = 0.01 * -DEFAULT_GRAVITY[1] * SLOPE.sin();
+        Tolerances::impacts(scene, 7.0).truth(downhill, "a hundredth of gravity along the ramp")
     });
 
 /// rad

@@ -7,6 +7,8 @@
 //! Each substep changes the velocity by exactly a h, hence
 //! [`View::accelerated`] gives the discrete distance.
 
+use super::holds::Demand;
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::params::DEFAULT_GRAVITY;
@@ -18,24 +20,29 @@ pub(super) const STICK: Entry =
     Entry::new("incline_stick", "a box on an incline, just held by friction, for a minute", |_| {
         scene("incline_stick", SceneShape::rectangle(0.5, 0.5), 0.26).steps(3600)
     })
-    .known(|_, _| truth("drift down the slope, all steps", 0.0, 0.0));
+    .known(|_, _| truth("drift down the slope, all steps", 0.0, 0.0))
+    .holds(&[Demand::StaysWithin(0.05)])
+    .within(|_, _| Tolerances::standard().joints(1.0));
 
 pub(super) const SLIP: Entry =
     Entry::new("incline_slip", "a box on an incline, just too steep for it", |_| {
         scene("incline_slip", SceneShape::rectangle(0.5, 0.5), 0.24).steps(120)
     })
-    .known(|scene, _| truth("distance slid, all steps", slipping(0.24), end_time(scene)));
+    .known(|scene, _| truth("distance slid, all steps", slipping(0.24), end_time(scene)))
+    .within(|_, way| Tolerances::standard().percent(way));
 
 pub(super) const ROLL: Entry = Entry::new("rolling_incline", "a disc that rolls down an incline", |_| {
     scene("rolling_incline", SceneShape::disc(0.5), 0.6).steps(120)
 })
-.known(|scene, _| truth("distance rolled, all steps", 2.0 / 3.0 * G * SLOPE.sin(), end_time(scene)));
+.known(|scene, _| truth("distance rolled, all steps", 2.0 / 3.0 * G * SLOPE.sin(), end_time(scene)))
+.within(|_, way| Tolerances::standard().percent(way));
 
 pub(super) const SLIPPING_DISC: Entry =
     Entry::new("slipping_disc", "a disc on an incline with too little friction to roll", |_| {
         scene("slipping_disc", SceneShape::disc(0.5), 0.05).steps(120)
     })
-    .known(|scene, _| truth("distance slid, all steps", slipping(0.05), end_time(scene)));
+    .known(|scene, _| truth("distance slid, all steps", slipping(0.05), end_time(scene)))
+    .within(|_, way| Tolerances::standard().percent(way));
 
 /// m/s²
 const G: f64 = -DEFAULT_GRAVITY[1];

@@ -1,6 +1,8 @@
 //! D: a yard full of pentagons, and a pusher that ploughs through them.
 
+use super::holds::{Demand, Outside};
 use super::parts::{below_floor, yard};
+use super::tolerance::Tolerances;
 use super::truth::{Truth, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
@@ -24,7 +26,10 @@ pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a 
 .known(|scene, _| {
     let below = Worst::from_step(u64::from(scene.steps), |view| Some(below_floor(view) as f64));
     Truth::new("bodies below the floor at the end", "bodies", 0.0, below)
-});
+})
+.holds(&[Demand::Contains(Outside(below_floor))])
+// The highest row starts at 54 m.
+.within(|scene, _| Tolerances::impacts(scene, 54.0).truth(0.5, "none"));
 
 /// Five points on a circle of radius 0.25 m, each a golden angle on from the last.
 fn pentagon() -> SceneShape {

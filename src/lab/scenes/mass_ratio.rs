@@ -1,6 +1,8 @@
 //! B4, C3, C4: heavy bodies on light ones.
 
+use super::holds::Demand;
 use super::parts::ground_line;
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst, ground_load, rests_at, rests_on_ground, weight};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
@@ -21,7 +23,9 @@ pub(super) const PAIR: Entry = Entry::new("mass_ratio", "a heavy disc on a disc 
         weight,
         Worst::last_second(scene, off),
     )
-});
+})
+.holds(&[Demand::Stands])
+.within(|_, load| Tolerances::standard().percent(load));
 
 /// Momentum at rest: the ground carries (1 + R) g. Two discs side by side would
 /// load it as much, so a heavy disc that has sunk by more than a radius is infinitely wrong.
@@ -55,7 +59,10 @@ pub(super) const TOPS: Entry =
         }
         Scene::new("high_mass_ratio_1", bodies)
     })
-    .known(|scene, _| rests_on_ground(scene));
+    .known(|scene, _| rests_on_ground(scene))
+    .holds(&[Demand::Stands])
+    // The tops fall two metres.
+    .within(|scene, load| Tolerances::impacts(scene, 2.0).percent(load));
 
 /// A box of 400 kg dropped on two of 1 kg, which stay 1 m high under it: its
 /// centre comes to rest at 1 + 10 m.
@@ -65,7 +72,9 @@ pub(super) const LARGE_ON_SMALL: Entry =
         let large = SceneBody::dynamic([0.0, 26.0], SceneShape::rectangle(10.0, 10.0));
         Scene::new("high_mass_ratio_2", vec![ground_line(20.0), small(-9.0), small(9.0), large])
     })
-    .known(|scene, _| rests_at(scene, 3, 11.0));
+    .known(|scene, _| rests_at(scene, 3, 11.0))
+    .holds(&[Demand::Stands])
+    .within(|scene, height| Tolerances::impacts(scene, 26.0 - height).joints(2.0));
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,5 @@
-//! Scenes: their file format, a catalogue of them, and what is known about each.
+//! Scenes: their file format, a catalogue of them, what is known about each, what it demands of a
+//! run and how wrong that may be.
 //!
 //! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 or C11
 //! in the scene files are those of the list of hard cases.
@@ -16,6 +17,7 @@ mod far;
 mod format;
 mod free;
 mod friction_ramp;
+pub mod holds;
 mod incline;
 mod junkyard;
 mod mass_ratio;
@@ -26,6 +28,7 @@ mod pyramid;
 mod single_box;
 mod sliding;
 mod smash;
+pub mod tolerance;
 mod truth;
 mod tumbler;
 mod washer;
@@ -37,6 +40,8 @@ pub use format::{
 pub use truth::{Observer, Truth};
 
 use crate::lab::error::Error;
+use holds::Demand;
+use tolerance::Tolerances;
 
 /// Every scene of the crate, as the command line lists them.
 pub static CATALOG: &[Entry] = &[
@@ -91,6 +96,10 @@ pub struct Entry {
     pub seeded: Option<fn(u32, u64) -> Scene>,
     /// What is known about the scene of that size, for a run of its `steps` at its `dt`.
     pub truth: Option<fn(&Scene, u32) -> Truth>,
+    /// What a run has to meet, besides that nothing blows up or passes through what is static.
+    pub demands: &'static [Demand],
+    /// How wrong a run may be, for the scene and the value that its truth has (0 where none is known).
+    pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
 
 /// A whole number that a scene is made from.
@@ -108,7 +117,8 @@ pub struct Size {
 
 impl Entry {
     const fn new(name: &'static str, summary: &'static str, build: fn(u32) -> Scene) -> Self {
-        Self { name, summary, size: None, build, seeded: None, truth: None }
+        let tolerances = |_: &Scene, _| Tolerances::standard();
+        Self { name, summary, size: None, build, seeded: None, truth: None, demands: &[], tolerances }
     }
 
     const fn sized(self, default: u32, min: u32, max: u32, meaning: &'static str) -> Self {
@@ -121,6 +131,21 @@ impl Entry {
 
     const fn known(self, truth: fn(&Scene, u32) -> Truth) -> Self {
         Self { truth: Some(truth), ..self }
+    }
+
+    const fn holds(self, demands: &'static [Demand]) -> Self {
+        Self { demands, ..self }
+    }
+
+    const fn within(self, tolerances: fn(&Scene, f64) -> Tolerances) -> Self {
+        Self { tolerances, ..self }
+    }
+
+    /// A scene of this entry, with what is known about a run of its steps at its step.
+    pub fn loaded(&self, scene: Scene, size: u32) -> Loaded {
+        let truth = self.truth.map(|truth| truth(&scene, size));
+        let tolerances = (self.tolerances)(&scene, truth.as_ref().map_or(0.0, |t| t.expected));
+        Loaded { scene, truth, demands: self.demands, tolerances }
     }
 
     /// The size that `text` asks for.
@@ -144,6 +169,10 @@ pub struct Loaded {
     pub scene: Scene,
     /// None where nothing is known.
     pub truth: Option<Truth>,
+    /// What a run has to meet.
+    pub demands: &'static [Demand],
+    /// How wrong it may be.
+    pub tolerances: Tolerances,
 }
 
 /// A scene by its name, with its size after a colon: `arch`, `stack`, `stack:40`.
@@ -175,6 +204,5 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
     if entry.size.is_some() {
         scene.name = format!("{stem}:{size}");
     }
-    let truth = entry.truth.map(|truth| truth(&scene, size));
-    Ok(Loaded { scene, truth })
+    Ok(entry.loaded(scene, size))
 }

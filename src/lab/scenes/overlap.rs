@@ -1,6 +1,7 @@
 //! C7: boxes that start a quarter deep in each other.
 
 use super::parts::ground_line;
+use super::tolerance::Tolerances;
 use super::truth::rests_on_ground;
 use super::{Entry, Scene, SceneBody, SceneShape};
 
@@ -17,4 +18,7 @@ pub(super) const RECOVERY: Entry =
         }
         Scene::new("overlap_recovery", bodies)
     })
-    .known(|scene, _| rests_on_ground(scene));
+    .known(|scene, _| rests_on_ground(scene))
+    .within(|scene, load| {
+        Tolerances::impacts(scene, 0.25).penetration(0.26, "the quarter that they start with").percent(load)
+    });

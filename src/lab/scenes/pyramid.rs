@@ -1,16 +1,22 @@
 //! B7, C9 and D: pyramids of boxes.
 
+use super::holds::Demand;
 use super::parts::ground_box;
+use super::tolerance::Tolerances;
 use super::truth::rests_on_ground;
 use super::{Entry, Scene, SceneBody, SceneShape};
 
 pub(super) const PYRAMID: Entry = Entry::new("pyramid", "a pyramid of boxes", |base| scene("pyramid", base))
     .sized(10, 1, 1000, "boxes in the lowest row")
-    .known(|scene, _| rests_on_ground(scene));
+    .known(|scene, _| rests_on_ground(scene))
+    .holds(&[Demand::Stands])
+    .within(|_, load| Tolerances::standard().percent(load));
 
 pub(super) const LARGE: Entry =
     Entry::new("large_pyramid", "a pyramid of 5050 boxes", |_| scene("large_pyramid", 100).steps(500))
-        .known(|scene, _| rests_on_ground(scene));
+        .known(|scene, _| rests_on_ground(scene))
+        .holds(&[Demand::Stands])
+        .within(|_, load| Tolerances::standard().percent(load));
 
 pub(super) const MANY: Entry =
     Entry::new("many_pyramids", "floors with pyramids of 55 boxes, as many as there are floors", |floors| {
@@ -31,7 +37,9 @@ pub(super) const MANY: Entry =
         Scene::new("many_pyramids", bodies).steps(200)
     })
     .sized(20, 1, 100, "floors")
-    .known(|scene, _| rests_on_ground(scene));
+    .known(|scene, _| rests_on_ground(scene))
+    .holds(&[Demand::Stands])
+    .within(|_, load| Tolerances::standard().percent(load));
 
 fn scene(name: &str, base: u32) -> Scene {
     let corner = [-0.5 * f64::from(base), 0.0];

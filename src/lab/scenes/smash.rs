@@ -1,5 +1,6 @@
 //! D: a heavy block flies into a wall of small boxes, without gravity.
 
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 
@@ -23,7 +24,9 @@ pub(super) const SMASH: Entry = Entry::new("smash", "a heavy block flies into 96
         Some((x - expected).hypot(y))
     });
     Truth::new("momentum of all bodies at the end", "kg m/s", expected, at_end)
-});
+})
+// The block is heavier than all: what it hits leaves at up to its own speed.
+.within(|scene, momentum| Tolerances::fast(scene, 40.0).percent(momentum));
 
 /// Σ m v (kg m/s)
 fn momentum(view: &View) -> [f64; 2] {

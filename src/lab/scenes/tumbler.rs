@@ -1,5 +1,7 @@
 //! D: a turning square drum, half full of small boxes.
 
+use super::holds::{Demand, Outside};
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
@@ -27,7 +29,10 @@ pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning
 .known(|scene, _| {
     let outside = Worst::from_step(u64::from(scene.steps), |view| Some(escaped(view) as f64));
     Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
-});
+})
+.holds(&[Demand::Contains(Outside(escaped))])
+// Across the drum.
+.within(|scene, _| Tolerances::impacts(scene, 2.0 * REACH).truth(0.5, "none"));
 
 /// Bodies whose centre is beyond the middle of a wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {

@@ -1,5 +1,7 @@
 //! D: a turning drum with four lobes, full of small boxes.
 
+use super::holds::{Demand, Outside};
+use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
@@ -30,7 +32,10 @@ pub(super) const WASHER: Entry = Entry::new("washer", "8100 boxes in a turning d
 .known(|scene, _| {
     let outside = Worst::from_step(u64::from(scene.steps), |view| Some(escaped(view) as f64));
     Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
-});
+})
+.holds(&[Demand::Contains(Outside(escaped))])
+// Across the drum.
+.within(|scene, _| Tolerances::impacts(scene, 2.0 * RADII[0]).truth(0.5, "none"));
 
 /// The piece of a ring from 10 `index` to 10 (`index` + 1) degrees, `wider` degrees more on both sides.
 fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {

@@ -1,4 +1,4 @@
-//! Time against error along a solver's budgets: the curves of a work-precision diagram.
+//! Time against error of a solver's settings: the curves of a work-precision diagram.
 
 use super::Record;
 use crate::engine::params::Budget;
@@ -12,7 +12,7 @@ pub const ERROR_FLOOR: f64 = 1e-8;
 pub enum ErrorAxis {
     /// The deepest penetration: what people see.
     Penetration,
-    /// The contact-law residual, root mean square: the mathematics.
+    /// The contact-law residual, root mean square in body weights: the mathematics.
     Law,
     /// The distance to the truth: the physics.
     Truth,
@@ -35,7 +35,7 @@ impl ErrorAxis {
     pub fn of(self, record: &Record) -> Option<f64> {
         match self {
             ErrorAxis::Penetration => Some(record.errors?.penetration_max),
-            ErrorAxis::Law => Some(record.errors?.law_rms),
+            ErrorAxis::Law => Some(record.errors?.law_rms_body),
             ErrorAxis::Truth => record.truth?.error,
         }
     }
@@ -50,26 +50,29 @@ impl ErrorAxis {
     }
 }
 
-/// One budget of a solver at its fastest lane width.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+/// A setting: a solver, an order and a budget, at its fastest lane width.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<'a> {
+    /// Its record.
+    pub record: &'a Record,
     /// Which of the solver's budgets, in the order in which they were tried.
     pub budget: usize,
     /// Time of a step (ns).
     pub time: f64,
-    /// Spread of that time (ns).
-    pub spread: f64,
     /// At least [`ERROR_FLOOR`].
     pub error: f64,
 }
 
-/// A solver on one scene, sample by sample along its budgets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
+/// The settings of a solver on one scene.
+///
+/// They are different runs: between two of them there is nothing to interpolate. What the solver
+/// can do in a given time, or to a given error, is what one of its settings does.
+#[derive(Clone, Debug)]
+pub struct Curve<'a> {
     /// Name of the solver.
     pub solver: &'static str,
-    /// Budgets that failed, or have no such error, are left out.
-    pub samples: Vec<Sample>,
+    /// Settings that do not hold, or have no such error, are left out.
+    pub samples: Vec<Sample<'a>>,
 }
 
 /// Budgets of a solver in the order in which they were tried.
@@ -94,103 +97,108 @@ pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
     solvers
 }
 
-/// The curves of one scene, one per solver, of coloured settings where there are any, else
-/// of natural ones.
-pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve> {
-    let colored = records.iter().any(|r| r.order == Order::Colored);
-    let order = if colored { Order::Colored } else { Order::Natural };
-    let sample = |solver: &str, budget: usize, value: &Budget| {
-        let widths = records.iter().filter(|r| r.solver == solver && r.budget == *value && r.order == order);
-        let found = widths.filter_map(|r| Some((r.lap.as_ref()?, axis.of(r)?)));
-        let (lap, error) = found.min_by(|a, b| a.0.median_ns.total_cmp(&b.0.median_ns))?;
-        Some(Sample { budget, time: lap.median_ns, spread: lap.spread_ns, error: error.max(ERROR_FLOOR) })
-    };
+/// The curves of one scene, one per solver: every order and budget that holds, at its fastest width.
+pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
     let curve = |solver: &'static str| {
-        let budgets = budgets_of(records, solver);
-        let samples = budgets.iter().enumerate().filter_map(|(i, b)| sample(solver, i, b));
-        Curve { solver, samples: samples.collect() }
+        let own = || records.iter().filter(|r| r.solver == solver);
+        let mut samples: Vec<Sample> = Vec::new();
+        for (budget, value) in budgets_of(records, solver).iter().enumerate() {
+            for order in [Order::Natural, Order::Colored] {
+                let widths = own().filter(|r| r.budget == *value && r.order == order);
+                let timed = widths.filter(|r| r.holds()).filter_map(|record| {
+                    let (lap, error) = (record.lap.as_ref()?, axis.of(record)?);
+                    Some(Sample { record, budget, time: lap.median_ns, error: error.max(ERROR_FLOOR) })
+                });
+                samples.extend(timed.min_by(|a, b| a.time.total_cmp(&b.time)));
+            }
+        }
+        Curve { solver, samples }
     };
     solvers_of(records).into_iter().map(curve).collect()
 }
 
-impl Curve {
-    /// The least error that the curve has at this time (ns); none outside its budgets. Between
-    /// neighbouring budgets it is a line of the logarithms.
-    pub fn error_at(&self, time: f64) -> Option<f64> {
-        self.cross(time, |s| [s.time, s.error]).map(|(error, _)| error)
+impl<'a> Curve<'a> {
+    /// The setting of least error among those that take at most `time` (ns); of equal ones the
+    /// fastest. None if all take longer.
+    pub fn best_within(&self, time: f64) -> Option<Sample<'a>> {
+        let within = self.samples.iter().filter(|s| s.time <= time);
+        within.copied().min_by(|a, b| a.error.total_cmp(&b.error).then(a.time.total_cmp(&b.time)))
     }
 
-    /// The least time (ns) at which the curve has this error, with the larger spread of the
-    /// two samples around it (ns).
-    pub fn time_to(&self, error: f64) -> Option<[f64; 2]> {
-        let (time, [a, b]) = self.cross(error, |s| [s.error, s.time])?;
-        Some([time, a.spread.max(b.spread)])
+    /// The fastest setting among those whose error is at most `error`; of equal ones that of
+    /// least error. None if all have more.
+    pub fn fastest_within(&self, error: f64) -> Option<Sample<'a>> {
+        let within = self.samples.iter().filter(|s| s.error <= error);
+        within.copied().min_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)))
     }
 
-    /// The least ordinate at the abscissa `x`: between neighbouring budgets a curve is a line of
-    /// the logarithms. A curve may come by more than once, since a larger budget is not
-    /// always slower or more exact; none where it does not come by.
-    fn cross(&self, x: f64, axes: impl Fn(&Sample) -> [f64; 2]) -> Option<(f64, [Sample; 2])> {
-        let alone = self.samples.iter().map(|&s| [s, s]);
-        let pieces = self.samples.windows(2).map(|w| [w[0], w[1]]).chain(alone);
-        let crossing = |[a, b]: [Sample; 2]| {
-            let ([x0, y0], [x1, y1]) = (axes(&a), axes(&b));
-            if !(x0.min(x1)..=x0.max(x1)).contains(&x) {
-                return None;
-            }
-            // A piece that runs along the ordinate is at its better end.
-            let along =
-                if x0 == x1 { if y0 <= y1 { 0.0 } else { 1.0 } } else { (x / x0).ln() / (x1 / x0).ln() };
-            Some((y0 * (y1 / y0).powf(along), [a, b]))
-        };
-        pieces.filter_map(crossing).min_by(|a, b| a.0.total_cmp(&b.0))
+    /// The settings that no other one of the solver beats in both time and error, the fastest first.
+    pub fn front(&self) -> Vec<Sample<'a>> {
+        let mut sorted = self.samples.clone();
+        sorted.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)));
+        let mut least = f64::INFINITY;
+        sorted.retain(|s| {
+            let is_better = s.error < least;
+            least = least.min(s.error);
+            is_better
+        });
+        sorted
     }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::lab::study::record::tests::{failed, record};
+    use crate::lab::study::record::tests::{failed, fell, record};
 
-    /// A curve through (time, error), without spread.
-    pub fn curve(samples: &[(f64, f64)]) -> Curve {
-        let sample =
-            |(budget, &(time, error)): (usize, &(f64, f64))| Sample { budget, time, spread: 0.0, error };
-        Curve { solver: "pgs", samples: samples.iter().enumerate().map(sample).collect() }
+    /// Records of `pgs` with times (µs) and errors (m).
+    fn settings(samples: &[(f64, f64)]) -> Vec<Record> {
+        samples.iter().zip(1..).map(|(&(time, error), substeps)| record(8, substeps, time, error)).collect()
     }
 
-    fn close(value: Option<f64>, expected: f64) -> bool {
-        value.is_some_and(|v| (v / expected - 1.0).abs() < 1e-12)
-    }
-
-    #[test]
-    fn logarithms_are_interpolated() {
-        // Error falls with the square of time: 1 at 10, 1/100 at 100.
-        let c = curve(&[(10.0, 1.0), (100.0, 0.01)]);
-        assert!(close(c.error_at(20.0), 0.25) && close(c.time_to(0.25).map(|t| t[0]), 20.0));
-        assert!(close(c.error_at(10.0), 1.0) && close(c.error_at(100.0), 0.01));
-        assert_eq!((c.error_at(9.9), c.error_at(101.0)), (None, None));
-        assert_eq!((c.time_to(1.1), c.time_to(0.0099)), (None, None));
+    fn at(sample: Option<Sample>) -> Option<(f64, f64)> {
+        sample.map(|s| (s.time / 1e3, s.error))
     }
 
     #[test]
-    fn of_several_crossings_the_best_counts() {
-        // The second budget is slower and worse, the third as the first but better.
-        let c = curve(&[(10.0, 0.1), (30.0, 0.4), (10.0, 0.01)]);
-        assert!(close(c.error_at(10.0), 0.01));
-        assert!(close(c.time_to(0.1).map(|t| t[0]), 10.0));
-        // One budget is a point, and an upright piece is its lower end.
-        assert_eq!(curve(&[(10.0, 0.1)]).error_at(10.0), Some(0.1));
-        assert_eq!(curve(&[(10.0, 0.1), (10.0, 0.2)]).error_at(10.0), Some(0.1));
-        assert_eq!(curve(&[]).error_at(1.0), None);
-    }
-
-    #[test]
-    fn a_curve_has_the_fastest_width_of_each_budget() {
-        let records = [record(1, 1, 20.0, 0.5), record(8, 1, 10.0, 0.5), record(8, 2, 30.0, 0.0), failed(8)];
+    fn a_curve_answers_everywhere_beyond_its_least_setting() {
+        let records = settings(&[(10.0, 1.0), (100.0, 0.01)]);
         let found = curves(&records, ErrorAxis::Penetration);
-        assert_eq!(found, [curve(&[(10e3, 0.5), (30e3, ERROR_FLOOR)])]);
-        assert_eq!(curves(&records, ErrorAxis::Truth), [curve(&[])]);
+        let c = &found[0];
+        // In less time than the fastest setting takes there is nothing.
+        assert_eq!(at(c.best_within(9.9e3)), None);
+        // Between two settings it is the one that is done, not something in between.
+        assert_eq!(at(c.best_within(10e3)), Some((10.0, 1.0)));
+        assert_eq!(at(c.best_within(99e3)), Some((10.0, 1.0)));
+        assert_eq!(at(c.best_within(100e3)), Some((100.0, 0.01)));
+        // Time to spare does no harm.
+        assert_eq!(at(c.best_within(1e9)), Some((100.0, 0.01)));
+        assert_eq!(at(c.fastest_within(1e3)), Some((10.0, 1.0)));
+        assert_eq!(at(c.fastest_within(0.5)), Some((100.0, 0.01)));
+        assert_eq!(at(c.fastest_within(0.0099)), None);
+    }
+
+    #[test]
+    fn a_larger_budget_need_not_be_slower_or_better() {
+        let records = settings(&[(10.0, 0.1), (30.0, 0.4), (8.0, 0.01), (8.0, 0.02), (20.0, 0.01)]);
+        let found = curves(&records, ErrorAxis::Penetration);
+        let c = &found[0];
+        assert_eq!(at(c.best_within(1e9)), Some((8.0, 0.01)));
+        assert_eq!(at(c.fastest_within(1.0)), Some((8.0, 0.01)));
+        let front: Vec<_> = c.front().into_iter().map(|s| at(Some(s)).unwrap()).collect();
+        assert_eq!(front, [(8.0, 0.01)]);
+    }
+
+    #[test]
+    fn a_curve_has_the_fastest_width_of_each_budget_in_each_order() {
+        let natural = Record { order: Order::Natural, ..record(1, 1, 5.0, 0.7) };
+        let records =
+            [natural, record(1, 1, 20.0, 0.5), record(8, 1, 10.0, 0.5), record(8, 2, 30.0, 0.0), failed(8)];
+        let records: Vec<Record> = records.into_iter().chain([fell(8, 4, 1.0, 0.0)]).collect();
+        let found = curves(&records, ErrorAxis::Penetration);
+        let samples: Vec<_> = found[0].samples.iter().map(|s| (s.budget, s.time, s.error)).collect();
+        assert_eq!(samples, [(0, 5e3, 0.7), (0, 10e3, 0.5), (1, 30e3, ERROR_FLOOR)]);
+        assert!(curves(&records, ErrorAxis::Truth)[0].samples.is_empty());
         let (law, unit) = (ErrorAxis::Law.of(&records[0]), ErrorAxis::Penetration.unit(&records));
         assert_eq!((law, unit), (Some(0.0), "m"));
     }

@@ -6,6 +6,7 @@
 //! widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
 pub mod ablation;
+pub mod answer;
 pub mod budget;
 pub mod curve;
 pub mod interleave;
@@ -21,6 +22,8 @@ use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
+use crate::lab::scenes::holds::{Broken, Watch};
+use crate::lab::scenes::tolerance::{GivenTolerances, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use interleave::{race, speed_up};
@@ -58,6 +61,8 @@ pub struct StudyPlan {
     pub budgets: BudgetGrid,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
+    /// Tolerances that take the place of the scenes' own.
+    pub tolerances: GivenTolerances,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
     /// Most steps of a timing run.
@@ -77,6 +82,7 @@ impl Default for StudyPlan {
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
             overrides: Vec::new(),
+            tolerances: GivenTolerances::default(),
             steps: None,
             timing_steps: 200,
             repeats: 3,
@@ -141,7 +147,12 @@ pub fn open_scene(
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
     let mut loaded = if is_path(name) {
-        Loaded { scene: Scene::from_file(name)?, truth: None }
+        Loaded {
+            scene: Scene::from_file(name)?,
+            truth: None,
+            demands: &[],
+            tolerances: Tolerances::standard(),
+        }
     } else {
         match seed {
             Some(seed) => scenes::load_with_seed(name, seed)?,
@@ -153,13 +164,15 @@ pub fn open_scene(
     scene.steps = steps.unwrap_or(own_steps);
     scene.dt = dt.unwrap_or(own_dt);
     scene.validate()?;
-    if loaded.truth.is_some() && (scene.steps, scene.dt) != (own_steps, own_dt) {
-        let (stem, size) = name.split_once(':').unwrap_or((name, ""));
-        let entry = scenes::CATALOG.iter().find(|e| e.name == stem);
-        let size = size.parse().ok().or(entry.and_then(|e| e.size).map(|s| s.default));
-        loaded.truth = entry.and_then(|e| e.truth).map(|truth| truth(scene, size.unwrap_or(0)));
+    let (stem, size) = name.split_once(':').unwrap_or((name, ""));
+    let entry = scenes::CATALOG.iter().find(|e| e.name == stem && !is_path(name));
+    match entry {
+        Some(entry) if (scene.steps, scene.dt) != (own_steps, own_dt) => {
+            let size = size.parse().ok().or(entry.size.map(|s| s.default));
+            Ok(entry.loaded(loaded.scene, size.unwrap_or(0)))
+        }
+        _ => Ok(loaded),
     }
-    Ok(loaded)
 }
 
 /// What a study is at, for a progress bar.
@@ -188,6 +201,8 @@ pub struct Outcome {
     pub errors: Result<Errors, Divergence>,
     /// Distance to what is known about the scene.
     pub truth: Option<TruthError>,
+    /// The first demand of the scene that was not met.
+    pub broken: Option<Broken>,
     /// Hash after the steps of a timing run.
     pub hash: u64,
 }
@@ -197,8 +212,11 @@ pub struct Outcome {
 /// Errors: what [`StudyPlan::check`] refuses. A run that diverges is a record, not an error.
 pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Record>, Error> {
     plan.check()?;
-    let scenes: Vec<Scene> =
-        plan.scenes.iter().map(|n| Ok(plan.open(n)?.scene)).collect::<Result<_, Error>>()?;
+    let scenes: Vec<(Scene, Tolerances)> = plan
+        .scenes
+        .iter()
+        .map(|name| plan.open(name).map(|l| (l.scene, l.tolerances.with(&plan.tolerances))))
+        .collect::<Result<_, Error>>()?;
     let mut cells = Vec::new();
     for (scene, name) in plan.scenes.iter().enumerate() {
         for &solver in &plan.solvers {
@@ -222,10 +240,23 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
     let mut records = Vec::new();
     for (cell, outcomes) in cells.iter().zip(&outcomes) {
         tell("times", cell);
-        records.extend(timed_records(plan, &scenes[cell.scene], cell, outcomes)?);
+        let (scene, tolerances) = &scenes[cell.scene];
+        records.extend(timed_records(plan, scene, *tolerances, cell, outcomes)?);
     }
     mark_fronts(&mut records);
+    if plan.steps.is_some() {
+        leave_out_unseen_truths(&mut records);
+    }
     Ok(records)
+}
+
+/// What nobody came to see in a shortened run is not judged.
+fn leave_out_unseen_truths(records: &mut [Record]) {
+    for scene in records.chunk_by_mut(|a, b| a.scene == b.scene) {
+        if scene.iter().all(|r| r.truth.is_none_or(|t| t.error.is_none())) {
+            scene.iter_mut().for_each(|r| r.tolerances.truth = None);
+        }
+    }
 }
 
 /// Settings of a cell in one order at one width.
@@ -284,17 +315,20 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Err
 
 /// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
 pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
-    let Loaded { scene, mut truth } = loaded;
+    let Loaded { scene, mut truth, demands, .. } = loaded;
     let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
     let mut observation = Observation::new(&world);
+    let mut watch = Watch::new(&world, demands);
     let mut hash = 0;
+    let failed = |divergence, hash| Outcome { errors: Err(divergence), truth: None, broken: None, hash };
     for step in 1..=scene.steps {
         if let Err(divergence) = world.step() {
-            return Ok(Outcome { errors: Err(divergence), truth: None, hash });
+            return Ok(failed(divergence, hash));
         }
         observation.observe(&world);
+        watch.observe(&world);
         if let Some(blow_up) = observation.blown_up() {
-            return Ok(Outcome { errors: Err(blow_up), truth: None, hash });
+            return Ok(failed(blow_up, hash));
         }
         if let Some(truth) = &mut truth {
             truth.observer.observe(&world);
@@ -303,13 +337,19 @@ pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outco
             hash = world.state_hash();
         }
     }
-    Ok(Outcome { errors: Ok(observation.errors()), truth: truth.as_ref().map(TruthError::of), hash })
+    Ok(Outcome {
+        errors: Ok(observation.errors()),
+        truth: truth.as_ref().map(TruthError::of),
+        broken: watch.broken(),
+        hash,
+    })
 }
 
 /// Races a cell's orders and widths, those that did not diverge.
 fn timed_records(
     plan: &StudyPlan,
     scene: &Scene,
+    tolerances: Tolerances,
     cell: &Cell,
     outcomes: &[Outcome],
 ) -> Result<Vec<Record>, Error> {
@@ -346,6 +386,8 @@ fn timed_records(
             speed_up: None,
             errors: outcome.errors.ok().filter(|_| failure.is_none()),
             truth: outcome.truth,
+            tolerances,
+            broken: outcome.broken,
             bits_equal: lap.as_ref().map(|lap| lap.hash == outcome.hash),
             front: Fronts::default(),
             lap,

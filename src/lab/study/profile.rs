@@ -1,8 +1,8 @@
 //! Performance profiles: on how many scenes is a solver how close to the fastest?
 //!
 //! **Source.** Dolan and Moré, "Benchmarking optimization software with performance profiles"
-//! (2002). Let t(p, s) be the least time in which any setting of the solver p keeps an error
-//! of the scene s within a tolerance; infinite where none does. Then
+//! (2002). Let t(p, s) be the least time in which any setting of the solver p holds and keeps an
+//! error of the scene s within the scene's tolerance; infinite where none does. Then
 //!
 //! ```text
 //! r(p, s) = t(p, s)/min over p of t(p, s),   ρ(p, τ) = share of scenes with r(p, s) ≤ τ
@@ -15,38 +15,6 @@
 use super::Record;
 use super::curve::{ErrorAxis, solvers_of};
 use super::pareto::tie;
-
-/// What counts as solved.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Tolerances {
-    /// Deepest penetration (m).
-    pub penetration: f64,
-    /// Contact-law residual, root mean square (1).
-    pub law: f64,
-    /// Distance to the truth, as a share of it (1); in its unit where the truth is zero.
-    pub truth: f64,
-}
-
-/// Two slops of overlap, a percent of the weight, a tenth of the truth.
-pub const TOLERANCES: Tolerances = Tolerances { penetration: 0.01, law: 0.01, truth: 0.1 };
-
-impl Tolerances {
-    /// The tolerance of an axis.
-    pub fn of(&self, axis: ErrorAxis) -> f64 {
-        match axis {
-            ErrorAxis::Penetration => self.penetration,
-            ErrorAxis::Law => self.law,
-            ErrorAxis::Truth => self.truth,
-        }
-    }
-
-    fn allows(&self, axis: ErrorAxis, record: &Record) -> bool {
-        let Some(error) = axis.of(record) else { return false };
-        let expected = record.truth.map_or(0.0, |t| t.expected.abs());
-        let scale = if axis == ErrorAxis::Truth && expected > 0.0 { expected } else { 1.0 };
-        error <= self.of(axis) * scale
-    }
-}
 
 /// One axis, all scenes.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,8 +30,9 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The profile of all records along an axis.
-    pub fn of(records: &[Record], axis: ErrorAxis, tolerances: &Tolerances) -> Profile {
+    /// The profile of all records along an axis, within the tolerances of their scenes; what does not
+    /// hold solves nothing.
+    pub fn of(records: &[Record], axis: ErrorAxis) -> Profile {
         let mut ratios: Vec<(&'static str, Vec<f64>)> =
             solvers_of(records).into_iter().map(|s| (s, Vec::new())).collect();
         let (mut scenes, mut solvable) = (0, 0);
@@ -72,7 +41,8 @@ impl Profile {
             let known = axis != ErrorAxis::Truth || group.iter().any(|r| r.truth.is_some());
             scenes += known as usize;
             let time = |solver: &str| {
-                let within = group.iter().filter(|r| r.solver == solver && tolerances.allows(axis, r));
+                let allowed = |r: &Record| r.holds() && r.in_tolerance(axis).is_some_and(|e| e <= 1.0);
+                let within = group.iter().filter(|r| r.solver == solver && allowed(r));
                 let times = within.filter_map(|r| r.lap.as_ref()).map(|l| [l.median_ns, l.spread_ns]);
                 times.min_by(|a, b| a[0].total_cmp(&b[0]))
             };
@@ -98,8 +68,7 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::study::TruthError;
-    use crate::lab::study::record::tests::{failed, record};
+    use crate::lab::study::record::tests::{failed, fell, record};
 
     fn on(scene: &str, solver: &'static str, time: f64, error: f64) -> Record {
         Record { scene: scene.to_string(), solver, ..record(8, 1, time, error) }
@@ -107,12 +76,13 @@ mod tests {
 
     #[test]
     fn shares_count_scenes_within_a_factor_of_the_fastest() {
-        let good = TOLERANCES.penetration;
+        let good = record(8, 1, 1.0, 0.0).tolerances.penetration.value;
         let records = [
             // a is fastest; b takes three times as long, its faster setting is too deep.
             on("x", "a", 10.0, good),
             on("x", "b", 30.0, 0.0),
             on("x", "b", 5.0, 2.0 * good),
+            Record { scene: "x".to_string(), solver: "b", ..fell(8, 1, 1.0, 0.0) },
             // Tied, and a alone.
             on("y", "a", 10.2, 0.0),
             on("y", "b", 10.0, 0.0),
@@ -122,23 +92,12 @@ mod tests {
             on("w", "a", 1.0, 1.0),
             Record { scene: "w".to_string(), solver: "b", ..failed(8) },
         ];
-        let profile = Profile::of(&records, ErrorAxis::Penetration, &TOLERANCES);
+        let profile = Profile::of(&records, ErrorAxis::Penetration);
         assert_eq!((profile.scenes, profile.solvable), (4, 3));
         assert_eq!(profile.ratios, [("a", vec![1.0; 3]), ("b", vec![1.0, 3.0])]);
         assert_eq!([1.0, 2.9, 3.0, 1e9].map(|f| profile.share(1, f)), [0.25, 0.25, 0.5, 0.5]);
         assert_eq!(profile.share(0, 1.0), 0.75);
-        let none = Profile::of(&records, ErrorAxis::Truth, &TOLERANCES);
+        let none = Profile::of(&records, ErrorAxis::Truth);
         assert_eq!((none.scenes, none.share(0, 1e9)), (0, 0.0));
-    }
-
-    #[test]
-    fn truths_are_relative_unless_they_are_zero() {
-        let with = |expected, error| {
-            let truth = TruthError { quantity: "", unit: "N", expected, error: Some(error) };
-            let record = Record { truth: Some(truth), ..record(8, 1, 1.0, 0.0) };
-            TOLERANCES.allows(ErrorAxis::Truth, &record)
-        };
-        assert!(with(-50.0, 5.0) && !with(-50.0, 5.1));
-        assert!(with(0.0, 0.1) && !with(0.0, 0.11));
     }
 }

@@ -1,11 +1,14 @@
 //! What a study finds: a record per setting, and which records are on a front.
 
+use super::curve::ErrorAxis;
 use super::interleave::Sample;
 use super::pareto::{self, Point};
 use crate::engine::params::Budget;
 use crate::engine::world::{Divergence, Order};
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::Truth;
+use crate::lab::scenes::holds::{Broken, Mark};
+use crate::lab::scenes::tolerance::Tolerances;
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -34,12 +37,48 @@ pub struct Record {
     pub errors: Option<Errors>,
     /// Distance to what is known about the scene.
     pub truth: Option<TruthError>,
+    /// How wrong the scene may be.
+    pub tolerances: Tolerances,
+    /// The first demand of the scene that was not met.
+    pub broken: Option<Broken>,
     /// Whether this width ended in the same bits as the error run.
     pub bits_equal: Option<bool>,
     /// Fronts that the setting is on; only its fastest width is.
     pub front: Fronts,
     /// Why there is no result.
     pub failure: Option<Failure>,
+}
+
+impl Record {
+    /// The word for a run that does not hold; none if it does.
+    pub fn mark(&self) -> Option<Mark> {
+        self.broken.map(|b| b.mark).or(self.failure.map(|_| Mark::BlewUp))
+    }
+
+    /// Whether the run holds: only such settings are in fronts, slices, profiles and advice.
+    pub fn holds(&self) -> bool {
+        self.mark().is_none()
+    }
+
+    /// The error along an axis in its tolerance; none where there is no such error.
+    pub fn in_tolerance(&self, axis: ErrorAxis) -> Option<f64> {
+        let tolerance = match axis {
+            ErrorAxis::Penetration => self.tolerances.penetration,
+            ErrorAxis::Law => self.tolerances.residual,
+            ErrorAxis::Truth => self.tolerances.truth?,
+        };
+        let error = axis.of(self)?;
+        Some(if error > 0.0 { error / tolerance.value } else { 0.0 })
+    }
+
+    /// The largest of the errors in their tolerances: up to 1 is within all of them. Infinite for a
+    /// run that does not hold, or that never came to what is known.
+    pub fn excess(&self) -> f64 {
+        let known = self.truth.is_some() && self.tolerances.truth.is_some();
+        let judged = ErrorAxis::ALL.into_iter().filter(|&axis| axis != ErrorAxis::Truth || known);
+        let worst = judged.map(|axis| self.in_tolerance(axis).unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
+        if self.holds() { worst } else { f64::INFINITY }
+    }
 }
 
 /// How far a run was from a known truth.
@@ -101,11 +140,12 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Marks, scene by scene, the settings on each front. A setting is a solver, a budget and
+/// Marks, scene by scene, the settings on each front, of those that hold. A setting is a solver, a budget and
 /// an order, at its fastest width.
 pub fn mark_fronts(records: &mut [Record]) {
     for group in records.chunk_by_mut(|a, b| a.scene == b.scene) {
-        let fastest: Vec<usize> = (0..group.len()).filter(|&i| is_fastest(group, i)).collect();
+        let fastest: Vec<usize> =
+            (0..group.len()).filter(|&i| group[i].holds() && is_fastest(group, i)).collect();
         let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
             let (indices, points): (Vec<usize>, Vec<Point>) = fastest
                 .iter()
@@ -119,7 +159,7 @@ pub fn mark_fronts(records: &mut [Record]) {
             }
         };
         mark(|r| Some(r.errors?.penetration_max), |f| &mut f.penetration);
-        mark(|r| Some(r.errors?.law_rms), |f| &mut f.law);
+        mark(|r| Some(r.errors?.law_rms_body), |f| &mut f.law);
         mark(|r| r.truth?.error, |f| &mut f.truth);
     }
 }
@@ -166,6 +206,8 @@ pub(crate) mod tests {
             speed_up: None,
             errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),
             truth: None,
+            tolerances: Tolerances::standard(),
+            broken: None,
             bits_equal: Some(true),
             front: Fronts::default(),
             failure: None,
@@ -177,6 +219,31 @@ pub(crate) mod tests {
         Record { lap: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
+    /// A record of a run that has errors and a time, and fell.
+    pub fn fell(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
+        let broken = Some(Broken { mark: Mark::Fell, step: 100 });
+        Record { broken, ..record(lanes, substeps, time, penetration) }
+    }
+
+    #[test]
+    fn an_error_is_judged_in_the_tolerance_of_its_scene() {
+        let mut good = record(8, 1, 10.0, 5e-3);
+        assert_eq!((good.in_tolerance(ErrorAxis::Truth), good.excess()), (None, 0.5 * 1e-2 / SLOPS));
+        let truth = TruthError { quantity: "", unit: "N", expected: 50.0, error: Some(2.0) };
+        (good.truth, good.tolerances) = (Some(truth), good.tolerances.percent(50.0));
+        assert_eq!(good.excess(), 4.0);
+        good.truth = Some(TruthError { error: None, ..truth });
+        assert_eq!(good.excess(), f64::INFINITY);
+        for bad in [fell(8, 1, 10.0, 0.0), failed(8)] {
+            assert_eq!((bad.excess(), bad.holds()), (f64::INFINITY, false));
+        }
+        assert_eq!(fell(8, 1, 10.0, 0.0).mark(), Some(Mark::Fell));
+        assert_eq!(failed(8).mark(), Some(Mark::BlewUp));
+    }
+
+    /// Two slops (m), as `f32` has them.
+    const SLOPS: f64 = 2.0 * crate::engine::params::LINEAR_SLOP as f64;
+
     #[test]
     fn only_the_fastest_width_of_a_setting_is_on_a_front() {
         let mut records = vec![
@@ -186,13 +253,15 @@ pub(crate) mod tests {
             record(8, 2, 15.0, 0.1),
             record(8, 4, 40.0, 0.2),
             failed(8),
+            // The fastest and best of all, but it fell.
+            fell(8, 8, 1.0, 0.0),
         ];
         mark_fronts(&mut records);
         let marked: Vec<bool> = records.iter().map(|r| r.front.penetration).collect();
-        assert_eq!(marked, [false, true, false, true, false, false]);
+        assert_eq!(marked, [false, true, false, true, false, false, false]);
         // All residuals are zero: only time counts. There is no truth.
         let marked: Vec<bool> = records.iter().map(|r| r.front.law).collect();
-        assert_eq!(marked, [false, true, false, false, false, false]);
+        assert_eq!(marked, [false, true, false, false, false, false, false]);
         assert!(records.iter().all(|r| !r.front.truth));
     }
 

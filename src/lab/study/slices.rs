@@ -1,59 +1,61 @@
-//! Work-precision curves cut across: the errors of all solvers in equal time, and their
-//! times to equal error.
+//! All solvers compared in equal time, and to equal error: of each the best setting that takes
+//! at most that time, or the fastest whose error is at most that large.
 
 use super::Record;
-use super::curve::{Curve, ErrorAxis, curves};
+use super::curve::{Curve, ErrorAxis, Sample, curves};
 use super::pareto::tie;
 
 /// Every solver of a scene at one time or at one error.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Slice {
+#[derive(Clone, Debug)]
+pub struct Slice<'a> {
     /// Name of the scene.
-    pub scene: String,
-    /// Where the curves are cut: a time (ns) or an error.
+    pub scene: &'a str,
+    /// What is given: a time (ns) or an error.
     pub at: f64,
     /// Unit of the error.
     pub unit: &'static str,
-    /// Solver, and its error or its time with the spread (ns); none where its budgets do
-    /// not reach.
-    pub values: Vec<(&'static str, Option<[f64; 2]>)>,
-}
-
-impl Slice {
-    /// The solvers that nobody beats: the best one, and those that [tie] with it.
-    pub fn best(&self) -> Vec<&'static str> {
-        let least = self.values.iter().filter_map(|v| v.1).min_by(|a, b| a[0].total_cmp(&b[0]));
-        let Some(least) = least else { return Vec::new() };
-        self.values.iter().filter(|v| v.1.is_some_and(|value| tie(value, least))).map(|v| v.0).collect()
-    }
+    /// Solver, and its setting; none where all take longer, or have a larger error.
+    pub values: Vec<(&'static str, Option<Sample<'a>>)>,
+    /// The solvers that nobody beats: in equal time those of least error, to equal error the
+    /// fastest and those that [tie] with it.
+    pub best: Vec<&'static str>,
 }
 
 /// The errors of the scene in equal time; none if no curve has an error of this kind.
-pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice> {
-    slice(records, axis, |s| s.0, |curve, at| Some([curve.error_at(at)?, 0.0]))
+pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
+    let best = |least: &Sample, other: &Sample| other.error <= least.error;
+    slice(records, axis, |s| s.time, Curve::best_within, |s| s.error, best)
 }
 
 /// The times to equal error.
-pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice> {
-    slice(records, axis, |s| s.1, |curve, at| curve.time_to(at))
+pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
+    let time =
+        |s: &Sample| s.record.lap.as_ref().map_or([f64::INFINITY, 0.0], |l| [l.median_ns, l.spread_ns]);
+    let best = |least: &Sample, other: &Sample| tie(time(least), time(other));
+    slice(records, axis, |s| s.error, Curve::fastest_within, |s| s.time, best)
 }
 
-fn slice(
-    records: &[Record],
+fn slice<'a>(
+    records: &'a [Record],
     axis: ErrorAxis,
-    abscissa: fn((f64, f64)) -> f64,
-    value: impl Fn(&Curve, f64) -> Option<[f64; 2]>,
-) -> Option<Slice> {
+    given: fn(&Sample) -> f64,
+    of: fn(&Curve<'a>, f64) -> Option<Sample<'a>>,
+    sought: fn(&Sample) -> f64,
+    as_good: impl Fn(&Sample, &Sample) -> bool,
+) -> Option<Slice<'a>> {
     let curves = curves(records, axis);
-    let ranges: Vec<[f64; 2]> = curves.iter().filter_map(|c| range(c, abscissa)).collect();
+    let ranges: Vec<[f64; 2]> = curves.iter().filter_map(|c| range(c, given)).collect();
     let at = common(&ranges)?;
-    let values = curves.iter().map(|c| (c.solver, value(c, at))).collect();
-    Some(Slice { scene: records.first()?.scene.clone(), at, unit: axis.unit(records), values })
+    let values: Vec<_> = curves.iter().map(|c| (c.solver, of(c, at))).collect();
+    let found = || values.iter().filter_map(|(solver, sample)| Some((*solver, sample.as_ref()?)));
+    let least = found().map(|f| f.1).min_by(|a, b| sought(a).total_cmp(&sought(b)));
+    let best = found().filter(|(_, s)| least.is_some_and(|least| as_good(least, s))).map(|f| f.0).collect();
+    Some(Slice { scene: &records.first()?.scene, at, unit: axis.unit(records), values, best })
 }
 
-/// From the least to the largest abscissa of a curve.
-fn range(curve: &Curve, abscissa: fn((f64, f64)) -> f64) -> Option<[f64; 2]> {
-    let all = || curve.samples.iter().map(|s| abscissa((s.time, s.error)));
+/// From the least to the largest time or error of a solver's settings.
+fn range(curve: &Curve, given: fn(&Sample) -> f64) -> Option<[f64; 2]> {
+    let all = || curve.samples.iter().map(given);
     let least = all().min_by(f64::total_cmp)?;
     Some([least, all().fold(least, f64::max)])
 }
@@ -105,36 +107,57 @@ mod tests {
     }
 
     #[test]
-    fn slices_read_the_curves_and_leave_out_who_does_not_reach() {
+    fn slices_take_settings_and_leave_out_who_does_not_reach() {
         let other = |time, error| Record { solver: "soft_step", ..record(8, 4, time, error) };
         let records = [
             record(8, 1, 10.0, 0.5),
             record(8, 2, 40.0, 0.03125),
-            other(30.0, 0.25),
-            Record { solver: "projection", ..record(8, 1, 5.0, 3.0) },
+            other(12.0, 0.25),
+            Record { solver: "projection", ..record(8, 1, 80.0, 3.0) },
         ];
-        // pgs: error = 50/t². The other two are points, and that of soft_step is at a round time.
+        let at = |s: &(&'static str, Option<Sample>)| s.1.map(|s| (s.time / 1e3, s.error));
+        // 20 µs: the second setting of pgs is not done, and projection has none that is. That of
+        // soft_step was done long ago.
         let time = equal_time(&records, ErrorAxis::Penetration).unwrap();
-        assert_eq!((time.scene.as_str(), time.unit, time.at), ("stack:2", "m", 30e3));
-        assert!((time.values[0].1.unwrap()[0] - 50.0 / 900.0).abs() < 1e-12);
-        assert_eq!(time.values[1..], [("soft_step", Some([0.25, 0.0])), ("projection", None)]);
-        assert_eq!(time.best(), ["pgs"]);
-        let error = equal_error(&records, ErrorAxis::Penetration).unwrap();
-        assert!(
-            (error.values[0].1.unwrap()[0] / 1e3 - (50.0 / (100.0 * error.at)).sqrt() * 10.0).abs() < 1e-9
-        );
-        assert_eq!(equal_time(&records, ErrorAxis::Truth), None);
+        assert_eq!((time.scene, time.unit), ("stack:2", "m"));
+        assert!((12e3..40e3).contains(&time.at), "{}", time.at);
+        let values: Vec<_> = time.values.iter().map(at).collect();
+        assert_eq!(values, [Some((10.0, 0.5)), Some((12.0, 0.25)), None]);
+        assert_eq!(time.best, ["soft_step"]);
+        // To an error of 0.1 to 0.25, or less: a setting is as good as any larger error.
+        let error = equal_error(&records[..3], ErrorAxis::Penetration).unwrap();
+        let values: Vec<_> = error.values.iter().map(at).collect();
+        assert_eq!((values[0], error.values.len()), (Some((40.0, 0.03125)), 2), "{}", error.at);
+        assert!(equal_time(&records, ErrorAxis::Truth).is_none());
+    }
+
+    #[test]
+    fn a_setting_that_is_done_early_answers_later() {
+        // The pyramid of 40 rows in equal time: 385 µs and 7.0 mm are better than 500 µs and 20.3 mm.
+        let slow = |substeps, time, error| record(8, substeps, time, error);
+        let soft = |substeps, time, error| Record { solver: "soft_step", ..record(8, substeps, time, error) };
+        let records = [
+            slow(1, 250.0, 35.0e-3),
+            slow(2, 500.0, 20.3e-3),
+            slow(4, 900.0, 18.0e-3),
+            soft(4, 230.0, 7.3e-3),
+            soft(8, 385.0, 7.0e-3),
+        ];
+        let slice = equal_time(&records, ErrorAxis::Penetration).unwrap();
+        assert_eq!(slice.best, ["soft_step"], "at {}", slice.at);
+        let c = curves(&records, ErrorAxis::Penetration);
+        assert_eq!(c[1].best_within(500e3).map(|s| s.error), Some(7.0e-3));
     }
 
     #[test]
     fn noise_makes_a_tie() {
-        let slice = |values: &[[f64; 2]]| {
+        let slice = |times: [f64; 3]| {
             let names = ["a", "b", "c"];
-            let values = names.into_iter().zip(values).map(|(n, &v)| (n, Some(v))).collect();
-            Slice { scene: String::new(), at: 1.0, unit: "m", values }.best()
+            let of = |(solver, time)| Record { solver, ..record(8, 1, time, 0.1) };
+            let records: Vec<Record> = names.into_iter().zip(times).map(of).collect();
+            equal_error(&records, ErrorAxis::Penetration).unwrap().best
         };
-        assert_eq!(slice(&[[100.0, 0.0], [102.0, 0.0], [104.0, 0.0]]), ["a", "b"]);
-        assert_eq!(slice(&[[100.0, 0.0], [110.0, 6.0], [104.0, 0.0]]), ["a", "b"]);
-        assert!(slice(&[]).is_empty());
+        assert_eq!(slice([100.0, 102.0, 104.0]), ["a", "b"]);
+        assert_eq!(slice([105.0, 120.0, 100.0]), ["c"]);
     }
 }

@@ -1,0 +1,367 @@
+//! What a scene demands of a run, and the word for one that does not meet it.
+//!
+//! A run that fell has fallen, however fast it was and however small its errors are: nobody wants
+//! it. Every scene demands that its kinetic energy has a source (see
+//! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes
+//! through a static one; what else it demands stands in its row of the catalogue.
+
+use super::truth::View;
+use crate::engine::bodies::BodyKind;
+use crate::engine::shapes::Shape;
+use crate::engine::world::World;
+use crate::lab::metrics::overlaps::Overlaps;
+use crate::lab::metrics::state::BodyState;
+use glam::DVec2;
+use std::f64::consts::TAU;
+
+/// Why a run does not hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mark {
+    /// A body left those it stood on.
+    Fell,
+    /// A body left its place.
+    Slid,
+    /// A body went through another.
+    Tunnelled,
+    /// Energy came from nowhere.
+    BlewUp,
+}
+
+impl Mark {
+    /// For tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Mark::Fell => "fell",
+            Mark::Slid => "slid",
+            Mark::Tunnelled => "tunnelled",
+            Mark::BlewUp => "blew up",
+        }
+    }
+}
+
+/// The first demand that a run did not meet.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Broken {
+    /// The word for it.
+    pub mark: Mark,
+    /// Step, from 1.
+    pub step: u64,
+}
+
+impl std::fmt::Display for Broken {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} at step {}", self.mark.word(), self.step)
+    }
+}
+
+/// What a scene demands of every step.
+#[derive(Clone, Copy, Debug)]
+pub enum Demand {
+    /// Every two bodies that touch at the start stay together: neither moves against the other by
+    /// more than [`LEFT`] of the reach of the smaller one. However far a tall pile sags as a whole,
+    /// a body that is off the next one has fallen.
+    Stands,
+    /// The bodies, dropped one above the other in their order, end up so: none is beside the next
+    /// one by more than [`LEFT`] of its reach, nor below it.
+    StaysStacked,
+    /// No dynamic body moves farther than this from its start (m).
+    StaysWithin(f64),
+    /// No body is outside.
+    Contains(Outside),
+    /// Kinetic and potential energy never exceed those of the start by more than [`GAIN`] of the
+    /// largest kinetic energy so far.
+    GainsNoEnergy,
+}
+
+/// Counts the bodies that are outside of what should contain them.
+#[derive(Clone, Copy, Debug)]
+pub struct Outside(pub(super) fn(&View) -> usize);
+
+/// Share of a body's reach, from its centre to its farthest corner, by which it may move against one
+/// that it touched: a unit box then is 0.35 m off, and its centre still above the one below.
+pub const LEFT: f64 = 0.5;
+
+/// Share of the largest kinetic energy that may come from nowhere. Semi-implicit Euler itself is off
+/// by up to m g h v/2, that is g h/v of it: 4 % at 4.5 m/s in steps of 1/60 s.
+pub const GAIN: f64 = 0.1;
+
+impl Demand {
+    /// In words.
+    pub fn meaning(&self) -> String {
+        match self {
+            Demand::Stands => "no body leaves those it stood on (fell)".to_string(),
+            Demand::StaysStacked => "the bodies end up one above the other (fell)".to_string(),
+            Demand::StaysWithin(limit) => format!("no body leaves its place by more than {limit} m (slid)"),
+            Demand::Contains(_) => "no body gets out (tunnelled)".to_string(),
+            Demand::GainsNoEnergy => "the energy does not grow (blew up)".to_string(),
+        }
+    }
+
+    fn mark(&self) -> Mark {
+        match self {
+            Demand::Stands | Demand::StaysStacked => Mark::Fell,
+            Demand::StaysWithin(_) => Mark::Slid,
+            Demand::Contains(_) => Mark::Tunnelled,
+            Demand::GainsNoEnergy => Mark::BlewUp,
+        }
+    }
+}
+
+/// Watches a run from before its first step.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    demands: &'static [Demand],
+    start: Vec<DVec2>,
+    previous: Vec<DVec2>,
+    /// From the centre of mass to the farthest point; infinite unless dynamic (m).
+    reach: Vec<f64>,
+    /// Bodies that touched at the start.
+    touching: Vec<[usize; 2]>,
+    walls: Walls,
+    /// At the start, and the largest kinetic energy so far (J).
+    energy: [f64; 2],
+    broken: Option<Broken>,
+}
+
+impl Watch {
+    /// For a world that has not taken a step yet.
+    pub fn new(world: &World, demands: &'static [Demand]) -> Self {
+        let start = centers(world);
+        let mut reach = vec![0.0_f64; world.bodies.len()];
+        for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
+            let farthest = &mut reach[body as usize];
+            let radius = f64::from(shape.radius());
+            shape.for_each_vertex(|v| *farthest = farthest.max(f64::from(v.length()) + radius));
+        }
+        for (i, reach) in reach.iter_mut().enumerate() {
+            if !world.bodies.is_dynamic(i) {
+                *reach = f64::INFINITY;
+            }
+        }
+        let mut touching = Vec::new();
+        if demands.iter().any(|d| matches!(d, Demand::Stands)) {
+            Overlaps::default().find(world, |pair, _| {
+                touching.push(pair.map(|shape| world.shape_body[shape as usize] as usize));
+            });
+        }
+        touching.sort();
+        touching.dedup();
+        let kinetic = energies(world);
+        Watch {
+            demands,
+            previous: start.clone(),
+            start,
+            reach,
+            touching,
+            walls: Walls::new(world),
+            energy: [kinetic[0] + kinetic[1], kinetic[0]],
+            broken: None,
+        }
+    }
+
+    /// The first demand that was not met, if there is one.
+    pub fn broken(&self) -> Option<Broken> {
+        self.broken
+    }
+
+    /// Looks at the world after one more step.
+    pub fn observe(&mut self, world: &World) {
+        if self.broken.is_some() {
+            return;
+        }
+        let now = centers(world);
+        let broken = self.demands.iter().find(|d| !self.is_met(d, world, &now)).map(Demand::mark);
+        let through = || {
+            let paths = self.previous.iter().zip(&now).enumerate();
+            let mut paths = paths.filter(|(i, _)| world.bodies.is_dynamic(*i));
+            paths.any(|(_, (&from, &to))| self.walls.are_crossed(from, to))
+        };
+        let mark = broken.or_else(|| through().then_some(Mark::Tunnelled));
+        self.broken = mark.map(|mark| Broken { mark, step: world.step_index });
+        if self.demands.iter().any(|d| matches!(d, Demand::GainsNoEnergy)) {
+            self.energy[1] = self.energy[1].max(energies(world)[0]);
+        }
+        self.previous = now;
+    }
+
+    /// What is not a number meets nothing.
+    fn is_met(&self, demand: &Demand, world: &World, now: &[DVec2]) -> bool {
+        match demand {
+            Demand::Stands => self.touching.iter().all(|&[a, b]| {
+                let moved = (now[b] - now[a]) - (self.start[b] - self.start[a]);
+                moved.length() <= LEFT * self.reach[a].min(self.reach[b])
+            }),
+            Demand::StaysStacked => {
+                let dynamic: Vec<usize> = (0..now.len()).filter(|&i| world.bodies.is_dynamic(i)).collect();
+                dynamic.windows(2).all(|pair| {
+                    let apart = now[pair[1]] - now[pair[0]];
+                    let limit = LEFT * self.reach[pair[0]].min(self.reach[pair[1]]);
+                    apart.x.abs() <= limit && apart.y > 0.0
+                })
+            }
+            Demand::StaysWithin(limit) => (0..now.len())
+                .filter(|&i| world.bodies.is_dynamic(i))
+                .all(|i| now[i].distance(self.start[i]) <= *limit),
+            Demand::Contains(Outside(count)) => count(&View::of(world)) == 0,
+            Demand::GainsNoEnergy => {
+                let [kinetic, potential] = energies(world);
+                kinetic + potential - self.energy[0] <= GAIN * self.energy[1].max(kinetic)
+            }
+        }
+    }
+}
+
+/// Centres of mass (m), by body.
+fn centers(world: &World) -> Vec<DVec2> {
+    (0..world.bodies.len()).map(|i| DVec2::from(world.bodies.center(i))).collect()
+}
+
+/// Kinetic and potential energy of the dynamic bodies (J).
+fn energies(world: &World) -> [f64; 2] {
+    let gravity = DVec2::from(world.settings.gravity.map(f64::from));
+    let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.is_dynamic(i));
+    let states = dynamic.map(|i| BodyState::of(&world.bodies, i, gravity));
+    states.fold([0.0, 0.0], |[kinetic, potential], s| {
+        [kinetic + s.kinetic_energy(), potential - s.force.dot(s.position)]
+    })
+}
+
+/// Outlines of all static shapes.
+#[derive(Clone, Debug, Default)]
+struct Walls {
+    /// From one end to the other (m), ascending by the lower end.
+    edges: Vec<[DVec2; 2]>,
+    /// The highest end of this edge and all before it (m).
+    highest: Vec<f64>,
+}
+
+/// A static disc counts as a polygon of so many edges.
+const DISC_EDGES: usize = 16;
+
+impl Walls {
+    fn new(world: &World) -> Self {
+        let bodies = &world.bodies;
+        let mut edges = Vec::new();
+        for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
+            let i = body as usize;
+            if bodies.kind[i] != BodyKind::Static {
+                continue;
+            }
+            let rotation = bodies.pose(i).rotation.as_dvec2();
+            let place = |v: DVec2| DVec2::from(bodies.center(i)) + rotation.rotate(v);
+            let mut corners = Vec::new();
+            shape.for_each_vertex(|v| corners.push(place(v.as_dvec2())));
+            if let Shape::Circle { center, radius } = shape {
+                let corner = |k: usize| DVec2::from_angle(TAU * k as f64 / DISC_EDGES as f64);
+                let around = |k: usize| place(center.as_dvec2() + f64::from(*radius) * corner(k));
+                corners = (0..DISC_EDGES).map(around).collect();
+            }
+            let ends = corners.iter().zip(corners.iter().cycle().skip(1));
+            // A line of two corners is one edge.
+            let count = if corners.len() == 2 { 1 } else { corners.len() };
+            edges.extend(ends.take(count).map(|(&a, &b)| [a, b]));
+        }
+        edges.sort_by(|a, b| a[0].y.min(a[1].y).total_cmp(&b[0].y.min(b[1].y)));
+        let highest = edges.iter().scan(f64::NEG_INFINITY, |highest, e| {
+            *highest = highest.max(e[0].y).max(e[1].y);
+            Some(*highest)
+        });
+        Walls { highest: highest.collect(), edges }
+    }
+
+    /// Whether the way from one point to another crosses an outline.
+    fn are_crossed(&self, from: DVec2, to: DVec2) -> bool {
+        let (low, high) = (from.y.min(to.y), from.y.max(to.y));
+        let begun = self.edges.partition_point(|e| e[0].y.min(e[1].y) <= high);
+        let reaching = self.edges[..begun].iter().zip(&self.highest).rev().take_while(|(_, h)| **h >= low);
+        reaching.into_iter().any(|(&[a, b], _)| {
+            // On which side of a line through p and q a point is.
+            let side = |p: DVec2, q: DVec2, point: DVec2| (q - p).perp_dot(point - p) > 0.0;
+            side(a, b, from) != side(a, b, to) && side(from, to, a) != side(from, to, b)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::{DEFAULT, find};
+    use crate::engine::world::Settings;
+    use crate::lab::scenes::{Scene, SceneBody, SceneShape, load};
+
+    fn build(scene: &Scene) -> World {
+        scene.build(Settings::new(find(DEFAULT).unwrap())).unwrap()
+    }
+
+    /// What is broken once body `i` is at `place`.
+    fn moved(name: &str, demands: &'static [Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
+        let mut world = build(&load(name).unwrap().scene);
+        let mut watch = Watch::new(&world, demands);
+        watch.observe(&world);
+        assert_eq!(watch.broken(), None, "{name}");
+        [world.bodies.position_x[i], world.bodies.position_y[i]] = place;
+        watch.observe(&world);
+        watch.broken().map(|b| b.mark)
+    }
+
+    #[test]
+    fn a_box_off_the_next_one_has_fallen_and_one_that_sags_has_not() {
+        // Reach √½ m, so that 0.354 m are too many.
+        assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.35, 2.5]), None);
+        assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.36, 2.5]), Some(Mark::Fell));
+        assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.0, 2.1]), Some(Mark::Fell));
+        assert_eq!(moved("stack:3", &[Demand::Stands], 3, [f32::NAN, 2.5]), Some(Mark::Fell));
+        assert_eq!(moved("vertical_stack", &[Demand::StaysStacked], 15, [0.3, 15.0]), None);
+        assert_eq!(moved("vertical_stack", &[Demand::StaysStacked], 15, [0.4, 15.0]), Some(Mark::Fell));
+    }
+
+    #[test]
+    fn slides_and_walls_have_their_words() {
+        let stays = &[Demand::StaysWithin(0.05)];
+        assert_eq!(moved("stack:1", stays, 1, [0.06, 0.5]), Some(Mark::Slid));
+        assert_eq!(moved("stack:1", stays, 1, [0.04, 0.5]), None);
+        // Half of it below the ground is not through it, its centre is.
+        assert_eq!(moved("stack:1", &[], 1, [0.0, 0.01]), None);
+        assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunnelled));
+        assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunnelled));
+        // Past the end of the ground.
+        let outside = &[Demand::Contains(Outside(|view| usize::from(view.center(1)[0] > 1.0)))];
+        assert_eq!(moved("stack:1", outside, 1, [2.0, 0.5]), Some(Mark::Tunnelled));
+    }
+
+    #[test]
+    fn energy_from_nowhere_is_a_blow_up() {
+        let mut world = build(&load("bounce").unwrap().scene);
+        let mut watch = Watch::new(&world, &[Demand::GainsNoEnergy]);
+        let fall = |world: &mut World, y: f32, v: f32| {
+            (world.bodies.position_y[1], world.bodies.velocity_y[1]) = (y, v);
+        };
+        // From 10.5 m: 10 m of fall are 14.14 m/s.
+        fall(&mut world, 0.5, -14.0);
+        watch.observe(&world);
+        fall(&mut world, 0.5, 14.5);
+        watch.observe(&world);
+        assert_eq!(watch.broken(), None);
+        // 15 m/s are 112.5 J/kg, and 10 % more than 100 would be allowed if it were still falling.
+        fall(&mut world, 0.5, 15.2);
+        watch.observe(&world);
+        assert_eq!(watch.broken().map(|b| b.mark), Some(Mark::BlewUp));
+    }
+
+    #[test]
+    fn walls_are_crossed_where_the_way_meets_an_outline() {
+        let yard = vec![
+            SceneBody::fixed([0.0, 0.0], SceneShape::rectangle(1.0, 1.0)),
+            SceneBody::fixed([0.0, 10.0], SceneShape::line(5.0)),
+            SceneBody::fixed([20.0, 0.0], SceneShape::disc(2.0)),
+            SceneBody::dynamic([50.0, 50.0], SceneShape::disc(1.0)),
+        ];
+        let walls = Walls::new(&build(&Scene::new("x", yard)));
+        assert_eq!(walls.edges.len(), 4 + 1 + DISC_EDGES);
+        let crossed = |a: [f64; 2], b: [f64; 2]| walls.are_crossed(a.into(), b.into());
+        assert!(crossed([0.0, 1.5], [0.0, 0.5]) && crossed([-9.0, 0.0], [9.0, 0.1]));
+        assert!(crossed([4.0, 11.0], [4.0, 9.0]) && !crossed([6.0, 11.0], [6.0, 9.0]));
+        assert!(crossed([23.0, 0.1], [21.0, 0.1]) && !crossed([-2.0, 2.0], [2.0, 2.0]));
+    }
+}
