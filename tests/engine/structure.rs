@@ -80,8 +80,8 @@ const ENGINE: &[&[&str]] = &[
 const LAB: &[&[&str]] = &[
     &["error"],
     &["files", "overrides"],
-    &["scenes", "reference"],
-    &["metrics", "capture"],
+    &["metrics", "reference"],
+    &["scenes", "capture"],
     &["verify", "study", "converge"],
     &["advise", "report"],
     &["profile"],
