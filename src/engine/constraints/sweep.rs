@@ -480,6 +480,10 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
 ) {
     let layout = const { Layout::of::<N, O>() };
     let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    if O::HAS_ROW {
+        rows.assert_rows(row_a);
+    }
     for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {
         let (record, later) = records.split_at_mut(layout.stride);
         prefetch(later, (PREFETCH_BATCHES - 1) * layout.stride..PREFETCH_BATCHES * layout.stride);
