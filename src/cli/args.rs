@@ -118,7 +118,7 @@ pub struct StudyArgs {
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
-    /// Timing runs of each setting [default: 3]
+    /// Timing runs of each setting; the best of a scene run twice as often again [default: 3]
     #[arg(long)]
     pub repeats: Option<u32>,
     /// Shuffles the timing runs and lays out random scenes

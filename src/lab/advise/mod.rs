@@ -24,8 +24,8 @@ use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
 use crate::lab::scenes::holds::Broken;
+use crate::lab::study::compare::compare;
 use crate::lab::study::interleave::{Sample, race};
-use crate::lab::study::pareto::tie;
 use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
 use limits::Limits;
 use search::Search;
@@ -112,6 +112,8 @@ pub struct Trial {
     pub setting: Setting,
     /// At the fastest width; none if the run failed.
     pub time: Option<Time>,
+    /// Blocks of the final race at that width; none before it.
+    pub lap: Option<Sample>,
     /// None if the run failed.
     pub errors: Option<Errors>,
     /// Distance to what is known about the scene.
@@ -134,10 +136,9 @@ impl Trial {
         self.time.map_or(f64::INFINITY, |t| t.median_ns)
     }
 
-    /// Whether the times of two trials differ by no more than noise.
+    /// Whether two trials of the final race are alike as far as can be told.
     pub fn ties(&self, other: &Trial) -> bool {
-        let of = |t: Time| [t.median_ns, t.spread_ns];
-        matches!((self.time, other.time), (Some(a), Some(b)) if tie(of(a), of(b)))
+        matches!((&self.lap, &other.lap), (Some(a), Some(b)) if compare(a, b).is_eq())
     }
 }
 
@@ -256,17 +257,17 @@ fn race_again(
     for (i, trial) in finalists.iter_mut().enumerate() {
         let own = runs.iter().zip(&laps).filter(|((j, _), _)| *j == i);
         let laps = own.filter_map(|((_, width), lap)| Some((*width, lap.as_ref().ok()?)));
-        if let Some(time) = fastest(laps) {
-            trial.time = Some(time);
+        if let Some((time, lap)) = fastest(laps) {
+            (trial.time, trial.lap) = (Some(time), Some(lap.clone()));
             trial.excess = excess(&plan.limits, trial);
         }
     }
     Ok(())
 }
 
-fn fastest<'a>(laps: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<Time> {
+fn fastest<'a>(laps: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(Time, &'a Sample)> {
     let (width, lap) = laps.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
-    Some(Time { lanes: width.lanes(), median_ns: lap.median_ns, spread_ns: lap.spread_ns })
+    Some((Time { lanes: width.lanes(), median_ns: lap.median_ns, spread_ns: lap.spread_ns }, lap))
 }
 
 fn excess(limits: &Limits, trial: &Trial) -> f64 {
@@ -287,6 +288,7 @@ mod tests {
         Trial {
             setting,
             time,
+            lap: None,
             errors: Some(Errors::default()),
             truth: None,
             failure: None,

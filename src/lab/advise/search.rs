@@ -220,6 +220,7 @@ impl<'a> Search<'a> {
         let mut trial = Trial {
             setting,
             time: None,
+            lap: None,
             errors: outcome.errors.ok(),
             truth: outcome.truth,
             failure: outcome.errors.err().map(Failure::from),
@@ -230,7 +231,7 @@ impl<'a> Search<'a> {
             let settings: Vec<_> = widths.iter().map(|&w| setting.settings(w)).collect();
             let laps = race(self.scene, &settings, self.scene.steps.min(TRIAL_STEPS), 1, self.plan.seed)?;
             let finished = widths.iter().zip(&laps).filter_map(|(&w, lap)| Some((w, lap.as_ref().ok()?)));
-            trial.time = fastest(finished);
+            trial.time = fastest(finished).map(|(time, _)| time);
             trial.excess = excess(&self.plan.limits, &trial);
         }
         Ok(trial)

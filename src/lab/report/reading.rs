@@ -4,7 +4,6 @@ use super::units::{digits, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::study::Record;
 use crate::lab::study::answer::Answer;
-use crate::lab::study::pareto::tie;
 
 /// A line per scene: the cheapest setting that holds and keeps the scene's tolerances.
 pub fn reading(records: &[Record]) -> String {
@@ -34,12 +33,10 @@ pub fn reading(records: &[Record]) -> String {
 
 /// The other solvers that do the same within the noise of the clock.
 fn tied(answer: &Answer) -> String {
-    let time = |r: &Record| r.lap.as_ref().map(|lap| [lap.median_ns, lap.spread_ns]);
     let Some(best) = answer.best() else { return String::new() };
     let mut names: Vec<&str> = Vec::new();
-    for record in answer.good.iter().filter(|r| r.solver != best.solver) {
-        let ties = time(record).zip(time(best)).is_some_and(|(own, best)| tie(own, best));
-        if ties && !names.contains(&record.solver) {
+    for record in answer.tied().filter(|r| r.solver != best.solver) {
+        if !names.contains(&record.solver) {
             names.push(record.solver);
         }
     }

@@ -1,6 +1,8 @@
 //! What to use on a scene: the cheapest setting that holds and keeps the scene's tolerances.
 
 use super::Record;
+use super::compare::compare;
+use std::cmp::Ordering;
 
 /// The settings of a scene that are worth naming. A setting is a solver, an order and a budget, at
 /// its fastest lane width.
@@ -8,7 +10,7 @@ use super::Record;
 pub struct Answer<'a> {
     /// Name of the scene.
     pub scene: &'a str,
-    /// Those that hold and keep every tolerance, the fastest first.
+    /// Those that hold and keep every tolerance: the cheapest, then the others by their time.
     pub good: Vec<&'a Record>,
     /// Of those that hold and do not keep them, the one nearest to it; none if nothing holds.
     pub nearest: Option<&'a Record>,
@@ -26,6 +28,12 @@ impl<'a> Answer<'a> {
             if !good.iter().any(|other| same(other, record)) {
                 good.push(record);
             }
+        }
+        // By blocks of the same rounds another one may be faster than the one of the least median.
+        let faster = |a: &Record, b: &Record| order(a, b).is_lt();
+        let best = (0..good.len()).reduce(|best, i| if faster(good[i], good[best]) { i } else { best });
+        if let Some(best) = best {
+            good[..=best].rotate_right(1);
         }
         let others = timed.into_iter().filter(|r| r.holds() && r.excess() > 1.0);
         let key = |r: &Record| (r.excess(), time(r));
@@ -45,6 +53,37 @@ impl<'a> Answer<'a> {
     pub fn runner_up(&self) -> Option<&'a Record> {
         self.good.get(1).copied()
     }
+
+    /// Those that are as cheap as far as can be told, without the cheapest itself.
+    pub fn tied(&self) -> impl Iterator<Item = &'a Record> {
+        let best = self.best();
+        self.good.iter().skip(1).copied().filter(move |r| best.is_some_and(|best| order(r, best).is_eq()))
+    }
+}
+
+/// Settings this much slower than the fastest may still be the cheapest (1).
+const CLOSE: f64 = 1.1;
+
+/// Most records that are timed again.
+const MOST_FINALISTS: usize = 10;
+
+/// Places of the records that may turn out to be the cheapest, or the next: those that are good
+/// enough and close to the fastest of them, and the fastest of another setting.
+pub fn finalists(records: &[Record]) -> Vec<usize> {
+    let mut good: Vec<usize> = (0..records.len()).filter(|&i| records[i].excess() <= 1.0).collect();
+    good.sort_by(|&a, &b| time(&records[a]).total_cmp(&time(&records[b])));
+    let Some(&first) = good.first() else { return Vec::new() };
+    let limit = CLOSE * time(&records[first]);
+    let next = good.iter().copied().find(|&i| !same(&records[i], &records[first]));
+    let is_close = |&i: &usize| time(&records[i]) <= limit;
+    let mut chosen: Vec<usize> = good.iter().copied().filter(is_close).take(MOST_FINALISTS).collect();
+    chosen.extend(next.filter(|next| !chosen.contains(next)));
+    chosen
+}
+
+/// Which of two records is faster, if that can be told.
+pub fn order(a: &Record, b: &Record) -> Ordering {
+    a.lap.as_ref().zip(b.lap.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
 }
 
 /// Whether two records differ in their lane width at most.
@@ -60,6 +99,56 @@ fn time(record: &Record) -> f64 {
 mod tests {
     use super::*;
     use crate::lab::study::record::tests::{failed, fell, record};
+
+    #[test]
+    fn finalists_are_close_to_the_fastest_or_the_next() {
+        let records = [
+            record(8, 1, 200.0, 1e-3),
+            record(1, 2, 109.0, 1e-3),
+            record(8, 2, 100.0, 1e-3),
+            record(8, 3, 10.0, 1.0),
+            record(8, 4, 150.0, 1e-3),
+        ];
+        assert_eq!(finalists(&records), [2, 1, 4]);
+        assert!(finalists(&records[3..4]).is_empty());
+    }
+
+    #[test]
+    fn the_order_of_the_list_decides_nothing() {
+        let mut records = vec![
+            record(8, 1, 10.0, 1e-3),
+            Record { solver: "soft_step", ..record(8, 1, 10.1, 1e-3) },
+            Record { solver: "projection", ..record(8, 1, 10.2, 1e-3) },
+            record(8, 2, 20.0, 1e-3),
+        ];
+        let names = |records: &[Record]| {
+            let answer = Answer::of(records).unwrap();
+            let tied: Vec<&str> = answer.tied().map(|r| r.solver).collect();
+            (answer.best().map(|r| r.solver), tied)
+        };
+        for _ in 0..4 {
+            records.rotate_left(1);
+            assert_eq!(names(&records), (Some("pgs"), vec!["soft_step", "projection"]));
+        }
+    }
+
+    #[test]
+    fn blocks_decide_before_medians_do() {
+        // Taken in the same rounds, the second is always 10 % faster; the first left out the slow ones.
+        let with = |substeps: u32, blocks: Vec<f64>| {
+            let mut own = record(8, substeps, 0.0, 1e-3);
+            own.lap = Some(crate::lab::study::interleave::tests::sample(vec![blocks]));
+            own
+        };
+        let mut first = vec![100.0; 20];
+        first.extend([f64::NAN; 20]);
+        let mut second = vec![90.0; 20];
+        second.extend([300.0; 21]);
+        let records = [with(1, first), with(2, second)];
+        let answer = Answer::of(&records).unwrap();
+        let substeps: Vec<u32> = answer.good.iter().map(|r| r.budget.substeps).collect();
+        assert_eq!(substeps, [2, 1]);
+    }
 
     #[test]
     fn the_cheapest_that_holds_within_tolerance_is_named() {

@@ -1,11 +1,16 @@
-//! Timing: worlds that differ in one setting, stepped in turn.
+//! Timing: all settings of a scene take turns, in blocks of some steps.
 //!
-//! A machine's clock rate and its other guests change from second to second. So all worlds
-//! of a race take step 1, then all take step 2, in an order that is shuffled for every step:
-//! whatever the machine does, it does to all of them.
+//! A machine's clock rate and its other guests change from second to second, so settings that are
+//! timed one after another are compared with the weather. Here every setting of a scene has a world
+//! of its own, and in every round each world goes the same block of steps, in an order that rotates
+//! from round to round. Settings are compared by the blocks of the same round ([`super::compare`]),
+//! so what changes slowly changes both.
 //!
-//! Clock readings within a step cost as much as a small scene's step. Every fourth step is
-//! read phase by phase, and only the other three count as a step's time.
+//! ```text
+//! block:  ○ ● ● ● ● ● ● ● ● ◐     ○ meets cold caches, not timed
+//!                                 ● timed together: two clock readings for all of them
+//!                                 ◐ read phase by phase, which costs as much as a small step
+//! ```
 
 use crate::engine::clock::Phase;
 use crate::engine::world::{Divergence, Settings, StepCounts, World};
@@ -14,20 +19,27 @@ use crate::lab::scenes::Scene;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64;
+use std::ops::Range;
 use std::time::Instant;
 
-/// One in this many steps is read phase by phase.
-const PHASE_STEPS: u32 = 4;
+/// Most steps of a block.
+const BLOCK: u32 = 10;
 
-/// Times and counts of one world.
+/// Blocks that a pass has at least, if it has steps for them.
+const LEAST_BLOCKS: u32 = 12;
+
+/// Fewest steps of a block, one of each kind.
+const LEAST_BLOCK: u32 = 3;
+
+/// Times and counts of one setting.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Sample {
-    /// Median over the steps (ns); a step's time is the median of its repeats.
+    /// Median over the blocks (ns per step); a block's time is the median of its repeats.
     pub median_ns: f64,
-    /// Median distance of a repeat from its step's median (ns); with one repeat, of a
-    /// step from the median step.
+    /// Median distance of a repeat from its block's median (ns); with one repeat, of a
+    /// block from the median block.
     pub spread_ns: f64,
-    /// Lower and upper quartile of the steps (ns): how the scene's cost changes as it moves.
+    /// Lower and upper quartile of the blocks (ns): how the scene's cost changes as it moves.
     pub quartiles_ns: [f64; 2],
     /// Median time of each phase (ns), in the order of [`Phase::ALL`].
     pub phase_ns: [f64; Phase::ALL.len()],
@@ -35,9 +47,10 @@ pub struct Sample {
     pub row_sweep_ns: f64,
     /// Averages over the steps.
     pub load: Load,
-    /// Time of each step (ns), for comparing step by step; not a number where none was taken.
+    /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
+    /// the setting took no part.
     #[serde(skip)]
-    pub steps_ns: Vec<f64>,
+    pub blocks_ns: Vec<Vec<f64>>,
     /// Hash of the final state.
     #[serde(skip)]
     pub hash: u64,
@@ -98,10 +111,41 @@ impl LoadSum {
     }
 }
 
-/// What is kept of one world while the race runs.
+/// Lets `count` entrants take turns in so many rounds: `turn(entrant, round)` for each of them.
+///
+/// The order of a round is the last one's, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
+/// and every second round is read backwards (Williams 1949), so that who comes after whom changes,
+/// too: an entrant that leaves the caches full of its own does not always leave them to the same one.
+/// It rotates by the golden section of the count, so that after any number of rounds everybody has
+/// been early and late about as often.
+pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize)) {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    for round in 0..rounds {
+        let start = ((round as f64 * GOLDEN).fract() * count as f64) as usize;
+        for mut place in 0..count {
+            if round % 2 == 1 {
+                place = count - 1 - place;
+            }
+            let step = if place % 2 == 1 { place.div_ceil(2) } else { count - place / 2 };
+            turn((start + step) % count, round);
+        }
+    }
+}
+
+/// Settings of one scene, timed in turns.
+pub struct Race<'a> {
+    scene: &'a Scene,
+    settings: Vec<Settings>,
+    blocks: Vec<Range<u32>>,
+    entrants: Vec<Entrant>,
+    random: Pcg64,
+}
+
+/// What is kept of one setting.
+#[derive(Clone, Default)]
 struct Entrant {
-    /// `[step][repeat]` (ns)
-    samples: Vec<Vec<f64>>,
+    /// `[pass][block]` (ns per step)
+    blocks: Vec<Vec<f64>>,
     phases: [Vec<f64>; Phase::ALL.len()],
     row_sweep: Vec<f64>,
     load: LoadSum,
@@ -109,7 +153,56 @@ struct Entrant {
     failure: Option<Divergence>,
 }
 
-/// Steps `scene` under each of `settings` and times them; a world that diverges drops out.
+/// The steps of a pass in blocks; what is left over is not run.
+fn blocks(steps: u32) -> Vec<Range<u32>> {
+    let length = (steps / LEAST_BLOCKS).clamp(LEAST_BLOCK, BLOCK).min(steps);
+    (0..steps / length.max(1)).map(|i| i * length..(i + 1) * length).collect()
+}
+
+/// How many of so many steps a race goes.
+pub fn whole_blocks(steps: u32) -> u32 {
+    blocks(steps).last().map_or(0, |block| block.end)
+}
+
+impl<'a> Race<'a> {
+    /// Of the first `steps` steps; `seed` decides who begins.
+    pub fn new(scene: &'a Scene, settings: Vec<Settings>, steps: u32, seed: u64) -> Self {
+        let entrants = vec![Entrant::default(); settings.len()];
+        Race { scene, settings, blocks: blocks(steps), entrants, random: Pcg64::seed_from_u64(seed) }
+    }
+
+    /// Goes through the steps so many times with those settings that `enter`; a world that diverges
+    /// drops out.
+    pub fn run(&mut self, passes: u32, enter: &[usize]) -> Result<(), Error> {
+        let mut names = enter.to_vec();
+        for _ in 0..passes {
+            // Nobody's place in the list is a place in the order.
+            names.shuffle(&mut self.random);
+            let mut worlds: Vec<World> = Vec::new();
+            for &i in &names {
+                worlds.push(self.scene.build(self.settings[i].clone())?);
+            }
+            for entrant in &mut self.entrants {
+                entrant.blocks.push(vec![f64::NAN; self.blocks.len()]);
+            }
+            let Race { blocks, entrants, .. } = self;
+            take_turns(names.len(), blocks.len(), |place, round| {
+                entrants[names[place]].go(&mut worlds[place], blocks[round].clone(), round);
+            });
+            for (&i, world) in names.iter().zip(&worlds) {
+                self.entrants[i].hash = world.state_hash();
+            }
+        }
+        Ok(())
+    }
+
+    /// What was found about a setting; why it dropped out, if it did.
+    pub fn sample(&self, setting: usize) -> Result<Sample, Divergence> {
+        self.entrants[setting].sample()
+    }
+}
+
+/// Times all settings of a scene side by side; a world that diverges drops out.
 pub fn race(
     scene: &Scene,
     settings: &[Settings],
@@ -117,105 +210,82 @@ pub fn race(
     repeats: u32,
     seed: u64,
 ) -> Result<Vec<Result<Sample, Divergence>>, Error> {
-    let entrant = || Entrant {
-        samples: vec![Vec::new(); steps as usize],
-        phases: Default::default(),
-        row_sweep: Vec::new(),
-        load: LoadSum::default(),
-        hash: 0,
-        failure: None,
-    };
-    let mut entrants: Vec<Entrant> = settings.iter().map(|_| entrant()).collect();
-    let mut order: Vec<usize> = (0..settings.len()).collect();
-    let mut random = Pcg64::seed_from_u64(seed);
-    for repeat in 0..repeats {
-        let mut worlds: Vec<World> =
-            settings.iter().map(|s| scene.build(s.clone())).collect::<Result<_, _>>()?;
-        for step in 0..steps {
-            order.shuffle(&mut random);
-            for &i in &order {
-                entrants[i].step(&mut worlds[i], step, repeat);
-            }
-        }
-        for (entrant, world) in entrants.iter_mut().zip(&worlds) {
-            entrant.hash = world.state_hash();
-        }
-    }
-    Ok(entrants.into_iter().map(Entrant::finish).collect())
+    let mut race = Race::new(scene, settings.to_vec(), steps, seed);
+    let all: Vec<usize> = (0..settings.len()).collect();
+    race.run(repeats, &all)?;
+    Ok(all.into_iter().map(|i| race.sample(i)).collect())
 }
 
 impl Entrant {
-    fn step(&mut self, world: &mut World, step: u32, repeat: u32) {
+    /// Goes one block, the last pass's number `round`.
+    fn go(&mut self, world: &mut World, steps: Range<u32>, round: usize) {
         if self.failure.is_some() {
             return;
         }
-        let by_phase = (step + repeat).is_multiple_of(PHASE_STEPS);
-        world.settings.timed = by_phase;
+        // Of one step there is no cold one and none for the phases.
+        let (cold, clocked) = if steps.len() >= 3 { (1, 1) } else { (0, 0) };
+        let timed = steps.len() - cold - clocked;
+        for _ in 0..cold {
+            self.step(world);
+        }
         let start = Instant::now();
-        let outcome = world.step();
-        let elapsed = start.elapsed().as_nanos() as f64;
-        if let Err(divergence) = outcome {
-            self.failure = Some(divergence);
-            return;
+        for _ in 0..timed {
+            self.step(world);
         }
-        self.load.add(&world.counts);
-        if !by_phase {
-            self.samples[step as usize].push(elapsed);
-            return;
+        let elapsed = start.elapsed().as_nanos() as f64 / timed.max(1) as f64;
+        world.settings.timed = true;
+        for _ in 0..clocked {
+            self.step(world);
+            for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
+                times.push(ns as f64);
+            }
+            if world.counts.row_updates > 0 {
+                let rows = world.counts.row_updates as f64;
+                self.row_sweep.push(world.timings.sweep_ns() as f64 / rows);
+            }
         }
-        for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
-            times.push(ns as f64);
-        }
-        let work = world.counts.row_updates;
-        if work > 0 {
-            self.row_sweep.push(world.timings.sweep_ns() as f64 / work as f64);
+        world.settings.timed = false;
+        if let Some(pass) = self.blocks.last_mut() {
+            pass[round] = elapsed;
         }
     }
 
-    fn finish(mut self) -> Result<Sample, Divergence> {
+    fn step(&mut self, world: &mut World) {
+        if self.failure.is_none() {
+            self.failure = world.step().err();
+            self.load.add(&world.counts);
+        }
+    }
+
+    fn sample(&self) -> Result<Sample, Divergence> {
         if let Some(divergence) = self.failure {
             return Err(divergence);
         }
-        // The first step finds cold caches and grows every array.
-        if self.samples.iter().skip(1).any(|s| !s.is_empty()) {
-            self.samples[0].clear();
-        }
-        let steps_ns: Vec<f64> =
-            self.samples.iter().map(|s| if s.is_empty() { f64::NAN } else { median(s) }).collect();
-        let known: Vec<f64> = steps_ns.iter().copied().filter(|t| !t.is_nan()).collect();
-        let middle = median(&known);
-        let repeated = self.samples.iter().any(|s| s.len() > 1);
-        let deviations: Vec<f64> = self
-            .samples
+        let count = self.blocks.first().map_or(0, Vec::len);
+        let repeats = |block: usize| -> Vec<f64> {
+            self.blocks.iter().map(|pass| pass[block]).filter(|t| !t.is_nan()).collect()
+        };
+        let times: Vec<Vec<f64>> = (0..count).map(repeats).filter(|t| !t.is_empty()).collect();
+        let medians: Vec<f64> = times.iter().map(|t| median(t)).collect();
+        let middle = median(&medians);
+        let repeated = times.iter().any(|t| t.len() > 1);
+        let deviations: Vec<f64> = times
             .iter()
-            .zip(&steps_ns)
-            .filter(|(s, _)| s.len() > 1 || !repeated)
-            .flat_map(|(s, &own)| s.iter().map(move |t| (t - if repeated { own } else { middle }).abs()))
+            .zip(&medians)
+            .filter(|(t, _)| t.len() > 1 || !repeated)
+            .flat_map(|(t, &own)| t.iter().map(move |t| (t - if repeated { own } else { middle }).abs()))
             .collect();
         Ok(Sample {
             median_ns: middle,
             spread_ns: median(&deviations),
-            quartiles_ns: [quantile(&known, 0.25), quantile(&known, 0.75)],
+            quartiles_ns: [quantile(&medians, 0.25), quantile(&medians, 0.75)],
             phase_ns: self.phases.each_ref().map(|times| median(times)),
             row_sweep_ns: median(&self.row_sweep),
             load: self.load.average(),
-            steps_ns,
+            blocks_ns: self.blocks.clone(),
             hash: self.hash,
         })
     }
-}
-
-/// How many times faster `lap` is than `other`, the median over the steps that both have;
-/// none if there is no such step.
-pub fn speed_up(lap: &Sample, other: &Sample) -> Option<f64> {
-    let ratios: Vec<f64> = lap
-        .steps_ns
-        .iter()
-        .zip(&other.steps_ns)
-        .map(|(own, other)| other / own)
-        .filter(|ratio| ratio.is_finite())
-        .collect();
-    (!ratios.is_empty()).then(|| median(&ratios))
 }
 
 /// The median, 0 of nothing.
@@ -234,8 +304,13 @@ pub fn quantile(values: &[f64], p: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// A sample of these blocks (ns per step), `[pass][block]`.
+    pub fn sample(blocks: Vec<Vec<f64>>) -> Sample {
+        Entrant { blocks, ..Entrant::default() }.sample().unwrap()
+    }
 
     #[test]
     fn quantiles_interpolate_and_of_nothing_are_zero() {
@@ -245,35 +320,20 @@ mod tests {
         assert_eq!(median(&[]), 0.0);
     }
 
-    fn lap(samples: Vec<Vec<f64>>) -> Sample {
-        let entrant = Entrant {
-            samples,
-            phases: Default::default(),
-            row_sweep: Vec::new(),
-            load: LoadSum::default(),
-            hash: 0,
-            failure: None,
-        };
-        entrant.finish().unwrap()
-    }
-
     #[test]
-    fn the_spread_is_of_repeats_and_not_of_steps() {
-        // Steps cost 10, 20 and 30; one repeat in three was interrupted.
-        let l = lap(vec![vec![99.0], vec![10.0, 11.0, 500.0], vec![20.0, 21.0, 22.0], vec![30.0; 3]]);
-        assert_eq!((l.median_ns, l.quartiles_ns), (21.0, [16.0, 25.5]));
+    fn the_spread_is_of_repeats_and_not_of_blocks() {
+        // Blocks cost 10, 20 and 30; one repeat in three was interrupted, and one took no part.
+        let s = sample(vec![
+            vec![10.0, 20.0, 30.0],
+            vec![11.0, 21.0, 30.0],
+            vec![500.0, 22.0, 30.0],
+            vec![f64::NAN; 3],
+        ]);
+        assert_eq!((s.median_ns, s.quartiles_ns), (21.0, [16.0, 25.5]));
         // Deviations: 1, 0, 489, 1, 0, 1, 0, 0, 0.
-        assert_eq!(l.spread_ns, 0.0);
-        let once = lap(vec![vec![99.0], vec![10.0], vec![], vec![20.0], vec![60.0]]);
+        assert_eq!(s.spread_ns, 0.0);
+        let once = sample(vec![vec![10.0, 20.0, 60.0]]);
         assert_eq!((once.median_ns, once.spread_ns), (20.0, 10.0));
-    }
-
-    #[test]
-    fn the_speed_up_compares_step_by_step() {
-        let slow = lap(vec![vec![1.0], vec![10.0], vec![400.0], vec![30.0]]);
-        let fast = lap(vec![vec![1.0], vec![5.0], vec![100.0], vec![]]);
-        assert_eq!(speed_up(&fast, &slow), Some(3.0));
-        assert_eq!(speed_up(&lap(vec![]), &slow), None);
     }
 
     #[test]
@@ -283,5 +343,50 @@ mod tests {
         sum.add(&StepCounts { contacts: 10, lane_slots: 16, colors: 1, ..StepCounts::default() });
         let load = sum.average();
         assert_eq!((load.occupancy, load.colors, load.rows, load.contacts), (0.5, 2, 12.0, 8.0));
+    }
+
+    #[test]
+    fn steps_are_cut_into_blocks() {
+        assert_eq!(blocks(200).len(), 20);
+        assert_eq!((blocks(40).len(), blocks(40)[1].clone()), (13, 3..6));
+        assert_eq!((blocks(2), blocks(1), blocks(0)), (vec![0..2], vec![0..1], vec![]));
+        for steps in 0..300 {
+            assert_eq!(blocks(whole_blocks(steps)), blocks(steps));
+        }
+    }
+
+    #[test]
+    fn everybody_has_a_turn_in_every_round_and_no_fixed_place_or_predecessor() {
+        for count in [1, 2, 7, 12, 45] {
+            let rounds = 60;
+            let mut places = vec![vec![0; count]; count];
+            let mut order: Vec<Vec<usize>> = vec![Vec::new(); rounds];
+            take_turns(count, rounds, |entrant, round| {
+                places[entrant][order[round].len()] += 1;
+                order[round].push(entrant);
+            });
+            for round in &order {
+                let mut sorted = round.clone();
+                sorted.sort();
+                assert_eq!(sorted, (0..count).collect::<Vec<_>>());
+            }
+            // The mean place of everybody is the middle, to a twentieth of the field.
+            for own in &places {
+                let mean = own.iter().enumerate().map(|(i, n)| (i * n) as f64).sum::<f64>() / rounds as f64;
+                assert!(
+                    (mean - 0.5 * (count - 1) as f64).abs() < 0.05 * count as f64 + 1e-9,
+                    "{count} {mean}"
+                );
+            }
+            // Who comes before 0: many different ones.
+            let before = |round: &Vec<usize>| {
+                let at = round.iter().position(|&e| e == 0)?;
+                Some(round[at.checked_sub(1)?])
+            };
+            let mut all: Vec<usize> = order.iter().filter_map(before).collect();
+            all.sort();
+            all.dedup();
+            assert!(all.len() + 2 >= count.min(rounds / 2), "{count}: {all:?}");
+        }
     }
 }

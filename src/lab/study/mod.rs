@@ -1,13 +1,14 @@
 //! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from a [race](mod@race) of the same
-//! setting in natural order and at every lane width, alone on the machine. All coloured
-//! widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
+//! all cores at once, because no clock is read. *Times* come from a [race](interleave) of all
+//! settings of a scene, alone on the machine; those that may be the cheapest are timed again. All
+//! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
 pub mod ablation;
 pub mod answer;
 pub mod budget;
+pub mod compare;
 pub mod curve;
 pub mod interleave;
 pub mod pareto;
@@ -26,7 +27,8 @@ use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::scenes::tolerance::{GivenTolerances, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
-use interleave::{race, speed_up};
+use compare::Ratio;
+use interleave::Race;
 pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -94,7 +96,7 @@ impl Default for StudyPlan {
 impl StudyPlan {
     /// A look at everything, in seconds: short runs, nothing repeated.
     pub fn quick() -> Self {
-        StudyPlan { steps: Some(60), timing_steps: 20, repeats: 1, ..StudyPlan::default() }
+        StudyPlan { steps: Some(60), timing_steps: 36, repeats: 1, ..StudyPlan::default() }
     }
 
     /// Refuses what cannot be run, before anything is.
@@ -186,7 +188,7 @@ pub struct Progress {
     pub what: String,
 }
 
-/// The settings that share an error run and a race.
+/// The settings that share an error run per order.
 struct Cell<'a> {
     scene: usize,
     name: &'a str,
@@ -226,22 +228,14 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
         }
     }
     let done = AtomicUsize::new(0);
-    let total = cells.len() * (plan.orders.len() + 1);
-    let tell = |verb: &str, cell: &Cell| {
-        let done = done.fetch_add(1, Ordering::Relaxed);
-        let budget = budget::brief(&cell.budget, cell.solver);
-        progress(Progress {
-            done,
-            total,
-            what: format!("{verb} {} · {} · {budget}", cell.name, cell.solver.name),
-        });
-    };
+    let total = cells.len() * plan.orders.len() + scenes.len() * (plan.repeats as usize + 1);
+    let tell = |what: String| progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
     let outcomes = error_runs(plan, &cells, &tell)?;
     let mut records = Vec::new();
-    for (cell, outcomes) in cells.iter().zip(&outcomes) {
-        tell("times", cell);
-        let (scene, tolerances) = &scenes[cell.scene];
-        records.extend(timed_records(plan, scene, *tolerances, cell, outcomes)?);
+    for (i, (scene, tolerances)) in scenes.iter().enumerate() {
+        let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene == i);
+        let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
+        records.extend(timed_records(plan, scene, *tolerances, &rows, &tell)?);
     }
     mark_fronts(&mut records);
     if plan.steps.is_some() {
@@ -267,14 +261,14 @@ fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Se
 
 /// Steps of a timing run.
 fn timing_steps(plan: &StudyPlan, scene: &Scene) -> u32 {
-    scene.steps.min(plan.timing_steps)
+    interleave::whole_blocks(scene.steps.min(plan.timing_steps))
 }
 
 /// Every cell in every order, on all cores; `[cell][order]`.
 fn error_runs(
     plan: &StudyPlan,
     cells: &[Cell],
-    tell: &(dyn Fn(&str, &Cell) + Sync),
+    tell: &(dyn Fn(String) + Sync),
 ) -> Result<Vec<Vec<Outcome>>, Error> {
     let jobs: Vec<(usize, Order)> =
         (0..cells.len()).flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
@@ -284,7 +278,8 @@ fn error_runs(
         loop {
             let job = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(cell, order)) = jobs.get(job) else { return Ok::<(), Error>(()) };
-            tell("errors", &cells[cell]);
+            let Cell { name, solver, budget, .. } = &cells[cell];
+            tell(format!("errors {name} · {} · {}", solver.name, budget::brief(budget, solver)));
             let outcome = error_run(plan, &cells[cell], order)?;
             if let Ok(mut found) = found.lock() {
                 found[job] = Some(outcome);
@@ -345,41 +340,63 @@ pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outco
     })
 }
 
-/// Races a cell's orders and widths, those that did not diverge.
+/// What becomes a record.
+struct Row<'a> {
+    cell: &'a Cell<'a>,
+    order: Order,
+    width: LaneWidth,
+    outcome: &'a Outcome,
+}
+
+/// The orders and widths of a cell.
+fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Row<'a>> {
+    let mut rows = Vec::new();
+    for (&order, outcome) in plan.orders.iter().zip(outcomes) {
+        let widths: &[LaneWidth] = match order {
+            Order::Natural => &[LaneWidth::W1],
+            Order::Colored => &plan.widths,
+        };
+        rows.extend(widths.iter().map(|&width| Row { cell, order, width, outcome }));
+    }
+    rows
+}
+
+/// Finalists are timed so many times as often again.
+const FINAL: u32 = 2;
+
+/// Races all settings of a scene that did not diverge, and those that may be the cheapest again.
 fn timed_records(
     plan: &StudyPlan,
     scene: &Scene,
     tolerances: Tolerances,
-    cell: &Cell,
-    outcomes: &[Outcome],
+    rows: &[Row],
+    tell: &dyn Fn(String),
 ) -> Result<Vec<Record>, Error> {
-    let mut rows = Vec::new();
-    for (&order, outcome) in plan.orders.iter().zip(outcomes) {
-        match order {
-            Order::Natural => rows.push((order, LaneWidth::W1, outcome)),
-            Order::Colored => rows.extend(plan.widths.iter().map(|&w| (order, w, outcome))),
-        }
+    let racing: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
+    let chosen = racing.iter().map(|&i| settings(plan, rows[i].cell, rows[i].order, rows[i].width));
+    let mut race = Race::new(scene, chosen.collect(), timing_steps(plan, scene), plan.seed);
+    let all: Vec<usize> = (0..racing.len()).collect();
+    for pass in 1..=plan.repeats {
+        tell(format!("times {} · pass {pass}", scene.name));
+        race.run(1, &all)?;
     }
-    let racing: Vec<Settings> = rows
-        .iter()
-        .filter(|row| row.2.errors.is_ok())
-        .map(|&(order, width, _)| settings(plan, cell, order, width))
-        .collect();
-    let mut laps = race(scene, &racing, timing_steps(plan, scene), plan.repeats, plan.seed)?.into_iter();
-    let mut records: Vec<Record> = Vec::new();
-    for (order, width, outcome) in rows {
-        let lap = match outcome.errors {
-            Ok(_) => laps.next().unwrap_or(Err(Divergence { step: 0, body: 0, speed: 0.0 })),
-            Err(divergence) => Err(divergence),
-        };
+    let place = |i: usize| racing.binary_search(&i).ok();
+    let untimed = Divergence { step: 0, body: 0, speed: 0.0 };
+    let lap = |race: &Race, i: usize| match rows[i].outcome.errors {
+        Ok(_) => place(i).map_or(Err(untimed), |place| race.sample(place)),
+        Err(divergence) => Err(divergence),
+    };
+    let record = |(i, row): (usize, &Row)| {
+        let Row { cell, order, width, outcome } = row;
+        let lap = lap(&race, i);
         let failure = lap.as_ref().err().map(|&d| Failure::from(d));
         let lap = lap.ok();
-        records.push(Record {
+        Record {
             scene: scene.name.clone(),
             bodies: scene.bodies.len(),
             dt: scene.dt,
             solver: cell.solver.name,
-            order,
+            order: *order,
             lanes: width.lanes(),
             budget: cell.budget,
             budget_text: budget::brief(&cell.budget, cell.solver),
@@ -392,13 +409,24 @@ fn timed_records(
             front: Fronts::default(),
             lap,
             failure,
-        });
-    }
-    let one_lane = records.iter().find(|r| r.order == Order::Colored && r.lanes == 1);
-    if let Some(one_lane) = one_lane.and_then(|r| r.lap.clone()) {
-        for record in &mut records {
-            record.speed_up = record.lap.as_ref().and_then(|lap| speed_up(lap, &one_lane));
         }
+    };
+    let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
+
+    tell(format!("times {} · finalists", scene.name));
+    let finalists = answer::finalists(&records);
+    let entering: Vec<usize> = finalists.iter().filter_map(|&i| place(i)).collect();
+    race.run(FINAL * plan.repeats, &entering)?;
+    for i in finalists {
+        records[i].lap = lap(&race, i).ok();
+    }
+    let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
+    for i in 0..records.len() {
+        let own = &records[i];
+        let budget = |r: &&Record| (r.solver, r.budget) == (own.solver, own.budget);
+        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.lap.as_ref());
+        let ratio = slow.zip(own.lap.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
+        records[i].speed_up = ratio.map(|r| r.median);
     }
     Ok(records)
 }

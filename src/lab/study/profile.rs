@@ -13,8 +13,9 @@
 //! noise does not decide who is fastest.
 
 use super::Record;
+use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
-use super::pareto::tie;
+use super::interleave::Sample;
 
 /// One axis, all scenes.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,15 +44,16 @@ impl Profile {
             let time = |solver: &str| {
                 let allowed = |r: &Record| r.holds() && r.in_tolerance(axis).is_some_and(|e| e <= 1.0);
                 let within = group.iter().filter(|r| r.solver == solver && allowed(r));
-                let times = within.filter_map(|r| r.lap.as_ref()).map(|l| [l.median_ns, l.spread_ns]);
-                times.min_by(|a, b| a[0].total_cmp(&b[0]))
+                within.filter_map(|r| r.lap.as_ref()).min_by(|a, b| a.median_ns.total_cmp(&b.median_ns))
             };
             let times: Vec<_> = ratios.iter().map(|(solver, _)| time(solver)).collect();
-            let least = times.iter().flatten().copied().min_by(|a, b| a[0].total_cmp(&b[0]));
+            let least = times.iter().flatten().copied().min_by(|a, b| a.median_ns.total_cmp(&b.median_ns));
             let Some(least) = least else { continue };
             solvable += 1;
             for ((_, ratios), time) in ratios.iter_mut().zip(times) {
-                ratios.extend(time.map(|t| if tie(t, least) { 1.0 } else { t[0] / least[0] }));
+                let ratio =
+                    |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.median_ns / least.median_ns };
+                ratios.extend(time.map(ratio));
             }
         }
         ratios.iter_mut().for_each(|(_, r)| r.sort_by(f64::total_cmp));

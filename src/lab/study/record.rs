@@ -150,11 +150,12 @@ pub fn mark_fronts(records: &mut [Record]) {
             let (indices, points): (Vec<usize>, Vec<Point>) = fastest
                 .iter()
                 .filter_map(|&i| {
-                    let (lap, error) = (group[i].lap.as_ref()?, error(&group[i])?);
-                    Some((i, Point { time: lap.median_ns, spread: lap.spread_ns, error }))
+                    let (sample, error) = (group[i].lap.as_ref()?, error(&group[i])?);
+                    Some((i, Point { sample, error }))
                 })
                 .unzip();
-            for (i, on_front) in indices.into_iter().zip(pareto::front(&points)) {
+            let fronts = pareto::front(&points);
+            for (i, on_front) in indices.into_iter().zip(fronts) {
                 *flag(&mut group[i].front) = on_front;
             }
         };
@@ -164,16 +165,13 @@ pub fn mark_fronts(records: &mut [Record]) {
     }
 }
 
-/// Whether record `i` is the fastest width of its setting.
+/// Whether no width of the same setting is faster than record `i`.
 fn is_fastest(group: &[Record], i: usize) -> bool {
     let own = &group[i];
     let time = |r: &Record| r.lap.as_ref().map(|lap| lap.median_ns);
     let Some(own_time) = time(own) else { return false };
     let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
-    group.iter().enumerate().all(|(j, r)| {
-        let faster = time(r).is_some_and(|t| t < own_time || (t == own_time && j < i));
-        !(same(r) && faster)
-    })
+    !group.iter().any(|r| same(r) && time(r).is_some_and(|t| t < own_time))
 }
 
 #[cfg(test)]
@@ -190,7 +188,7 @@ pub(crate) mod tests {
             phase_ns: Default::default(),
             row_sweep_ns: 1.0,
             load: Load::default(),
-            steps_ns: Vec::new(),
+            blocks_ns: vec![vec![1e3 * time; 20]],
             hash: 0,
         };
         Record {

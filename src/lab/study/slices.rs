@@ -2,8 +2,8 @@
 //! at most that time, or the fastest whose error is at most that large.
 
 use super::Record;
+use super::compare::compare;
 use super::curve::{Curve, ErrorAxis, Sample, curves};
-use super::pareto::tie;
 
 /// Every solver of a scene at one time or at one error.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub struct Slice<'a> {
     /// Solver, and its setting; none where all take longer, or have a larger error.
     pub values: Vec<(&'static str, Option<Sample<'a>>)>,
     /// The solvers that nobody beats: in equal time those of least error, to equal error the
-    /// fastest and those that [tie] with it.
+    /// fastest and those that [tie](compare) with it.
     pub best: Vec<&'static str>,
 }
 
@@ -29,9 +29,10 @@ pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
 
 /// The times to equal error.
 pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
-    let time =
-        |s: &Sample| s.record.lap.as_ref().map_or([f64::INFINITY, 0.0], |l| [l.median_ns, l.spread_ns]);
-    let best = |least: &Sample, other: &Sample| tie(time(least), time(other));
+    let best = |least: &Sample, other: &Sample| {
+        let samples = least.record.lap.as_ref().zip(other.record.lap.as_ref());
+        samples.is_some_and(|(least, other)| compare(least, other).is_eq())
+    };
     slice(records, axis, |s| s.error, Curve::fastest_within, |s| s.time, best)
 }
 
