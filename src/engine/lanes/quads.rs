@@ -52,7 +52,7 @@ fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
     index.array()
 }
 
-/// Asks for the cache lines of `values[range]`; past the end, nothing is asked for. A hint: it
+/// Prefetches the cache lines of `values[range]`; past the end, nothing. A hint: it
 /// changes no value, and on targets without such an instruction it does nothing.
 #[inline(always)]
 pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {

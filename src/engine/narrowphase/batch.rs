@@ -139,7 +139,7 @@ pub struct Input<'a> {
     pub speculative: f32,
 }
 
-/// Collides every job and updates its contact: geometry anew, impulses kept where the feature
+/// Collides every job and updates its contact: geometry recomputed, impulses kept where the feature
 /// stays the same. Returns the number of points.
 ///
 /// A contact that has no point any more gets count 0, and `change(name, contact)` is called for

@@ -6,7 +6,7 @@
 //!
 //! | error | says | computed in |
 //! |---|---|---|
-//! | penetration | how deep bodies overlap *after* the step, found by colliding anew | [`Observation`] |
+//! | penetration | how deep bodies overlap *after* the step, found by colliding again | [`Observation`] |
 //! | excess penetration | what of that soft contacts do not account for, at rest | [`softness`] |
 //! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
 //! | complementarity, cone, dissipation | which part of the law is broken | [`violation`] |
@@ -228,7 +228,7 @@ impl Observation {
         self.blown_up
     }
 
-    /// Collides the step's contacts anew, where their bodies are now.
+    /// Collides the step's contacts again, where their bodies are now.
     fn add_penetrations(&mut self, world: &World, points: &[([usize; 2], PointStep)]) {
         let mut depths = Depths::default();
         let mut steps = points;
