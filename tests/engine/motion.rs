@@ -167,3 +167,12 @@ fn divergence_is_reported_with_body_and_step() {
     assert_eq!((divergence.step, divergence.body), (1, 0));
     assert!(divergence.speed > 1e5);
 }
+
+#[test]
+fn a_rotation_that_is_no_number_is_a_divergence() {
+    let mut world = world(Settings::new(&VARIANTS[1]), &body(BodyKind::Dynamic, [0.0; 2]));
+    world.step().unwrap();
+    // What a spin leaves that overflowed in a substep and was stopped in a later one.
+    world.bodies.rotation_sin[0] = f32::NAN;
+    assert_eq!(world.step().map_err(|divergence| divergence.body), Err(0));
+}

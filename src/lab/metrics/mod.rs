@@ -282,7 +282,7 @@ impl Observation {
             penetration_mean: self.penetration.mean(),
             penetration_rms: self.penetration.rms(),
             penetration_p99: self.penetration.p99(),
-            penetration_relative: self.penetration.max() / self.half_extent,
+            penetration_relative: ratio(self.penetration.max(), self.half_extent),
             penetration_excess: depths.map(|d| d.excess),
             soft_floor: depths.map(|d| d.floor),
             law_normal_rms: rms(normal, count, unit),

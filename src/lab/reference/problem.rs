@@ -124,9 +124,13 @@ pub struct ContactProblem {
 }
 
 impl ContactProblem {
-    /// Checks that all numbers are finite and in range, all indices valid, and that every contact
-    /// has a side that answers to impulses.
+    /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
+    /// that every contact has a side that answers to impulses.
     pub fn validate(&self) -> Result<(), Error> {
+        // Names go into tables.
+        require(!self.name.chars().any(char::is_control), "name", || {
+            format!("must not have control characters, is {:?}", self.name)
+        })?;
         let h = [self.h];
         finite("h", &h)?;
         require(self.h > 0.0, "h", || format!("the step is {} s, must be > 0", self.h))?;
