@@ -100,7 +100,7 @@ impl Given {
     fn with_bounces<L: Lanes>(mut self) -> Self {
         let mut of = Given::new(good(L::WIDTH));
         restitution::prepare::<L, Full>(
-            &mut of.rows,
+            &of.rows,
             &mut of.batches,
             &mut of.bounces,
             &of.contacts,

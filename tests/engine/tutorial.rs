@@ -114,7 +114,8 @@ fn its_parameter_is_set_by_name() {
     strict.settings.solver.set(&mut strict.settings.parameters, "tolerance", 0.0).unwrap();
     let mut loose = stack(5, LaneWidth::W8);
     loose.settings.solver.set(&mut loose.settings.parameters, "tolerance", 100.0).unwrap();
-    (strict.step().unwrap(), loose.step().unwrap());
+    strict.step().unwrap();
+    loose.step().unwrap();
     assert_eq!((strict.counts.sweeps, loose.counts.sweeps), (64, 1));
     let refused = ADAPTIVE.set(&mut strict.settings.parameters, "tolerance", -1.0).unwrap_err();
     assert!(refused.to_string().contains("-1"), "{refused}");

@@ -552,7 +552,8 @@ fn body() -> impl Strategy<Value = SceneBody> {
 proptest! {
     #[test]
     fn any_scene_comes_back_with_the_same_bits(
-        name in "[a-zé\"\\\\\n]{1,8}[a-z]",
+        // Control characters are refused, see below.
+        name in "[a-zé\"\\\\ ]{1,8}[a-z]",
         gravity in point(),
         dt in 1e-6..1.0,
         steps in 1..u32::MAX,
