@@ -34,13 +34,13 @@ pub struct Target {
     pub seeds: Vec<Vec<u8>>,
     /// A child of one or two parents.
     pub mutate: fn(&mut Random, &[Vec<u8>]) -> Vec<u8>,
-    /// How the input behaved, in words that are the same for alike inputs; or what is wrong. The number chooses
-    /// everything that the input leaves open.
+    /// How the input behaved, in words that are the same for alike inputs; or what is wrong. The
+    /// number chooses everything that the input leaves open.
     pub judge: fn(&[u8], u64) -> Result<String, String>,
 }
 
-/// Tries `inputs` inputs, or as many as there is time for if the environment says so; panics with
-/// what was found.
+/// Tries `inputs` inputs, or, if the environment says so, as many as the thread's time on a
+/// processor lasts for; panics with what was found.
 pub fn run(target: &Target, inputs: u64) {
     quiet_panics();
     if let Ok(path) = std::env::var("SIMPULSE_FUZZ_INPUT") {
@@ -65,16 +65,16 @@ pub fn run(target: &Target, inputs: u64) {
     let mut seen = HashSet::new();
     let mut accepted = 0;
     let mut found = BTreeMap::new();
-    let (start, mut reported, mut slowest) = (Instant::now(), Duration::ZERO, Duration::ZERO);
-    let mut count = 0;
     let clock = Clock::of_this_thread();
-    let summary = |time: Duration, count, accepted, kinds, slowest: Duration| {
-        let (name, ran) = (target.name, clock.read());
+    let (start, mut reported, mut slowest) = (clock.read(), Duration::ZERO, Duration::ZERO);
+    let mut count = 0;
+    let summary = |count, accepted, kinds, slowest: Duration| {
+        let (name, time) = (target.name, clock.read() - start);
         format!(
-            "{name}: {time:.0?}, running for {ran:.0?} of it: {count} inputs, {accepted} accepted, {kinds} kinds of behaviour, slowest {slowest:.1?}"
+            "{name}: {time:.0?}, {count} inputs, {accepted} accepted, {kinds} kinds of behaviour, slowest {slowest:.1?}"
         )
     };
-    while seconds.map_or(count < inputs, |s| start.elapsed() < s) {
+    while seconds.map_or(count < inputs, |s| clock.read() - start < s) {
         let salt: u64 = random.random();
         let mut input = match target.seeds.get(count as usize) {
             Some(seed) => seed.clone(),
@@ -119,13 +119,13 @@ pub fn run(target: &Target, inputs: u64) {
             }
         }
         count += 1;
-        if seconds.is_some() && start.elapsed() - reported > Duration::from_secs(60) {
-            reported = start.elapsed();
-            eprintln!("{}", summary(reported, count, accepted, seen.len(), slowest));
+        if seconds.is_some() && clock.read() - start - reported > Duration::from_secs(60) {
+            reported = clock.read() - start;
+            eprintln!("{}", summary(count, accepted, seen.len(), slowest));
         }
     }
     drop(watch);
-    println!("{}", summary(start.elapsed(), count, accepted, seen.len(), slowest));
+    println!("{}", summary(count, accepted, seen.len(), slowest));
     let reports: Vec<String> = found.into_values().collect();
     assert!(reports.is_empty(), "{}", reports.join("\n"));
 }

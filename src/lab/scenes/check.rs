@@ -19,8 +19,8 @@ impl Scene {
     /// Errors, naming place and value: a name that is empty or has control characters;
     /// a number that is not finite in `f32`; `dt` ≤ 0; no steps; more than
     /// [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
-    /// [`MAX_FRICTION`]; restitution outside
-    /// [0, 1]; a shape that [`Shape`]'s constructors refuse; a dynamic body without mass.
+    /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
+    /// constructors refuse; a dynamic body without mass.
     pub fn validate(&self) -> Result<(), Error> {
         self.check_head()?;
         self.bodies.iter().enumerate().try_for_each(|(i, body)| body_def(i, body).map(drop))
