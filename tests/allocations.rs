@@ -15,7 +15,7 @@ thread_local! {
 }
 
 // SAFETY: every call is handed to the system's allocator unchanged.
-#[allow(unsafe_code)]
+#[allow(unsafe_code, reason = "an allocator")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|c| c.set(c.get() + 1));

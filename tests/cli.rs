@@ -1,5 +1,6 @@
 //! The program as a user meets it: what it refuses, and what a small study leaves behind.
 
+use simpulse::engine::solvers::VARIANTS;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -184,8 +185,8 @@ fn a_small_study_leaves_whole_files() {
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // 2 scenes × solvers × 3 budgets × (natural order and 2 widths).
-    assert_eq!(rows.len(), 2 * simpulse::engine::solvers::VARIANTS.len() * 3 * 3);
+    // 2 scenes × all solvers × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 2 * VARIANTS.len() * 3 * 3);
     for row in &rows {
         for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
             let value: f64 = row[column(name)].parse().unwrap();

@@ -68,7 +68,7 @@ pub struct AdviseArgs {
     /// Begin no trial after this many seconds
     #[arg(long, value_name = "S", default_value_t = 60.0)]
     pub seconds: f64,
-    /// Shuffles the races and lays out random scenes
+    /// Random seed: of scenes that have one, and of the order of timing runs
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Write everything that was tried to this file too

@@ -69,7 +69,7 @@ pub enum Command {
     Converge(ConvergeArgs),
     /// Run the hard cases whose truth is known
     Verify(VerifyArgs),
-    /// Repeat one phase of a step and hold it against what this machine can do
+    /// Repeat one phase of a step and compare it with the roofline
     Profile(ProfileArgs),
     /// Measure the cost of a contact from a thousand contacts to a million
     Growth(GrowthArgs),
@@ -121,7 +121,7 @@ pub struct StudyArgs {
     /// Timing runs of each setting; the best of a scene run twice as often again [default: 3]
     #[arg(long)]
     pub repeats: Option<u32>,
-    /// Shuffles the timing runs and lays out random scenes
+    /// Random seed: of scenes that have one, and of the order of timing runs
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Short runs, nothing repeated: a look at everything in seconds
@@ -172,7 +172,7 @@ pub struct RunArgs {
     /// Step in seconds [default: that of the scene]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
-    /// Lays out random scenes
+    /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
     /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
@@ -194,7 +194,7 @@ pub struct SceneArgs {
     /// Print it in the file format
     #[arg(long)]
     pub json: bool,
-    /// Lays out random scenes
+    /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
 }

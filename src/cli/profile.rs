@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Repeat one phase of a step and hold it against what this machine can do
+/// Repeat one phase of a step and compare it with the roofline
 ///
 /// Settles the scene, holds its state still and repeats one phase on it: pairs, collide, color,
 /// prepare, warm-start, solve, relax, position, restitution, integrate or store, or all that there
@@ -30,7 +30,7 @@ use std::process::ExitCode;
 /// sweep. Of prepare and restitution only what is done in lanes is counted.
 ///
 /// Velocities and impulses that repeats change are brought back every 100 repeats, outside of the
-/// times. In pairs and color every repeat finds all pairs and colours anew, which a step does only
+/// times. In pairs and color every repeat searches all pairs and recomputes colours, which a step does only
 /// where many shapes left their bounds and where a contact came or went.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
@@ -65,7 +65,7 @@ pub struct ProfileArgs {
     /// Steps before the state is held still
     #[arg(long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
-    /// Lays out random scenes
+    /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
     /// Measure nothing but the phase

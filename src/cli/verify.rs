@@ -4,7 +4,7 @@ use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::verify::{
-    self, CASES, Case, Cell, Finding, Lab, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
 };
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -99,8 +99,8 @@ fn list(cases: &[&Case]) -> String {
     let mut text = String::new();
     for case in cases {
         let law = match case.law_of {
-            [] => String::new(),
-            solvers => format!(" (law of {})", solvers.join(", ")),
+            LawOf::Everyone => String::new(),
+            law => format!(" ({})", law.text()),
         };
         let (word, why) = match case.required {
             Required::Yes(why) => ("required", why),
@@ -166,7 +166,7 @@ fn common(cells: &[Cell], value: impl Fn(&Finding) -> f64) -> Option<f64> {
 
 fn cell_text(cell: &Cell, with_truth: bool) -> String {
     match cell {
-        Cell::Foreign => "not its law".into(),
+        Cell::Foreign => "n/a".into(),
         Cell::Failed(_) => "FAIL, see below".into(),
         Cell::Found(f) => {
             let word = if f.passed() { "pass" } else { "FAIL" };
@@ -241,7 +241,7 @@ fn json(matrix: &Matrix) -> Value {
             "passed": cell.passed(),
         });
         match cell {
-            Cell::Foreign => value["reason"] = json!("not its law"),
+            Cell::Foreign => value["reason"] = json!("n/a"),
             Cell::Failed(failure) => value["reason"] = json!(failure.to_string()),
             Cell::Found(f) => {
                 for (key, x) in [
@@ -321,14 +321,14 @@ mod tests {
         let cell = Cell::Found(Finding::new(1.5, 1.0, 0.25));
         assert_eq!(cell_text(&cell, false), "FAIL 1.5 (2)");
         assert_eq!(cell_text(&cell, true), "FAIL 1.5, truth 1 ± 0.25 (2)");
-        assert_eq!(cell_text(&Cell::Foreign, false), "not its law");
+        assert_eq!(cell_text(&Cell::Foreign, false), "n/a");
     }
 
     #[test]
     fn the_list_says_what_is_required_and_what_is_skipped() {
         let cases = verify::select(&["B2.box".to_string(), "A18".to_string()]).unwrap();
         let text = list(&cases);
-        for part in ["A18.law", "not required of soft_step", "(law of soft_step)", "B20 (bridge"] {
+        for part in ["A18.law", "not required of soft_step", "(soft contacts only)", "B20 (bridge"] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
     }

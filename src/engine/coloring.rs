@@ -105,7 +105,7 @@ impl Coloring {
         }
     }
 
-    /// Makes the next call of [`Self::assign`] colour anew whatever its arguments.
+    /// Makes the next call of [`Self::assign`] recompute the colours whatever its arguments.
     pub fn forget(&mut self) {
         self.starts.clear();
     }

@@ -5,11 +5,18 @@
 
 use std::path::PathBuf;
 
-/// What a caller can get wrong, each variant carrying the offending value.
+/// Longest text of a file that a message repeats (characters).
+const LONGEST: usize = 400;
+
+/// Longest name for which a similar one is looked for (bytes): memory and time grow with it.
+pub(in crate::lab) const LONGEST_MISSPELT: usize = 100;
+
+/// What a caller can get wrong, each variant carrying the offending value. Every message is one
+/// line, whatever the value is.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", plain(&path.to_string_lossy()))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -17,7 +24,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file is not of the expected form.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {}", plain(&path.to_string_lossy()), plain(message))]
     Format {
         /// The file.
         path: PathBuf,
@@ -25,7 +32,7 @@ pub enum Error {
         message: String,
     },
     /// A value is out of its range.
-    #[error("{place}: {message}")]
+    #[error("{}: {}", plain(place), plain(message))]
     Invalid {
         /// Where the value stands, for example `bodies[3].shapes[0].density`.
         place: String,
@@ -33,7 +40,7 @@ pub enum Error {
         message: String,
     },
     /// A name that is not in its table.
-    #[error("unknown {kind} '{name}'{}", suggestion(nearest))]
+    #[error("unknown {kind} '{}'{}", plain(name), suggestion(nearest))]
     UnknownName {
         /// `scene`, `solver`, …
         kind: &'static str,
@@ -49,6 +56,23 @@ fn suggestion(nearest: &Option<String>) -> String {
         Some(name) => format!("; did you mean '{name}'?"),
         None => String::new(),
     }
+}
+
+/// The text with control characters as escapes, and without the middle of what is too long.
+pub(in crate::lab) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() { plain.extend(c.escape_default()) } else { plain.push(c) }
+    }
+    let count = plain.chars().count();
+    if count <= LONGEST {
+        return plain;
+    }
+    // What is wrong mostly stands before the value, line and column behind it.
+    let (head, tail) = (LONGEST - LONGEST / 4, LONGEST / 4);
+    let at = |n: usize| plain.char_indices().nth(n).map_or(plain.len(), |(i, _)| i);
+    let (head, left_out, tail) = (&plain[..at(head)], count - head - tail, &plain[at(count - tail)..]);
+    format!("{head} … {left_out} characters … {tail}")
 }
 
 impl From<crate::engine::error::Error> for Error {
@@ -70,6 +94,7 @@ impl Error {
     /// An unknown `name`, with the nearest of `known` as the suggestion.
     pub fn unknown<'a>(kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Self {
         let nearest = known
+            .filter(|_| name.len() <= LONGEST_MISSPELT)
             .map(|k| (strsim::damerau_levenshtein(k, name), k))
             .min()
             .filter(|&(distance, k)| distance <= 2.max(k.len() / 2))
@@ -81,5 +106,29 @@ impl Error {
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Error::Io { path, source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_one_line_of_bounded_length() {
+        assert_eq!(plain("µ at 'a', 5 %"), "µ at 'a', 5 %");
+        assert_eq!(plain("a\nb\u{1b}[31m\0"), "a\\nb\\u{1b}[31m\\u{0}");
+        let (head, tail) = ("a".repeat(300), "z".repeat(100));
+        assert_eq!(
+            plain(&format!("{head}{}{tail}", "µ".repeat(5))),
+            format!("{head} … 5 characters … {tail}")
+        );
+        assert_eq!(plain(&format!("{head}{tail}")), format!("{head}{tail}"));
+        assert!(plain(&"\u{1}".repeat(5000)).chars().count() < 430);
+        // With a matrix of distances this would take a gigabyte.
+        assert!(
+            Error::unknown("scene", &"a".repeat(30_000_000), ["arch"].into_iter()).to_string().len() < 500
+        );
+        let message = Error::unknown("scene", "no\nsuch", ["arch"].into_iter()).to_string();
+        assert_eq!(message, "unknown scene 'no\\nsuch'");
     }
 }

@@ -4,10 +4,9 @@
 //!
 //! ```text
 //! error  files  overrides        what can go wrong; result files; parameters by name
-//! scenes                         what is simulated, and its known truth
 //! reference  metrics             certified solutions; errors read from states
-//! capture  verify                frozen problems; hard cases
-//! study  converge                solver × scene × budget; iterations to a tolerance
+//! scenes  capture                what is simulated, and its known truth; frozen problems
+//! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
 //! profile                        phases against the roofline; cost by size
 //! ```

@@ -6,3 +6,6 @@ mod motion;
 mod narrow_batches;
 mod narrowphase;
 mod shapes;
+mod soundness;
+mod structure;
+mod tutorial;

@@ -6,8 +6,9 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::{Contact, Manifold};
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::narrowphase::batch::{Class, Input, Jobs, Kind, NO_CONTACT, Shapes, update};
+use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
 use simpulse::engine::narrowphase::collide;
+use simpulse::engine::narrowphase::lanes::Class;
 use simpulse::engine::narrowphase::lanes::PoseRow;
 use simpulse::engine::shapes::{Pose, Shape};
 

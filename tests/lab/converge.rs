@@ -3,7 +3,7 @@
 use simpulse::cli::{capture as capture_command, converge as converge_command};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::params::Budget;
-use simpulse::engine::solvers::{self, VARIANTS, Variant};
+use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
 use simpulse::lab::converge::replay::{Outcome, Replay, Sequence, Start};
@@ -187,7 +187,9 @@ fn every_solver_reaches_its_own_law_on_a_pyramid() {
     let names: Vec<&str> = VARIANTS.iter().map(|v| v.name).collect();
     let settings = Options { max_iterations: 4000, ..options(&names) };
     let report = converge(&problem, reference.as_ref(), &settings).unwrap();
-    for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
+    let promises =
+        |c: &&Curve| VARIANTS.iter().any(|v| c.solver.starts_with(v.name) && v.promises(Law::Converges));
+    for curve in report.curves.iter().filter(|c| c.arithmetic == "f32").filter(promises) {
         assert!(curve.own.first[5].is_some(), "{} {} {:?}", curve.solver, curve.order, curve.own);
         // The first k within a tolerance is the first indeed.
         for (first, tolerance) in curve.own.first.iter().zip(report.tolerances) {
@@ -270,7 +272,8 @@ fn what_is_written_is_what_is_read() {
 #[test]
 fn a_replayed_problem_is_the_step_of_the_world() {
     for name in ["pyramid:5", "disc_column:8", "card_house"] {
-        for variant in &VARIANTS {
+        // What diverges makes any difference large.
+        for variant in VARIANTS.iter().filter(|v| v.promises(Law::Converges)) {
             let budget = Budget { substeps: 1, ..variant.budget };
             for (order, sequence) in
                 [(Order::Natural, Sequence::Natural), (Order::Colored, Sequence::Colored)]

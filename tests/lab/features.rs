@@ -1,7 +1,7 @@
 //! Law: what a scene does not need costs nothing, and leaving it out changes nothing.
 
 use simpulse::engine::constraints::{Features, Layout, OppositeKind};
-use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::solvers::{VARIANTS, find};
 
 /// Scenes, what each needs, and what it does without.
 fn scenes() -> [(&'static str, Features); 5] {
@@ -41,7 +41,7 @@ fn scene(name: &str) -> simpulse::lab::scenes::Scene {
 #[test]
 fn needs_are_read_off_the_scene() {
     for (name, features) in scenes() {
-        let world = scene(name).build(crate::common::settings(VARIANTS[0])).unwrap();
+        let world = scene(name).build(crate::common::settings(find("projection").unwrap())).unwrap();
         assert_eq!(world.features(), features, "{name}");
     }
 }

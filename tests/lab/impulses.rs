@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::solvers::{Law, VARIANTS};
 use simpulse::lab::scenes::Scene;
 
 #[test]
@@ -17,7 +17,8 @@ fn normal_impulses_push_and_friction_stays_in_its_cone() {
                     for point in contact.manifold.points() {
                         let (normal, tangent) = (point.normal_impulse, point.tangent_impulse);
                         assert!(normal >= 0.0, "{name} {}: {point:?}", variant.name);
-                        assert!(tangent.abs() <= contact.friction * normal, "{name} {}", variant.name);
+                        let held = tangent.abs() <= contact.friction * normal;
+                        assert!(held || !variant.promises(Law::Cone), "{name} {}", variant.name);
                         largest = largest.max(normal);
                     }
                 }

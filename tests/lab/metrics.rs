@@ -345,3 +345,19 @@ fn speed_from_nowhere_is_a_blow_up() {
         assert!(seen.is_none_or(|(at, body)| at == 5 && body >= 2), "{seen:?}");
     }
 }
+
+/// Near 10⁸ m from its centre of mass the box has no width left in 32 bits. Overlap was told in
+/// half widths of the thinnest shape, and so was infinite.
+#[test]
+fn a_shape_without_width_has_finite_errors() {
+    let scene = json(
+        r#"{"type":"static","position":[0,0],"shapes":[{"box":{"half":[50,1]}}]},
+           {"type":"dynamic","position":[0,0.5],"shapes":[{"box":{"half":[0.5,0.5]}}]},
+           {"type":"dynamic","position":[0,20],"shapes":[{"box":{"half":[0.5,0.5]}},
+               {"circle":{"center":[0,1e8],"radius":5}}]}"#,
+        0.0,
+    );
+    let errors = observe(&mut build(&scene, "pgs"), 1);
+    assert!(errors.penetration_max > 0.0);
+    assert_eq!(errors.penetration_relative, 0.0);
+}

@@ -1,6 +1,6 @@
 //! Box2D through its C interface: the one place with unsafe code.
 
-#![allow(unsafe_code)] // A foreign library.
+#![allow(unsafe_code, reason = "a C library")]
 
 use crate::engine::{Contender, Engine, Stage, State};
 use boxdd_sys::ffi::*;

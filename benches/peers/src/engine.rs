@@ -2,7 +2,6 @@
 
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::lab::scenes::Scene;
 
 /// A scene inside an engine: one thread, no sleeping, no continuous collision.
 pub trait Engine {
@@ -135,15 +134,6 @@ impl Contender {
         let against_static = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
         let anew = if self.recycling { "" } else { ", no recycling" };
         format!("n = {}{against_static}{anew}", self.substeps)
-    }
-
-    /// The scene in this engine. Errors: what the engine cannot hold.
-    pub fn build(&self, scene: &Scene) -> Result<Box<dyn Engine>, String> {
-        Ok(match self.maker {
-            Maker::Box2d => Box::new(crate::box2d::Box2d::new(scene, self)?),
-            Maker::Rapier => Box::new(crate::rapier::Rapier::new(scene, self)?),
-            Maker::Simpulse(width, pairs) => Box::new(crate::ours::Simpulse::new(scene, self, width, pairs)?),
-        })
     }
 }
 

@@ -16,7 +16,7 @@
 //! junkyard             8 262    1 223    95 %      45      12
 //! ```
 //!
-//! So the tree is ahead in all of them. Its order, made anew, takes another 15 to 40 ns per proxy,
+//! So the tree is ahead in all of them. Rebuilding its order takes another 15 to 40 ns per proxy,
 //! which puts the grid ahead where proxies jump to other places at every step, and are dense.
 
 mod all_pairs;

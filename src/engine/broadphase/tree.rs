@@ -7,7 +7,7 @@
 //!
 //! **Motion.** A proxy keeps its place in the order when it moves, and the bounds above it follow
 //! (refit). Bodies that move together stay neighbours, so the order lasts for many steps. It is
-//! made anew when the perimeters of the leaves, which say how many a query enters, have grown by
+//! rebuilt when the perimeters of the leaves, which say how many a query enters, have grown by
 //! [`REBUILD_THRESHOLD`].
 //!
 //! **Curve.** Hilbert's, through the centres, in a square of 2^[`BITS`] cells. Proxies far larger
@@ -19,7 +19,7 @@
 //! tested, sixteen boxes at a time. A descent for each proxy took two to three times as long.
 //!
 //! A tree of two children with surface-area insertion and rotations, each proxy inserted again
-//! when it left its box, stood here before: 1.2 µs for each that did.
+//! when it left its box, was used previously: 1.2 µs for each that did.
 //!
 //! **Source:** leaves packed along Hilbert's curve, Kamel and Faloutsos 1993 (`kamel1993`); wide
 //! nodes tested in lanes, Wald, Benthin and Boulos 2008 (`wald2008`); refit and rebuild when the
@@ -37,7 +37,7 @@ const BITS_OF_FAN: usize = 4;
 /// Bits of a coordinate on the curve.
 const BITS: u32 = 10;
 
-/// The order is made anew when the leaves' perimeters have grown by this factor.
+/// The order is rebuilt when the leaves' perimeters have grown by this factor.
 const REBUILD_THRESHOLD: f32 = 1.15;
 
 /// Lists are merged if no more than one proxy in this many moved.
@@ -231,7 +231,7 @@ impl Tree {
         self.cost_of_order = self.cost();
     }
 
-    /// Makes the order anew if it is worn.
+    /// Rebuilds the order past the rebuild threshold.
     fn renew_order(&mut self, proxies: &[Proxy]) {
         if self.cost() > REBUILD_THRESHOLD * self.cost_of_order {
             self.make_order(proxies);

@@ -42,7 +42,7 @@ impl Assignment {
         self.groups.iter().map(one).sum()
     }
 
-    /// Forgets all colours, so that the next call finds them anew even for the same contacts.
+    /// Forgets all colours, so that the next call recomputes them even for the same contacts.
     pub fn forget(&mut self) {
         self.groups.iter_mut().for_each(|group| group.coloring.forget());
     }

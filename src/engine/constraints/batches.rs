@@ -60,6 +60,9 @@ pub struct SegmentRecords<'a, L> {
     pub row_b: IndexList<'a>,
 }
 
+/// Contacts are added by so many at a time, since the bound of a list is found in lanes.
+const PART: usize = 64;
+
 impl Batches {
     /// Lanes per batch.
     pub fn width(&self) -> usize {
@@ -137,10 +140,19 @@ impl Batches {
     ) {
         assert!(self.width > 0, "batches without lanes: `clear` gives them their width");
         let first_lane = self.contact.len();
-        for (contact, [a, b]) in contacts {
-            self.contact.push(contact);
-            self.row_a.push(a);
-            self.row_b.push(b);
+        let mut contacts = contacts;
+        let mut part = [[0; PART]; 3];
+        loop {
+            let mut count = 0;
+            for (k, (contact, [a, b])) in (0..PART).zip(&mut contacts) {
+                (part[0][k], part[1][k], part[2][k]) = (contact, a, b);
+                count = k + 1;
+            }
+            let lists = [&mut self.contact, &mut self.row_a, &mut self.row_b];
+            lists.into_iter().zip(&part).for_each(|(list, part)| list.extend(&part[..count]));
+            if count < PART {
+                break;
+            }
         }
         let contacts = self.contact.len() - first_lane;
         if contacts == 0 {

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the unchanged K of the two rows. Of the
-//! four cases the first that fits is taken (total enumeration, `catto2007`, Murty):
+//! four cases the first that fits is taken (total enumeration, `catto2006`):
 //!
 //! ```text
 //! both push     λ = A⁻¹ r              λ ≥ 0

@@ -10,7 +10,7 @@ use super::features::{KernelFeatures, OnDynamic, OnKinematic, OnStatic, Opposite
 use super::pass::{AnyPass, Pass, PassInput};
 use super::rules::{Rigid, Rule, Soft};
 use super::sweep::{INV_MASS, NormalRule, Sweep, VX, VY, W, over_segments, sweep_segment};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
+use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under a rule.
 #[derive(Clone, Copy, Debug)]
@@ -102,6 +102,12 @@ struct SummedRows<'a> {
 }
 
 impl RowStore for SummedRows<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        self.before.assert_rows(index);
+        self.sums.assert_rows(index);
+    }
+
     #[inline(always)]
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
         L::gather(self.before, index)

@@ -10,6 +10,7 @@
 pub mod assign;
 pub mod batches;
 pub mod block;
+pub mod bounces;
 pub mod features;
 pub mod graph;
 pub mod jacobi;

@@ -5,8 +5,8 @@
 //! that schedules see. Which instance runs is decided once per pass, outside of all loops.
 
 use super::batches::Batches;
+use super::bounces::Bounces;
 use super::features::{Features, Kernel, KernelFeatures};
-use super::restitution::Bounces;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 

@@ -2,6 +2,7 @@
 
 use super::batches::Batches;
 use super::block::BlockSweep;
+use super::bounces::Bounces;
 use super::features::Features;
 use super::graph::Graph;
 use super::jacobi::{self, JacobiRule};
@@ -12,7 +13,6 @@ use super::pass::{AnyPass, PassInput, PassWidth};
 use super::position::PositionSweep;
 use super::prepare::{Prepare, Store};
 use super::restitution;
-use super::restitution::Bounces;
 use super::rules::{Rigid, Rule};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::System;

@@ -28,49 +28,14 @@
 //! rebound speed is *derived* here.
 
 use super::batches::{Batches, Segment, SegmentRecords};
+use super::bounces::Bounces;
 use super::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
 use super::pass::{Pass, PassInput};
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, held};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
-use std::slice::ChunksExactMut;
-
-/// Side records: per batch, the acceleration a of approach (m/s²), then per point the energy e² E₀
-/// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
-#[derive(Debug, Default)]
-pub struct Bounces {
-    buffer: Vec<Block>,
-}
-
-/// Vectors per side record.
-const fn stride(points: usize) -> usize {
-    1 + 2 * points
-}
-
-impl Bounces {
-    /// The side records of a segment, batch by batch.
-    ///
-    /// # Panics
-    /// If they were not prepared.
-    fn of<L: Lanes>(&mut self, segment: &Segment, points: usize) -> ChunksExactMut<'_, L> {
-        let (first, stride) = (segment.first_lane / L::WIDTH, stride(points));
-        let range = first * stride..(first + segment.batches) * stride;
-        let records = bytemuck::cast_slice_mut(&mut self.buffer).get_mut(range);
-        records.expect("bounces of these batches: `prepare` makes them").chunks_exact_mut(stride)
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.buffer)
-    }
-
-    /// Bytes in use for `lanes` lanes of `points`-point contacts.
-    pub fn bytes(lanes: usize, points: usize) -> usize {
-        4 * lanes * stride(points)
-    }
-}
 
 /// Reads the energies, before anything moves.
 pub struct Begin {
@@ -127,8 +92,7 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     increments: &[[f32; 4]],
     h: f32,
 ) {
-    let floats = batches.lanes() * stride(N::POINTS);
-    bounces.buffer.resize(floats.div_ceil(16), Block::default());
+    bounces.reserve(batches.lanes(), N::POINTS);
     for i in 0..batches.segments().len() {
         let segment = batches.segments()[i];
         let layout = N::layout(segment.opposite);

@@ -75,7 +75,6 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
 use super::pass::{AnyPass, Pass, PassInput};
-use super::position::PositionSweep;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
@@ -467,62 +466,6 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     });
 }
 
-/// One position sweep over a segment, see [`super::position`].
-#[inline(always)]
-fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
-    sweep: PositionSweep,
-) {
-    let layout = const { Layout::of::<N, O>() };
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
-        let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
-        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let mut moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
-        let mut angle = [a[TURN], b[TURN]];
-        let mut sum = L::zero();
-        for p in 0..N::POINTS {
-            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
-            let arm_t = arms::<L, N, O>(record, &layout, p, 1);
-            let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
-            let mut separation = record[layout.at(p, layout.separation)] + moved;
-            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
-            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
-            let mut mass = record[layout.at(p, layout.normal_mass)];
-            if sweep.turned && N::ROTATION {
-                let turned = |sine: L, versine: L, side: usize| {
-                    sine.mul_add(arm_t[side], versine.neg_mul_add(arm_n[side], arm_n[side]))
-                };
-                arm_n = [turned(sine_a, versine_a, 0), turned(sine_b, versine_b, 1)];
-                let mut k = (inertia[1] * arm_n[1]).mul_add(arm_n[1], mass_sum);
-                if O::MOVES {
-                    k = (inertia[0] * arm_n[0]).mul_add(arm_n[0], k);
-                }
-                // A point that is not there has no mass, and keeps none.
-                mass = mass.select_positive(L::splat(1.0) / k, L::zero());
-            }
-            let overlap = (-(separation + L::splat(sweep.slop))).max(L::zero());
-            let correction = (overlap * L::splat(sweep.fraction)).min(L::splat(sweep.max_correction));
-            let push = mass * correction;
-            sum = sum + push;
-            moved = mass_sum.mul_add(push, moved);
-            spin::<L, N, O>(&mut angle, inertia, arm_n, push);
-        }
-        let (x, y) = (n[0] * sum, n[1] * sum);
-        b[DX] = b[INV_MASS].mul_add(x, b[DX]);
-        b[DY] = b[INV_MASS].mul_add(y, b[DY]);
-        L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::MOVES {
-            a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
-            a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
-            L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
-        }
-    });
-}
-
 /// How many batches ahead a record is asked for. Without, 150 000 contacts cost 2 to 5 times as
 /// much, as their records come from memory; with two batches 5 %, with eight nothing more.
 const PREFETCH_BATCHES: usize = 4;
@@ -537,6 +480,10 @@ pub(super) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
 ) {
     let layout = const { Layout::of::<N, O>() };
     let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    if O::HAS_ROW {
+        rows.assert_rows(row_a);
+    }
     for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {
         let (record, later) = records.split_at_mut(layout.stride);
         prefetch(later, (PREFETCH_BATCHES - 1) * layout.stride..PREFETCH_BATCHES * layout.stride);
@@ -578,14 +525,4 @@ impl Pass for WarmStart {
 #[inline(never)]
 pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
     over_segments!(warm_start_segment, L, N; rows, batches);
-}
-
-/// One position sweep over all segments, in order.
-#[inline(never)]
-pub fn position_sweep<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    sweep: PositionSweep,
-) {
-    over_moving_segments!(position_segment, L, N; rows, batches, sweep);
 }

@@ -123,7 +123,7 @@ impl<'a> System<'a> {
             let mass = arms.map(|arms| self.effective_mass(bodies, arms));
             let wanted = (normal - mass[0] * (vn + f64::from(gap))).max(0.0);
             let bound = f64::from(contact.friction) * normal.max(0.0);
-            let held = (tangent - mass[1] * vt).clamp(-bound, bound);
+            let held = (tangent - mass[1] * vt).max(-bound).min(bound);
             let friction = if self.features.friction { (tangent - held).abs() } else { 0.0 };
             worst = worst.max((normal - wanted).abs()).max(friction);
         }

@@ -32,17 +32,16 @@ impl Indices {
         self.bound = 0;
     }
 
-    /// Appends an entry.
-    #[inline]
-    pub fn push(&mut self, index: u32) {
-        self.bound = self.bound.max((index as usize).saturating_add(1));
-        self.entries.push(index);
+    /// Appends entries.
+    pub fn extend(&mut self, entries: &[u32]) {
+        self.bound = self.bound.max(bound_of(entries));
+        self.entries.extend_from_slice(entries);
     }
 
     /// Appends `index` until there are `len` entries. A longer list stays as it is.
     pub fn fill_to(&mut self, len: usize, index: u32) {
         if len > self.entries.len() {
-            self.bound = self.bound.max((index as usize).saturating_add(1));
+            self.bound = self.bound.max(bound_of(&[index]));
             self.entries.resize(len, index);
         }
     }

@@ -10,6 +10,10 @@
 //!   compare equal (so for ±0) or are unordered: the rule of the x86 instructions.
 //! * No reciprocal estimates.
 //!
+//! Kernels gather and scatter by [`LaneIndex`], indices with a bound, and no index of theirs is out of
+//! place: it panics instead. What is unsafe in that is in `quads.rs` and `rows.rs`, and nothing of
+//! it depends on who implements [`Lanes`].
+//!
 //! Which instructions a width becomes is decided at build time by the target
 //! CPU; [`native_width`] tells the widest that is not emulated.
 

@@ -5,7 +5,10 @@
 //! from record `4q + k`, so that one 4 × 4 transpose of each 128-bit lane (8 shuffles for any
 //! width) puts component `c` of records `0..W`, in order, into vector `c`.
 
-#![allow(unsafe_code)] // Loads and stores at addresses; [`super::index`] upholds what they rest on.
+#![allow(
+    unsafe_code,
+    reason = "loads and stores by index, which `index` keeps in bounds; vector instructions"
+)]
 
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
@@ -49,7 +52,7 @@ fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
     index.array()
 }
 
-/// Asks for the cache lines of `values[range]`; past the end, nothing is asked for. A hint: it
+/// Prefetches the cache lines of `values[range]`; past the end, nothing. A hint: it
 /// changes no value, and on targets without such an instruction it does nothing.
 #[inline(always)]
 pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {

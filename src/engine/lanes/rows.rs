@@ -3,7 +3,10 @@
 //! A row is two quads, and [`super::quads`] moves it by halves. Sixteen bodies are gathered by whole
 //! rows instead, which takes half the loads. Single columns are moved to compare with rows.
 
-#![allow(unsafe_code)] // Loads and stores at addresses; [`super::index`] upholds what they rest on.
+#![allow(
+    unsafe_code,
+    reason = "loads and stores by index, which `index` keeps in bounds; vector instructions"
+)]
 
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};

@@ -1,9 +1,18 @@
 //! Where sweeps keep the rows of bodies: packed, as solvers do, or in columns, to compare.
 
-use super::{BodyRow, LaneIndex, LaneVec, Lanes};
+use super::index::assert_fits;
+use super::{BodyRow, IndexList, LaneIndex, LaneVec, Lanes};
 
 /// Rows of bodies that a sweep gathers from and scatters to.
 pub trait RowStore {
+    /// Checks before a loop over batches what gathers and scatters in it would check in every batch:
+    /// that no row of `index` is missing. The checks in the loop are then gone from what is compiled. With
+    /// them alone a sweep of 16 lanes takes 3 % longer.
+    ///
+    /// # Panics
+    /// If one is.
+    fn assert_rows(&self, index: IndexList);
+
     /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]` of the rows that `index` names.
     ///
     /// # Panics
@@ -18,6 +27,11 @@ pub trait RowStore {
 }
 
 impl RowStore for [BodyRow] {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        assert_fits(index.bound(), self.len(), 1);
+    }
+
     #[inline(always)]
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
         L::gather(self, index)
@@ -60,6 +74,11 @@ impl RowColumns {
 }
 
 impl RowStore for RowColumns {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        self.columns.iter().for_each(|column| assert_fits(index.bound(), column.len(), 1));
+    }
+
     #[inline(always)]
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
         self.columns.each_ref().map(|column| L::load_at(column, index))

@@ -3,7 +3,7 @@
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
-use super::lanes::{PoseRow, Poses, ShapePair, ShapeRow, Touch};
+use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{
@@ -12,19 +12,6 @@ use crate::engine::lanes::{
 use crate::engine::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
-
-/// What kernels tell apart in a shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Class {
-    /// A polygon with four right angles.
-    Rectangle,
-    /// A circle.
-    Circle,
-    /// Any other polygon, or a capsule.
-    Hull,
-    /// A segment.
-    Segment,
-}
 
 /// Which kernel a pair of shapes has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,7 +139,7 @@ pub struct Input<'a> {
     pub speculative: f32,
 }
 
-/// Collides every job and updates its contact: geometry anew, impulses kept where the feature
+/// Collides every job and updates its contact: geometry recomputed, impulses kept where the feature
 /// stays the same. Returns the number of points.
 ///
 /// A contact that has no point any more gets count 0, and `change(name, contact)` is called for

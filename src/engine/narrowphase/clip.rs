@@ -13,7 +13,7 @@
 //! the other shape's nearest point to it is, the caller knows. The normal is along the line between
 //! the two, and there is one point. Where faces are flush, the deepest end is so by rounding only:
 //! there q is the end nearer to the face, and an edge over the face needs no q, so that aligned
-//! boxes keep both points however they tremble. The distance is off by 1 in 10⁴ at most.
+//! boxes keep both points however they jitter. The distance is off by 1 in 10⁴ at most.
 //!
 //! Source: Sutherland, Hodgman 1974 (clipping).
 

@@ -1,6 +1,5 @@
 //! What the narrow phase reads and writes in lanes.
 
-use super::batch::Class;
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::lanes::{LaneIndex, Lanes, Quad};
 use crate::engine::shapes::{Polygon, Pose, Shape};
@@ -23,6 +22,19 @@ impl PoseRow {
         let (p, q) = (pose.position, pose.rotation);
         PoseRow { position: [p.x, p.y, 0.0, 0.0], rotation: [q.x, q.y, 0.0, 0.0] }
     }
+}
+
+/// What kernels tell apart in a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// A polygon with four right angles.
+    Rectangle,
+    /// A circle.
+    Circle,
+    /// Any other polygon, or a capsule.
+    Hull,
+    /// A segment.
+    Segment,
 }
 
 /// A rectangle or circle, as two quads in its body's frame.

@@ -12,7 +12,7 @@
 //! relative to b's centre of mass: where one body is large it is the ground,
 //! which is a, and what is small about the contact keeps its digits.
 //!
-//! [`gjk`] and [`epa`] answer the same questions by another road, in `f64`,
+//! [`gjk`] and [`epa`] answer the same questions independently, in `f64`,
 //! to check this one.
 
 pub mod batch;

@@ -65,7 +65,10 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: Some(angular_frequencies),
     kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[(Law::Rest, "diverges where a body has three contacts or more")],
+    breaks: &[
+        (Law::Converges, "diverges where a body has three contacts or more"),
+        (Law::Rest, "diverges where a body has three contacts or more"),
+    ],
     step,
 };
 

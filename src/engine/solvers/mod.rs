@@ -59,6 +59,8 @@ pub enum Law {
     Cone,
     /// A step allocates nothing.
     NoAllocation,
+    /// More iterations on one problem come to the solver's own law.
+    Converges,
     /// Piles of a few boxes stay where they are at the standard budget.
     Rest,
 }

@@ -38,7 +38,10 @@ pub static SOLVER: Variant = Variant {
     }],
     softness: None,
     kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
+    breaks: &[
+        (Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
+        (Law::Rest, "4 sweeps are too few for stacks"),
+    ],
     step,
 };
 

@@ -37,7 +37,7 @@ const FRESH: u32 = 1 << 31;
 impl World {
     /// Collides every candidate and hands the last step's impulses on by feature id.
     ///
-    /// Contacts are updated where they lie, and sorted anew only if one came or went.
+    /// Contacts are updated where they lie, and sorted again only if one came or went.
     pub(super) fn update_contacts(&mut self) {
         let narrow = &mut self.narrow;
         if narrow.count != self.contacts.len() {

@@ -9,7 +9,7 @@
 //!
 //! What repeats do to the state:
 //!
-//! * *pairs* looks for all pairs anew each time and *color* for all colours, as a step does in which
+//! * *pairs* searches all pairs again each time and *color* for all colours, as a step does in which
 //!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
 //! * *prepare* reads bodies and contacts and writes rows and records: always the same.
 //! * Sweeps go on from each other's velocities and impulses and converge; *warm start* and
@@ -132,7 +132,7 @@ impl HeldWorld<'_> {
     }
 
     /// Runs every phase of a step once, from what the step itself would start with, and says what each
-    /// took, pairs looked for anew. The bodies are brought back.
+    /// took, pairs searched again. The bodies are brought back.
     ///
     /// With `net`, pauses in which the thread waited for a processor are taken out, which costs
     /// some microseconds a pass beside the times.

@@ -3,7 +3,7 @@
 use super::{Order, World};
 use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::assign::Sides;
-use crate::engine::constraints::restitution::Bounces;
+use crate::engine::constraints::bounces::Bounces;
 use crate::engine::constraints::{Features, OppositeKind};
 use crate::engine::contacts::Contact;
 

@@ -84,19 +84,22 @@ impl World {
             records.extend(batches.memory());
         }
         records.push(opaque(w.lane_bounces.held_bytes() + w.serial_bounces.held_bytes()));
-        Memory {
-            components: vec![
-                component("bodies", &bodies),
-                component("shapes", &arrays![self.shapes, self.shape_body, self.surfaces]),
-                component("bounds", &[arrays![self.proxies][0], opaque(self.fat_boxes.held_bytes())]),
-                component("broad phase", &[opaque(self.broadphase.held_bytes())]),
-                component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
-                component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
-                component("colouring", &[opaque(self.assignment.held_bytes())]),
-                component("records", &records),
-                component("rows", &[arrays![w.rows][0], arrays![w.sums][0], opaque(w.motion.held_bytes())]),
-                component("solver", &[opaque(w.kept.held_bytes() + w.graph.held_bytes())]),
-            ],
+        let mut components = vec![
+            component("bodies", &bodies),
+            component("shapes", &arrays![self.shapes, self.shape_body, self.surfaces]),
+            component("bounds", &[arrays![self.proxies][0], opaque(self.fat_boxes.held_bytes())]),
+            component("broad phase", &[opaque(self.broadphase.held_bytes())]),
+            component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
+            component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
+            component("colouring", &[opaque(self.assignment.held_bytes())]),
+            component("records", &records),
+            component("rows", &[arrays![w.rows][0], arrays![w.sums][0], opaque(w.motion.held_bytes())]),
+        ];
+        // Most solvers keep nothing of their own.
+        let own = w.kept.held_bytes() + w.graph.held_bytes();
+        if own > 0 {
+            components.push(component("solver", &[opaque(own)]));
         }
+        Memory { components }
     }
 }

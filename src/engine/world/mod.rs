@@ -13,7 +13,7 @@ use crate::engine::constraints::observe::ObservedRule;
 use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::batch::Class;
+use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
 use collide::Narrow;
@@ -249,11 +249,14 @@ impl World {
         // Cut to one length and without branches, so that the compiler does it in lanes.
         let arrays = [&b.velocity_x, &b.velocity_y, &b.angular_velocity, &b.position_x, &b.position_y];
         let [vx, vy, w, x, y] = arrays.map(|array| &array[..b.len()]);
+        let [cos, sin] = [&b.rotation_cos, &b.rotation_sin].map(|array| &array[..b.len()]);
         let bad = |i: usize| {
-            // NaN is bad, too.
+            // NaN is bad, too. A spin that was out of bounds within the step, and is not any more,
+            // leaves one in the rotation.
             !((vx[i] * vx[i] + vy[i] * vy[i] <= DIVERGED_SPEED * DIVERGED_SPEED)
                 & (w[i].abs() <= DIVERGED_SPEED)
-                & ((x[i] + y[i]).abs() < f32::INFINITY))
+                & ((x[i] + y[i]).abs() < f32::INFINITY)
+                & ((cos[i] + sin[i]).abs() < f32::INFINITY))
         };
         if !(0..b.len()).fold(false, |any, i| any | bad(i)) {
             return Ok(());

@@ -26,7 +26,7 @@ impl Having {
 /// What decides the needs of a scene.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Traits {
-    rub: Having,
+    friction: Having,
     corner: Having,
     spins: bool,
     has_other_than_discs: bool,
@@ -39,7 +39,7 @@ impl Traits {
     pub fn add(&mut self, body: &BodyDef, round: bool) {
         let dynamic = body.kind == BodyKind::Dynamic;
         let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
-        self.rub.add(any(|s| s.friction as f32 > 0.0), dynamic);
+        self.friction.add(any(|s| s.friction as f32 > 0.0), dynamic);
         self.corner.add(any(|s| !matches!(s.shape, Shape::Circle { .. })), dynamic);
         self.spins |= body.kind != BodyKind::Static && body.angular_velocity as f32 != 0.0;
         self.has_other_than_discs |= dynamic && !round;
@@ -50,8 +50,8 @@ impl Traits {
     /// What constraints between such bodies need.
     pub fn features(&self) -> Features {
         Features {
-            rotation: self.rub.pair() || self.spins || self.has_other_than_discs,
-            friction: self.rub.pair(),
+            rotation: self.friction.pair() || self.spins || self.has_other_than_discs,
+            friction: self.friction.pair(),
             restitution: self.bounces,
             two_points: self.corner.pair(),
             damping: self.damped,

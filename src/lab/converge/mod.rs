@@ -246,8 +246,8 @@ fn measure(
             .iter()
             .flat_map(|r| [r.normal, if own.friction { r.tangent } else { 0.0 }])
             .collect();
-        let rubs = problem.contacts.iter().any(|c| c.friction > 0.0);
-        own_is_rigid = own.friction || !rubs;
+        let has_friction = problem.contacts.iter().any(|c| c.friction > 0.0);
+        own_is_rigid = own.friction || !has_friction;
         for (i, row) in own.rows.iter().enumerate() {
             let rigid = Target::Rigid.row(problem, i);
             // Gaps over h, in f32.

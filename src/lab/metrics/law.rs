@@ -121,7 +121,8 @@ pub fn natural_map(impulse: [f64; 2], velocity: [f64; 2], rho: [f64; 2], frictio
     let limit = friction * normal.max(0.0);
     [
         normal - (normal - rho[0] * velocity[0]).max(0.0),
-        tangent - (tangent - rho[1] * velocity[1]).clamp(-limit, limit),
+        // Not `clamp`, which panics where an impulse that overflowed makes the limit NaN.
+        tangent - (tangent - rho[1] * velocity[1]).max(-limit).min(limit),
     ]
 }
 
@@ -163,6 +164,12 @@ pub(super) mod tests {
 
     fn residual(point: PointStep, before: DVec2, after: DVec2) -> [f64; 2] {
         point.residual(&standing(), &moving(before, after), DT)
+    }
+
+    #[test]
+    fn an_impulse_that_overflowed_has_a_residual() {
+        let r = natural_map([f64::INFINITY, 1.0], [0.0, 2.0], [1.0; 2], 0.0);
+        assert_eq!(r[1], 2.0);
     }
 
     #[test]

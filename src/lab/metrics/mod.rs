@@ -6,7 +6,7 @@
 //!
 //! | error | says | computed in |
 //! |---|---|---|
-//! | penetration | how deep bodies overlap *after* the step, pairs searched anew | [`overlaps`] |
+//! | penetration | how deep bodies overlap *after* the step, pairs searched again | [`overlaps`] |
 //! | excess penetration | what of that soft contacts do not account for, at rest | [`softness`] |
 //! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
 //! | complementarity, cone, dissipation | which part of the law is broken | [`violation`] |
@@ -285,7 +285,7 @@ impl Observation {
             penetration_mean: self.penetration.mean(),
             penetration_rms: self.penetration.rms(),
             penetration_p99: self.penetration.p99(),
-            penetration_relative: self.penetration.max() / self.half_extent,
+            penetration_relative: ratio(self.penetration.max(), self.half_extent),
             penetration_excess: depths.map(|d| d.excess),
             soft_floor: depths.map(|d| d.floor),
             law_normal_rms: rms(normal, count, unit),

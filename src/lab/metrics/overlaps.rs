@@ -1,4 +1,4 @@
-//! Shapes that overlap or nearly do, wherever bodies are now: pairs are searched anew, whatever
+//! Shapes that overlap or nearly do, wherever bodies are now: pairs are searched again, whatever
 //! contacts the world knows of. Bodies that meet within a step overlap before there is a contact.
 
 use crate::engine::broadphase::{BroadPhase, BroadPhaseKind, Proxy};

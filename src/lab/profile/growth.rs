@@ -2,7 +2,7 @@
 //! grows.
 //!
 //! Scenes of all sizes are held still and take turns, so that whatever the machine does, it does to
-//! all of them. A turn is a few whole steps on the same state, pairs looked for anew in each; the
+//! all of them. A turn is a few whole steps on the same state, pairs searched again in each; the
 //! first finds cold caches and is not timed.
 
 use super::ceilings::ReadCurve;

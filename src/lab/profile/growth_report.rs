@@ -34,7 +34,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         times.add_row(cells);
     }
     let mut text = format!(
-        "ns per contact; a step looks for all pairs and colours anew; pauses in which the thread waited for a processor are left out\n{}\n",
+        "ns per contact; a step searches all pairs and recomputes colours; pauses in which the thread waited for a processor are left out\n{}\n",
         finish(times, 1)
     );
     let names: Vec<&str> =
@@ -72,7 +72,7 @@ fn sentence(verdict: &Verdict) -> String {
         }
         Change::Logarithm => "within n log n".to_string(),
         Change::Faster => {
-            format!("FASTER than n log n and streams, which account for {}", digits(whole.memory))
+            format!("grows faster than n log n and bandwidth, which explain {}", digits(whole.memory))
         }
     };
     let mut text = format!(
@@ -104,7 +104,7 @@ fn sentence(verdict: &Verdict) -> String {
         .map(|s| format!("{}, where streams account for {}", place(s), digits(s.memory)))
         .collect();
     if !faster.is_empty() {
-        parts.push(format!("FASTER than n log n and streams account for: {}", faster.join("; ")));
+        parts.push(format!("grows faster than n log n and bandwidth explain: {}", faster.join("; ")));
     }
     text += &format!("; {}\n", parts.join("; "));
     text

@@ -2,7 +2,7 @@
 //!
 //! A phase is repeated on a state that is held still ([`crate::engine::world::HeldWorld`]), in turn with loops
 //! that measure what memory and arithmetic units can do ([`ceilings`]), so that whatever the machine
-//! does, it does to all of them. Its operations are counted by running the same kernel text on a
+//! does, it does to all of them. Its operations are counted by running the same kernel source on a
 //! lane that counts ([`crate::engine::lanes::Counted`]), its bytes follow from the layout ([`traffic`]).
 //!
 //! # The roofline

@@ -153,7 +153,7 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
     }
     let mut text = finish(rows, 1);
     text += &format!(
-        "  all phases: {} µs a step, pairs looked for anew; {:.1} % of the time went into bringing the state back\n",
+        "  all phases: {} µs a step, pairs searched again; {:.1} % of the time went into bringing the state back\n",
         digits(1e-3 * sum),
         100.0 * report.reset_share
     );
@@ -209,7 +209,7 @@ fn reading(report: &Report, phase: &PhaseReport) -> String {
         t if t < 1.1 => "it is at its ceiling".to_string(),
         t if t < 2.0 => format!("a pass takes {} times what that allows", digits(t)),
         t => format!(
-            "a pass takes {} times what that allows: neither binds, but chains of operations and gathers",
+            "a pass takes {} times what that allows: latency-bound: chains of operations and gathers",
             digits(t)
         ),
     };

@@ -1,4 +1,4 @@
-//! How long this thread has waited for a processor: time that a clock on the wall books on whatever
+//! How long this thread has waited for a processor: time that wall-clock time attributes to whatever
 //! phase happens to run.
 
 pub use crate::engine::clock::waited;

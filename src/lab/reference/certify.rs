@@ -16,6 +16,7 @@ use super::problem::{ContactProblem, Pair, Velocity};
 use super::residual::{Target, natural_map};
 use super::stewart_trinkle::stewart_trinkle;
 use super::sweeps::{Stop, Sweep, pgs};
+use crate::lab::error::plain;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -105,7 +106,7 @@ pub struct Reference {
 
 /// No method found an answer with sufficient evidence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("no reference for '{problem}': {why}")]
+#[error("no reference for '{}': {why}", plain(problem))]
 pub struct NoReference {
     /// Name of the problem.
     pub problem: String,
@@ -249,7 +250,10 @@ pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
         Uniqueness::Unknown
     };
     let certificate = Certificate { method: best.method, natural_map: best.natural_map, witness, uniqueness };
-    Ok(Reference { velocities: best.velocities, impulses: best.impulses, certificate })
+    let found = Reference { velocities: best.velocities, impulses: best.impulses, certificate };
+    // Numbers near the end of the range overflow in the norms and not in the residual.
+    found.check(problem).map_err(fail)?;
+    Ok(found)
 }
 
 #[cfg(test)]

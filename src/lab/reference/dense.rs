@@ -1,7 +1,7 @@
 //! Dense matrices, and the factorisation that Lemke's method solves its bases with.
 //!
 //! Plain Gaussian elimination P A = L U, where P brings the largest entry of what is left of a
-//! column to the diagonal. A·X = R is solved for [`STRIP`] columns of R at a time, so that a row of
+//! column to the diagonal. A·X = R is solved for `STRIP` columns of R at a time, so that a row of
 //! the unknowns stays in registers while the rows that it depends on pass by; then once more for what
 //! R − A X leaves, which takes the error of every column to rounding of its own residual.
 //!

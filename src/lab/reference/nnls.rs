@@ -11,7 +11,7 @@
 //! simplex method may cycle, need no care.
 //! **Departures**: least squares by Gram–Schmidt, each column twice (Giraud & Langou 2002: enough for
 //! orthogonality to rounding), from scratch every time; a column that depends on those in use to
-//! [`DEPENDENT`] is passed over.
+//! `DEPENDENT` is passed over.
 //! **Cost**: 4 m k² a round, k ≤ m edges in use, and some k rounds; meant for a few hundred rows.
 
 /// Part of a unit column outside the span of others below which it counts as inside.

@@ -124,9 +124,13 @@ pub struct ContactProblem {
 }
 
 impl ContactProblem {
-    /// Checks that all numbers are finite and in range, all indices valid, and that every contact
-    /// has a side that answers to impulses.
+    /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
+    /// that every contact has a side that answers to impulses.
     pub fn validate(&self) -> Result<(), Error> {
+        // Names go into tables.
+        require(!self.name.chars().any(char::is_control), "name", || {
+            format!("must not have control characters, is {:?}", self.name)
+        })?;
         let h = [self.h];
         finite("h", &h)?;
         require(self.h > 0.0, "h", || format!("the step is {} s, must be > 0", self.h))?;
@@ -307,7 +311,8 @@ impl ContactProblem {
 
 /// Finite masses of a body, zero where infinite: those components cannot change.
 fn masses(b: &ProblemBody) -> Velocity {
-    let inverse = |x: f64| if x > 0.0 { 1.0 / x } else { 0.0 };
+    // The reciprocal of the smallest numbers is infinite, too.
+    let inverse = |x: f64| if x > 0.0 && x.recip().is_finite() { x.recip() } else { 0.0 };
     [inverse(b.inv_mass), inverse(b.inv_mass), inverse(b.inv_inertia)]
 }
 
@@ -355,6 +360,26 @@ mod tests {
 
     fn close(a: f64, b: f64) {
         assert!((a - b).abs() < 1e-14, "{a} is not {b}");
+    }
+
+    /// 1/5e-324 is infinite, and made the norms NaN: a reference was accepted that its own check refused.
+    #[test]
+    fn a_mass_beyond_all_numbers_is_infinite() {
+        let mut p = oblique();
+        p.bodies[0].inv_inertia = 5e-324;
+        let v: Vec<Velocity> = p.bodies.iter().map(|b| b.velocity).collect();
+        let norm = p.mass_norm(&v);
+        p.bodies[0].inv_inertia = 0.0;
+        assert_eq!(norm, p.mass_norm(&v));
+    }
+
+    /// Names go into tables and terminals.
+    #[test]
+    fn a_name_is_one_line() {
+        let mut p = oblique();
+        p.name = "a\nb\u{1b}[31m".into();
+        let message = p.validate().unwrap_err().to_string();
+        assert_eq!(message, r#"name: must not have control characters, is "a\nb\u{1b}[31m""#);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Columns are eliminated in an order of approximate minimum degree of A + Aᵀ, which suits matrices
 //! whose pattern is nearly symmetric, and a diagonal entry stays the pivot of its column while it is
-//! [`DIAGONAL`] times the largest: that keeps the order and so the fill. What this loses in accuracy,
+//! `DIAGONAL` times the largest: that keeps the order and so the fill. What this loses in accuracy,
 //! a step of refinement returns, its remainder summed to twice the working precision.
 //!
 //! **Source**: Davis, *Direct Methods for Sparse Linear Systems*, §6.2 (left-looking LU) and §7.1

@@ -10,13 +10,17 @@ use glam::Vec2;
 /// Most bodies of a scene.
 pub const MAX_BODIES: usize = 1_000_000;
 
+/// Greatest friction coefficient (1), so that the product of two is finite in `f32`.
+pub const MAX_FRICTION: f64 = 1e9;
+
 impl Scene {
     /// Whether a world can be made of this scene.
     ///
-    /// Errors, naming place and value: an empty name; a number that is not
-    /// finite in `f32`; `dt` ≤ 0; no steps; more than [`MAX_BODIES`]; density
-    /// ≤ 0; negative friction or damping; restitution outside [0, 1]; a shape
-    /// that [`Shape`]'s constructors refuse; a dynamic body without mass.
+    /// Errors, naming place and value: a name that is empty or has control characters;
+    /// a number that is not finite in `f32`; `dt` ≤ 0; no steps; more than
+    /// [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
+    /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
+    /// constructors refuse; a dynamic body without mass.
     pub fn validate(&self) -> Result<(), Error> {
         self.check_head()?;
         self.bodies.iter().enumerate().try_for_each(|(i, body)| body_def(i, body).map(drop))
@@ -25,6 +29,10 @@ impl Scene {
     fn check_head(&self) -> Result<(), Error> {
         if self.name.trim().is_empty() {
             return Err(Error::invalid("name", format!("must not be empty, is '{}'", self.name)));
+        }
+        if self.name.chars().any(char::is_control) {
+            let message = format!("must not have control characters, is {:?}", self.name);
+            return Err(Error::invalid("name", message));
         }
         finite_pair("gravity", self.gravity)?;
         positive("dt", self.dt)?;
@@ -104,6 +112,10 @@ fn shape_def(place: &str, shape: &SceneShape) -> Result<ShapeDef, Error> {
     let at = |name: &str| format!("{place}.{name}");
     positive(&at("density"), shape.density)?;
     not_negative(&at("friction"), shape.friction)?;
+    if shape.friction > MAX_FRICTION {
+        let message = format!("must be at most {MAX_FRICTION:e}, is {:?}", shape.friction);
+        return Err(Error::invalid(at("friction"), message));
+    }
     finite(&at("restitution"), shape.restitution)?;
     if !(0.0..=1.0).contains(&shape.restitution) {
         return Err(Error::invalid(

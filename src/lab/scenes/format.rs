@@ -77,7 +77,7 @@ pub struct SceneShape {
     pub geometry: Geometry,
     /// kg/m², > 0
     pub density: f64,
-    /// Coulomb coefficient, ≥ 0; two surfaces mix as √(µa µb).
+    /// Coulomb coefficient, ≥ 0 and ≤ 10⁹; two surfaces mix as √(µa µb).
     pub friction: f64,
     /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
     pub restitution: f64,

@@ -1,5 +1,10 @@
 //! Where in a scene a JSON error stands, in the words of the scene: `bodies[3].shapes[0].density`.
 
+use crate::lab::error::LONGEST_MISSPELT;
+
+/// Longer keys are cut in a place, so that there is room for what is wrong (characters).
+const LONGEST_KEY: usize = 40;
+
 /// One open bracket on the way to a position in the text.
 enum Level {
     /// `{`, with the last key read.
@@ -74,8 +79,11 @@ fn path(levels: &[Level]) -> String {
     for level in levels {
         match level {
             Level::Object { key, .. } if key.is_empty() => {}
-            Level::Object { key, .. } if path.is_empty() => path.push_str(key),
-            Level::Object { key, .. } => path.extend([".", key]),
+            Level::Object { key, .. } => {
+                path.push_str(if path.is_empty() { "" } else { "." });
+                path.extend(key.chars().take(LONGEST_KEY));
+                path.push_str(if key.chars().nth(LONGEST_KEY).is_some() { "…" } else { "" });
+            }
             Level::Array { index } => path.push_str(&format!("[{index}]")),
         }
     }
@@ -93,6 +101,9 @@ fn number_before(text: &str) -> &str {
 fn nearest_key(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     let unknown = quoted.next().unwrap_or_default();
+    if unknown.len() > LONGEST_MISSPELT {
+        return String::new();
+    }
     match quoted.map(|k| (strsim::damerau_levenshtein(k, unknown), k)).min() {
         Some((distance, key)) if distance <= 2 => format!("; did you mean `{key}`?"),
         _ => String::new(),
@@ -113,6 +124,16 @@ mod tests {
         assert_eq!(place(r#"{"a":[{"b":1}"#), "a[0]");
         assert_eq!(place("]]}}"), "");
         assert_eq!(place(r#"{"unfinished \"#), r"unfinished \");
+    }
+
+    #[test]
+    fn long_keys_leave_room_for_the_message() {
+        let key = "µ".repeat(50_000);
+        let text = format!(r#"{{"bodies": [{{"{key}": 1}}]}}"#);
+        let error = serde_json::from_str::<crate::lab::scenes::Scene>(&text).unwrap_err();
+        let message = crate::lab::error::plain(&place_at(&text, &error));
+        assert!(message.starts_with(&format!("bodies[0].{}…: unknown field `µ", &key[..80])), "{message}");
+        assert!(message.chars().count() < 430 && message.contains(" at line 1 column "), "{message}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 
-/// Most that any field of a budget may be: a slip of the finger should not run for a year.
+/// Most that any field of a budget may be: a typo should not run for a year.
 pub const LARGEST: u32 = 10_000;
 
 /// Values to try for each field of a [`Budget`]; where a list is empty, the solver's own.

@@ -81,6 +81,16 @@ impl Lab {
     }
 }
 
+/// Depth (m) at which the solver's own soft contact bears `load` (N) with the effective mass `mass` (kg)
+/// in steps of `dt` (s): the spring's m ω² s = F, with the solver's ω.
+pub(super) fn own_depth(lab: &Lab, dt: f32, load: f64, mass: f64, on_static: bool) -> f64 {
+    let settings = &lab.settings;
+    let h = dt / settings.budget.substeps as f32;
+    let omega = settings.solver.softness.map_or([f32::NAN; 2], |softness| softness(&settings.parameters, h));
+    let omega = f64::from(omega[usize::from(on_static)]);
+    load / (mass * omega * omega)
+}
+
 /// Depth (m) at which a standard soft contact bears `load` (N) with the effective mass `mass` (kg): the
 /// spring's m ω² s = F, with twice the frequency on static bodies. Every solver is held to it, whatever
 /// its contacts are.

@@ -58,8 +58,41 @@ pub use lab::Lab;
 pub use runner::{Cell, Matrix, Progress, run, select};
 pub use table::{CASES, NEEDS_JOINTS};
 
+use crate::engine::solvers::Variant;
 use crate::engine::world::Divergence;
 use crate::lab::error::Error;
+
+/// Which solvers a truth is the law of, as their rows tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LawOf {
+    /// All of them.
+    Everyone,
+    /// Those whose contacts are springs at rest.
+    Springs,
+    /// Those that sweep such contacts once per substep, whose every step the truth follows.
+    SpringsSweptOnce,
+}
+
+impl LawOf {
+    /// Whether the truth is a law of this solver.
+    pub fn includes(self, solver: &Variant) -> bool {
+        let springs = solver.softness.is_some();
+        match self {
+            LawOf::Everyone => true,
+            LawOf::Springs => springs,
+            LawOf::SpringsSweptOnce => springs && solver.budget.velocity_iterations == 1,
+        }
+    }
+
+    /// For lists; empty for everyone.
+    pub fn text(self) -> &'static str {
+        match self {
+            LawOf::Everyone => "",
+            LawOf::Springs => "soft contacts only",
+            LawOf::SpringsSweptOnce => "soft contacts swept once per substep only",
+        }
+    }
+}
 
 /// A row of [`CASES`].
 pub struct Case {
@@ -73,8 +106,8 @@ pub struct Case {
     pub tolerance: &'static str,
     /// Whether the default solver must pass, and why.
     pub required: Required,
-    /// The solvers whose own law the truth is; empty where it is everyone's.
-    pub law_of: &'static [&'static str],
+    /// The solvers whose own law the truth is.
+    pub law_of: LawOf,
     /// Runs it.
     pub measure: fn(&Lab) -> Result<Finding, Failure>,
 }

@@ -56,7 +56,7 @@ pub(super) fn soft_depths(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("disc_column:15")?, 0.0, |_| ())?;
     let off = depths(&world).into_iter().map(|([a, _], depth, _)| {
         let (load, mass) = ((15 - a.min(15)) as f64 * G, if a == 0 { 1.0 } else { 0.5 });
-        (depth - soft_depth(load, mass, a == 0)).abs()
+        (depth - own_depth(lab, world.settings.dt, load, mass, a == 0)).abs()
     });
     Ok(Finding::new(largest(off), 0.0, 2.0 * 2f64.powi(-20)))
 }
@@ -65,7 +65,7 @@ pub(super) fn soft_depths(lab: &Lab) -> Result<Finding, Failure> {
 pub(super) fn soft_box(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("stack:1")?, 0.0, |_| ())?;
     let deepest = depths(&world).into_iter().map(|(_, depth, _)| depth).fold(f64::NAN, f64::max);
-    Ok(Finding::new(deepest, soft_depth(0.5 * G, 0.4, true), 2.0 * 2f64.powi(-24)))
+    Ok(Finding::new(deepest, own_depth(lab, world.settings.dt, 0.5 * G, 0.4, true), 2.0 * 2f64.powi(-24)))
 }
 
 /// B2. No overlap of 15 discs is more than what a standard soft contact needs, or the slop: the worst,

@@ -1,7 +1,7 @@
 //! The list of cases.
 
 use super::Required::{No, Yes};
-use super::{Case, Required};
+use super::{Case, LawOf, Required};
 use super::{Failure, Finding, Lab};
 use super::{far, impacts, motion, overlap, paradox, ratios, sliding, stacks};
 
@@ -17,9 +17,6 @@ pub static NEEDS_JOINTS: &[(&str, &str)] = &[
     ("B20", "bridge of 160 links"),
 ];
 
-/// For truths that are those of soft contacts.
-const SOFT: &[&str] = &["soft_step"];
-
 type Measure = fn(&Lab) -> Result<Finding, Failure>;
 
 const fn case(
@@ -30,11 +27,15 @@ const fn case(
     measure: Measure,
     required: Required,
 ) -> Case {
-    Case { id, summary, unit, tolerance, required, law_of: &[], measure }
+    Case { id, summary, unit, tolerance, required, law_of: LawOf::Everyone, measure }
+}
+
+const fn swept_once(case: Case) -> Case {
+    Case { law_of: LawOf::SpringsSweptOnce, ..case }
 }
 
 const fn soft(case: Case) -> Case {
-    Case { law_of: SOFT, ..case }
+    Case { law_of: LawOf::Springs, ..case }
 }
 
 /// Every case, by family.
@@ -267,7 +268,7 @@ pub static CASES: &[Case] = &[
         stacks::depth_bound,
         Yes("the spring's fixed point"),
     ),
-    soft(case(
+    swept_once(case(
         "B3.recovery",
         "depth of a disc pushed out of the ground, against the spring's recursion, worst",
         "m",

@@ -1,0 +1,571 @@
+//! Law: safe functions are sound whatever they are given. Bad rows, bad contacts, wrong widths, short
+//! arrays and batches that were never filled end in a panic that says what is wrong, before or
+//! without a read or write out of place. Run it under valgrind as well (README, Benches).
+
+use simpulse::engine::clock::Clock;
+use simpulse::engine::constraints::bounces::Bounces;
+use simpulse::engine::constraints::position::position_sweep;
+use simpulse::engine::constraints::restitution;
+use simpulse::engine::constraints::rules::Rigid;
+use simpulse::engine::constraints::sweep::{self, sweep, sweep_store, warm_start};
+use simpulse::engine::constraints::{
+    Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace, prepare,
+};
+use simpulse::engine::contacts::{Contact, quad};
+use simpulse::engine::lanes::{
+    BodyRow, Counted, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns,
+    RowStore, prefetch, prefetch_records,
+};
+use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
+use simpulse::engine::narrowphase::hull::{Hull, HullRow};
+use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
+use simpulse::engine::params::Budget;
+use simpulse::engine::shapes::Shape;
+use std::hint::black_box;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use wide::{f32x4, f32x8, f32x16};
+
+type Full = Kernel<true, true, 2>;
+type Bare = Kernel<false, false, 1>;
+
+const RULE: Rigid = Rigid { inv_h: 60.0 };
+const POSITION: PositionSweep =
+    PositionSweep { fraction: 0.2, slop: 0.005, max_correction: 0.2, turned: true };
+/// As far out as an index can point, and just past the end of the rows below.
+const FAR: [u32; 3] = [u32::MAX, 1_000_000_000, ROWS as u32];
+/// Rows of the good batches, the inert one among them, and contacts.
+const ROWS: usize = 24;
+const CONTACTS: usize = 20;
+
+/// What `run` panics with.
+#[track_caller]
+fn panic_of<T>(run: impl FnOnce() -> T) -> String {
+    let payload = catch_unwind(AssertUnwindSafe(|| drop(black_box(run())))).expect_err("no panic");
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or(payload.downcast_ref::<&str>().copied()).unwrap_or("?").to_string()
+}
+
+/// Checks that `run` panics, and says `words`.
+#[track_caller]
+fn panics<T>(words: &str, run: impl FnOnce() -> T) {
+    let text = panic_of(run);
+    assert!(text.contains(words), "{text:?} does not say {words:?}");
+}
+
+fn layout(opposite: OppositeKind) -> Layout {
+    Layout::for_features(&Features::FULL, opposite)
+}
+
+fn rows() -> Vec<BodyRow> {
+    vec![BodyRow { velocity: [1.0; 4], delta: [0.5; 4] }; ROWS]
+}
+
+/// A segment against each kind of body, with `contact`, `a` and `b` in one lane of each.
+fn batches(width: usize, contact: u32, a: u32, b: u32) -> Batches {
+    let mut batches = Batches::default();
+    batches.clear(width);
+    for opposite in OppositeKind::ALL {
+        let pairs = (0..CONTACTS as u32).map(|i| if i == 9 { (contact, [a, b]) } else { (i, [i, i + 1]) });
+        batches.push_segment(opposite, &layout(opposite), pairs, ROWS as u32 - 1);
+    }
+    batches.reserve_buffer();
+    batches
+}
+
+fn good(width: usize) -> Batches {
+    batches(width, 9, 9, 10)
+}
+
+/// Every pass over constraints, each on what it is given.
+struct Given {
+    rows: Vec<BodyRow>,
+    batches: Batches,
+    bounces: Bounces,
+    contacts: Vec<Contact>,
+    increments: Vec<[f32; 4]>,
+}
+
+impl Given {
+    fn new(batches: Batches) -> Self {
+        Given {
+            rows: rows(),
+            batches,
+            bounces: Bounces::default(),
+            contacts: vec![Contact::default(); CONTACTS],
+            increments: vec![[0.0; 4]; ROWS],
+        }
+    }
+
+    /// With side records, as `restitution::prepare` makes them for good batches.
+    fn with_bounces<L: Lanes>(mut self) -> Self {
+        let mut of = Given::new(good(L::WIDTH));
+        restitution::prepare::<L, Full>(
+            &of.rows,
+            &mut of.batches,
+            &mut of.bounces,
+            &of.contacts,
+            &of.increments,
+            0.01,
+        );
+        self.bounces = of.bounces;
+        self
+    }
+}
+
+type Pass = (&'static str, fn(&mut Given));
+
+/// Passes that read rows, and whether they also read contacts or side records.
+fn row_passes<L: Lanes>() -> [Pass; 7] {
+    [
+        ("sweep", |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
+        ("sweep_store", |g| {
+            sweep_store::<L, Full, _, _>(&mut RowColumns::from_rows(&g.rows), &mut g.batches, RULE);
+        }),
+        ("warm_start", |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
+        ("position_sweep", |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
+        ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
+        ("restitution::prepare", |g| {
+            restitution::prepare::<L, Full>(
+                &g.rows,
+                &mut g.batches,
+                &mut g.bounces,
+                &g.contacts,
+                &g.increments,
+                0.01,
+            );
+        }),
+        ("restitution::apply", |g| {
+            restitution::apply::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces, 0.01);
+        }),
+    ]
+}
+
+/// Passes that go by contacts.
+fn contact_passes<L: Lanes>() -> [Pass; 3] {
+    [
+        ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
+        ("store", |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
+        ("restitution::prepare", |g| {
+            restitution::prepare::<L, Full>(
+                &g.rows,
+                &mut g.batches,
+                &mut g.bounces,
+                &g.contacts,
+                &g.increments,
+                0.01,
+            );
+        }),
+    ]
+}
+
+/// Passes over side records that read no rows.
+fn bounce_passes<L: Lanes>() -> [Pass; 2] {
+    [
+        ("restitution::track", |g| {
+            restitution::track::<L, Full>(&mut g.batches, &mut g.bounces);
+        }),
+        ("restitution::forget", |g| {
+            restitution::forget::<L, Full>(&mut g.batches, &mut g.bounces);
+        }),
+    ]
+}
+
+fn all_passes<L: Lanes>() -> Vec<Pass> {
+    let mut passes = row_passes::<L>().to_vec();
+    passes.extend(contact_passes::<L>());
+    passes.extend(bounce_passes::<L>());
+    passes
+}
+
+/// Runs a test body at every width.
+macro_rules! at_every_width {
+    ($($test:ident: $body:ident;)*) => { $(
+        #[test]
+        fn $test() {
+            $body::<f32>();
+            $body::<f32x4>();
+            $body::<f32x8>();
+            $body::<f32x16>();
+            $body::<Counted>();
+        }
+    )* };
+}
+
+at_every_width! {
+    good_batches_run: run_good;
+    a_row_that_does_not_exist_panics: bad_rows;
+    a_contact_that_does_not_exist_panics: bad_contacts;
+    fewer_rows_than_batches_name_panic: short_rows;
+    batches_of_another_width_panic: wrong_width;
+    records_of_another_layout_panic: wrong_layout;
+    batches_without_a_buffer_panic: no_buffer;
+    bounces_that_were_not_prepared_panic: no_bounces;
+    lanes_gather_nothing_out_of_place: bad_gathers;
+}
+
+fn run_good<L: Lanes>() {
+    for (name, pass) in all_passes::<L>() {
+        let mut given = Given::new(good(L::WIDTH)).with_bounces::<L>();
+        pass(&mut given);
+        assert!(given.rows[0].velocity[3] == 1.0, "{name}");
+    }
+    // Batches that were never filled hold nothing to do.
+    for (_, pass) in all_passes::<L>() {
+        pass(&mut Given {
+            rows: vec![],
+            contacts: vec![],
+            increments: vec![],
+            ..Given::new(Batches::default())
+        });
+    }
+}
+
+fn bad_rows<L: Lanes>() {
+    for far in FAR {
+        for (name, pass) in row_passes::<L>() {
+            let mut given = Given::new(batches(L::WIDTH, 9, 9, far)).with_bounces::<L>();
+            let text = panic_of(|| pass(&mut given));
+            assert!(text.contains(&far.to_string()), "{name}: {text}");
+            // Against a dynamic body, row a is read as well.
+            let mut given = Given::new(batches(L::WIDTH, 9, far, 10)).with_bounces::<L>();
+            let text = panic_of(|| pass(&mut given));
+            assert!(text.contains(&far.to_string()), "{name}: {text}");
+        }
+    }
+}
+
+fn bad_contacts<L: Lanes>() {
+    for far in FAR {
+        for (name, pass) in contact_passes::<L>() {
+            let mut given = Given::new(batches(L::WIDTH, far, 9, 10));
+            let text = panic_of(|| pass(&mut given));
+            assert!(text.contains(&far.to_string()), "{name}: {text}");
+        }
+    }
+    for (_, pass) in contact_passes::<L>() {
+        panic_of(|| pass(&mut Given { contacts: vec![], ..Given::new(good(L::WIDTH)) }));
+    }
+}
+
+fn short_rows<L: Lanes>() {
+    for (name, pass) in row_passes::<L>() {
+        for count in [0, 1, CONTACTS] {
+            let rows = vec![BodyRow::default(); count];
+            let mut given = Given { rows, ..Given::new(good(L::WIDTH)) }.with_bounces::<L>();
+            let text = panic_of(|| pass(&mut given));
+            assert!(text.contains(&count.to_string()), "{name}: {text}");
+        }
+    }
+    let mut given = Given { increments: vec![], ..Given::new(good(L::WIDTH)) };
+    let pass = |g: &mut Given| {
+        let Given { rows, batches, bounces, contacts, increments } = g;
+        restitution::prepare::<L, Full>(rows, batches, bounces, contacts, increments, 0.01);
+    };
+    panics("out of bounds", || pass(&mut given));
+}
+
+fn wrong_width<L: Lanes>() {
+    for width in [1, 2, 3, 4, 8, 16, 32, 1000].into_iter().filter(|&w| w != L::WIDTH) {
+        for (_, pass) in all_passes::<L>() {
+            let mut given = Given::new(good(width)).with_bounces::<L>();
+            panics(&format!("batches of {width} lanes for a kernel of {}", L::WIDTH), || pass(&mut given));
+        }
+    }
+}
+
+fn wrong_layout<L: Lanes>() {
+    let words = "layout";
+    let mut g = Given::new(good(L::WIDTH)).with_bounces::<L>();
+    panics(words, || sweep::<L, Bare, _>(&mut g.rows, &mut g.batches, RULE));
+    panics(words, || prepare::prepare::<L, Bare>(&mut g.rows, &mut g.batches, &g.contacts));
+    panics(words, || prepare::store::<L, Bare>(&mut g.batches, &mut g.contacts));
+    panics(words, || restitution::track::<L, Bare>(&mut g.batches, &mut g.bounces));
+    panics(words, || g.batches.for_each_lane(&Features::NONE, |_, _, _, _| {}));
+    // A layout that no kernel has.
+    for stride in [0, 1, usize::MAX / 2, usize::MAX] {
+        let mut batches = Batches::default();
+        batches.clear(L::WIDTH);
+        let layout = Layout { stride, ..layout(OppositeKind::Dynamic) };
+        let pushed = catch_unwind(AssertUnwindSafe(|| {
+            batches.push_segment(OppositeKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
+            batches.push_segment(OppositeKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
+        }));
+        if pushed.is_ok() {
+            panics(words, || sweep::<L, Full, _>(&mut g.rows, &mut batches, RULE));
+        }
+    }
+}
+
+fn no_buffer<L: Lanes>() {
+    for (_, pass) in all_passes::<L>() {
+        let mut batches = Batches::default();
+        batches.clear(L::WIDTH);
+        let kind = OppositeKind::Dynamic;
+        batches.push_segment(kind, &layout(kind), (0..CONTACTS as u32).map(|i| (i, [i, i + 1])), 0);
+        let mut given = Given::new(batches).with_bounces::<L>();
+        panics("no room for records", || pass(&mut given));
+        panic_of(|| given.batches.for_each_lane(&Features::FULL, |_, _, _, _| {}));
+        panic_of(|| given.batches.records().to_vec());
+    }
+}
+
+fn no_bounces<L: Lanes>() {
+    let [.., apply] = row_passes::<L>();
+    for (_, pass) in bounce_passes::<L>().into_iter().chain([apply]) {
+        panics("`prepare` makes them", || pass(&mut Given::new(good(L::WIDTH))));
+    }
+}
+
+/// What lanes offer to kernels, by indices of which the last lane's points past the end by one, and by more.
+fn bad_gathers<L: Lanes>() {
+    for far in FAR {
+        let mut list = [0; MOST_LANES];
+        list[L::WIDTH - 1] = far;
+        let index = LaneIndex::<L::Index>::new(&list);
+        assert_eq!(index.bound(), far as usize + 1);
+        let words = format!("index {far} where there are {ROWS} rows");
+        let mut rows = rows();
+        panics(&words, || L::gather(&rows, index));
+        panics(&words, || L::scatter_velocity(&mut rows, index, [L::zero(); 4]));
+        panics(&words, || L::scatter_delta(&mut rows, index, [L::zero(); 4]));
+        panics(&words, || RowStore::gather::<L>(rows.as_slice(), index));
+        let mut columns = RowColumns::from_rows(&rows);
+        panics(&words, || columns.gather::<L>(index));
+        panics(&words, || columns.scatter_velocity(index, [L::zero(); 4]));
+        let mut values = [0.0; ROWS];
+        panics(&words, || L::load_at(&values, index));
+        panics(&words, || L::store_at(&mut values, index, L::zero()));
+        // Records of three quads, of which the last one is not whole.
+        let mut quads = [Quad::default(); 3 * ROWS + 2];
+        panics(&words, || L::gather_quads::<3, 0>(&quads, index));
+        panics(&words, || L::scatter_quads::<3, 2>(&mut quads, index, [L::zero(); 4]));
+        panics(&words, || L::scatter_halves::<3, 0, 1>(&mut quads, index, [L::zero(); 4]));
+        panics(&words, || ShapeRow::gather::<L>(&[ShapeRow::default(); ROWS], index));
+        panics(&words, || Poses::<L>::gather(&[PoseRow::default(); ROWS], [index, index]));
+        let hulls = [HullRow::default(); ROWS];
+        let mut hull = Hull::<L>::empty();
+        panic_of(|| hull.gather_heads(&hulls, index));
+        panic_of(|| hull.gather_corners(&hulls, index, 8, |corner| corner));
+        panic_of(|| hull.gather_corners(&hulls, index, 9, |corner| corner));
+    }
+    // The last record itself is in place.
+    let list = [ROWS as u32 - 1; MOST_LANES];
+    let index = LaneIndex::<L::Index>::new(&list);
+    assert_eq!(index.only(), Some(ROWS - 1));
+    assert!(bytemuck::bytes_of(&L::gather(&rows(), index)[7]) == bytemuck::bytes_of(&L::splat(0.5)));
+}
+
+#[test]
+fn the_bound_of_a_list_is_never_below_an_entry() {
+    let mut list = Indices::default();
+    assert_eq!(list.list().bound(), 0);
+    for (i, bound) in [(3, 4), (1, 4), (7, 8), (u32::MAX, (u32::MAX as usize).saturating_add(1))] {
+        list.extend(&[i]);
+        assert_eq!(list.list().bound(), bound);
+    }
+    list.clear();
+    list.fill_to(5, 9);
+    list.fill_to(3, 100);
+    assert_eq!((&list[..], list.list().bound()), (&[9; 5][..], 10));
+    let part = IndexList::new(&[1, 2, 3, 50, 4, 5]).part(1..3);
+    assert_eq!((part.entries(), part.bound()), (&[2, 3][..], 51));
+    // A batch that the list does not fill repeats its first entry.
+    let mut room = [0; MOST_LANES];
+    let batch = IndexList::new(&[9, 8, 7]).batch_at::<[u32; 4]>(1, &mut room);
+    assert_eq!((*batch.array(), batch.bound()), ([8, 7, 8, 8], 10));
+    panics("out of range", || part.part(0..3));
+    panics("out of bounds", || part.batch_at::<[u32; 4]>(2, &mut [0; MOST_LANES]).bound());
+    panics("out of range", || part.batch_at::<[u32; 4]>(3, &mut [0; MOST_LANES]).bound());
+    panic_of(|| part.batches::<[u32; 4]>().count());
+}
+
+#[test]
+fn batches_without_a_width_take_no_segment() {
+    let layout = layout(OppositeKind::Dynamic);
+    let push = |mut b: Batches| {
+        b.push_segment(OppositeKind::Dynamic, &layout, [(0, [1_000_000_000, 2])].into_iter(), 0);
+    };
+    panics("without lanes", || push(Batches::default()));
+    panics("without lanes", || Batches::default().clear(0));
+}
+
+/// The issue's own lines: rows far out, and no rows at all.
+#[test]
+fn a_sweep_over_no_rows_panics() {
+    let mut batches = Batches::default();
+    batches.clear(8);
+    let kind = OppositeKind::Dynamic;
+    batches.push_segment(kind, &layout(kind), [(0, [1_000_000_000, 999_999_999])].into_iter(), 1_000_000_000);
+    batches.reserve_buffer();
+    panics("index 1000000000 where there are 0 rows", || {
+        sweep::sweep::<f32x8, Full, _>(&mut [], &mut batches, RULE);
+    });
+}
+
+#[test]
+fn a_step_says_what_is_wrong_before_it_begins() {
+    let input = StepInput {
+        features: Features::FULL,
+        budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
+        h: 0.01,
+        parameters: [0.0; 8],
+        record_impulses: true,
+        points: 0,
+    };
+    let new = |lanes: Batches, serial: Batches, contacts: usize| {
+        let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };
+        let mut contacts = vec![Contact::default(); contacts];
+        Passes::new(&mut work, &mut contacts, &mut Clock::start(false), &input, LaneWidth::W8).finish();
+    };
+    panics("batches name row 24 of 24", || new(batches(8, 9, 9, 24), good(1), CONTACTS));
+    panics("batches name row 24 of 24", || new(good(8), batches(1, 9, 24, 10), CONTACTS));
+    panics("batches name contact 19 of 5", || new(good(8), Batches::default(), 5));
+    panics("batches of 4 lanes for kernels of 8", || new(good(4), Batches::default(), CONTACTS));
+    panics("batches of 8 lanes for kernels of 1", || new(Batches::default(), good(8), CONTACTS));
+}
+
+const KINDS: [Kind; 5] = Kind::ALL;
+
+/// `pairs` pairs of one body and shape, with one list changed by `spoil`.
+fn collide(kind: Kind, width: LaneWidth, pairs: u32, contacts: usize, spoil: impl Fn(&mut Jobs)) {
+    let mut shapes = Shapes::default();
+    let shape = match kind {
+        Kind::Circles => Shape::circle("c", glam::Vec2::ZERO, 0.5),
+        _ => Shape::rectangle("r", glam::Vec2::ONE, glam::Vec2::ZERO, 0.0, 0.0),
+    };
+    shapes.push(&shape.expect("valid"));
+    let mut jobs = Jobs::default();
+    let names: Vec<u32> = (0..pairs).collect();
+    jobs.list(&names, |_| (true, [0, 0], [0, 0], NO_CONTACT));
+    spoil(&mut jobs);
+    let input = Input { poses: &[PoseRow::default()], shapes: &shapes, speculative: 0.02 };
+    let mut contacts = vec![Contact::default(); contacts];
+    update(kind, width, &jobs, input, &mut contacts, |_, _| {});
+}
+
+#[test]
+fn the_narrow_phase_refuses_pairs_of_what_does_not_exist() {
+    for kind in KINDS {
+        for width in LaneWidth::ALL {
+            for pairs in [1, 16, 21] {
+                collide(kind, width, pairs, 0, |_| {});
+                collide(kind, width, pairs, 1, |jobs| jobs.contact[0] = 0);
+                for far in [1, 1_000_000_000, u32::MAX] {
+                    for end in [0, pairs as usize - 1] {
+                        for side in [0, 1] {
+                            let words = format!("a pair of bodies {far} of 1");
+                            let spoil = |jobs: &mut Jobs| jobs.bodies[side][end] = far;
+                            panics(&words, || collide(kind, width, pairs, 0, spoil));
+                            let words = format!("a pair of shapes {far} of 1");
+                            let spoil = |jobs: &mut Jobs| jobs.shapes[side][end] = far;
+                            panics(&words, || collide(kind, width, pairs, 0, spoil));
+                        }
+                        if far != NO_CONTACT {
+                            let spoil = |jobs: &mut Jobs| jobs.contact[end] = far;
+                            let words = format!("a pair of contact {far} of 1");
+                            panics(&words, || collide(kind, width, pairs, 1, spoil));
+                        }
+                    }
+                }
+                for list in 0..5 {
+                    for add in [false, true] {
+                        panics(&format!("{pairs} pairs, and "), || {
+                            collide(kind, width, pairs, 0, |jobs| {
+                                let Jobs { bodies: [a, b], shapes: [c, d], contact, .. } = jobs;
+                                let list = [a, b, c, d, contact].into_iter().nth(list).expect("five lists");
+                                list.pop();
+                                if add {
+                                    list.extend([0, 0]);
+                                }
+                            });
+                        });
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn prefetches_are_hints_at_any_address() {
+    let quads = [Quad::default(); 3];
+    prefetch_records::<{ quad::STRIDE }>(&quads, [0, 1, u32::MAX].into_iter());
+    prefetch_records::<1>(&[], [7].into_iter());
+    for (start, end) in [(0, 0), (0, 3), (2, usize::MAX), (usize::MAX, 3), (usize::MAX, usize::MAX)] {
+        let range = start..end;
+        prefetch(&quads, range.clone());
+        prefetch::<u8>(&[], range.clone());
+        prefetch(&[(), ()], range);
+    }
+}
+
+mod words {
+    //! Where unsafe code may be.
+
+    use std::fs;
+    use std::path::Path;
+
+    /// The whole list; each of these says why.
+    const LISTED: [&str; 4] = [
+        "benches/peers/src/box2d.rs",
+        "src/engine/lanes/quads.rs",
+        "src/engine/lanes/rows.rs",
+        "tests/allocations.rs",
+    ];
+
+    /// The code of a file: without line comments and what is between quotation marks.
+    fn code(text: &str) -> String {
+        let mut code = String::new();
+        for line in text.lines() {
+            let line = line.split("//").next().unwrap_or("");
+            code.extend(line.split('"').step_by(2).chain(["\n"]));
+        }
+        code
+    }
+
+    fn has_word(code: &str, word: &str) -> bool {
+        code.split(|c: char| !c.is_alphanumeric() && c != '_').any(|w| w == word)
+    }
+
+    fn walk(folder: &Path, visit: &mut impl FnMut(&Path)) {
+        for entry in fs::read_dir(folder).expect("a folder of sources") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                walk(&path, visit);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                visit(&path);
+            }
+        }
+    }
+
+    #[test]
+    fn unsafe_code_is_only_in_listed_files() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let (mut found, mut allowed) = (vec![], vec![]);
+        for folder in ["src", "tests", "benches"] {
+            walk(&root.join(folder), &mut |path| {
+                let code = code(&fs::read_to_string(path).expect("a source file"));
+                let name = path.strip_prefix(root).expect("below the root").to_str().expect("a name");
+                let name = name.replace('\\', "/");
+                if has_word(&code, "unsafe") {
+                    found.push(name.clone());
+                }
+                if has_word(&code, "unsafe_code") {
+                    allowed.push(name);
+                }
+            });
+        }
+        found.sort();
+        allowed.sort();
+        assert_eq!(found, LISTED);
+        assert_eq!(allowed, LISTED);
+    }
+
+    #[test]
+    fn comments_and_strings_are_no_code() {
+        assert!(has_word(&code("unsafe { x() } // safe"), "unsafe"));
+        assert!(has_word(&code("let x = \"a\"; unsafe fn f()"), "unsafe"));
+        assert!(!has_word(&code("//! unsafe\nlet x = \"unsafe\"; // unsafe"), "unsafe"));
+        assert!(!has_word(&code("#![allow(unsafe_code)]"), "unsafe"));
+    }
+}

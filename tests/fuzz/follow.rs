@@ -1,0 +1,264 @@
+//! What an input is put through, and what may come of it.
+
+use super::bytes;
+use super::harness::Random;
+use super::values;
+use rand::{RngExt, SeedableRng};
+use simpulse::engine::broadphase::BroadPhaseKind;
+use simpulse::engine::constraints::motion::{Integrator, RotationUpdate};
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::world::{Order, Settings, World};
+use simpulse::lab::advise::limits;
+use simpulse::lab::capture::capture;
+use simpulse::lab::converge::{self, Options};
+use simpulse::lab::error::Error;
+use simpulse::lab::metrics::Observation;
+use simpulse::lab::overrides::{self, Override};
+use simpulse::lab::reference::certify::reference;
+use simpulse::lab::reference::frozen::Frozen;
+use simpulse::lab::scenes::{self, Scene};
+use std::path::Path;
+
+/// Scenes of more shapes are read, but not run: all of them may touch all others.
+const MOST_SHAPES: usize = 1500;
+/// Problems of more contacts are read, but not solved.
+const MOST_CONTACTS: usize = 12;
+/// Steps of more contacts are not frozen: their files are large.
+const MOST_FROZEN: usize = 300;
+/// Longest message (characters).
+const LONGEST_MESSAGE: usize = 600;
+const STEPS: u64 = 3;
+
+/// A scene is refused in one line; or it comes back from its JSON as it was, runs, and all that is
+/// measured of it is finite.
+pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
+    let text = String::from_utf8_lossy(input);
+    let path = Path::new("fuzz.json");
+    let scene = match Scene::from_json(&text, path) {
+        Ok(scene) => scene,
+        Err(error) => return refused(&error, "fuzz.json: "),
+    };
+    if scene.name.chars().any(char::is_control) {
+        return Err(format!("accepted name: {:?} is not for tables", scene.name));
+    }
+    let json = scene.to_json();
+    let back = Scene::from_json(&json, path).map_err(|e| format!("own JSON: refused, {e}"))?;
+    // Equality of floats takes −0 for 0; their text does not.
+    if back != scene || back.to_json() != json {
+        return Err("own JSON: another scene came back".to_string());
+    }
+    let shapes: usize = scene.bodies.iter().map(|b| b.shapes.len()).sum();
+    if shapes > MOST_SHAPES {
+        return Ok("accepted: large".to_string());
+    }
+    let settings = settings(salt);
+    let solver = settings.solver.name;
+    let mut world = scene.build(settings).map_err(|e| format!("build: refused a valid scene, {e}"))?;
+    let ending = steps(&mut world, salt % STEPS)?;
+    let c = &world.counts;
+    let sizes = [shapes, c.pairs, c.contacts, c.points].map(|n| n.checked_ilog2().map_or(0, |n| n + 1));
+    Ok(format!(
+        "accepted: {ending}, {sizes:?}, {} colours, overflow {}, {:?}, {solver}",
+        c.colors,
+        c.overflow > 0,
+        world.features()
+    ))
+}
+
+/// Everything that a run can choose.
+fn settings(salt: u64) -> Settings {
+    let mut random = Random::seed_from_u64(salt);
+    let mut settings = Settings::new(bytes::one(&mut random, &VARIANTS));
+    settings.width = bytes::one(&mut random, &LaneWidth::ALL);
+    if random.random_ratio(1, 5) {
+        (settings.order, settings.width) = (Order::Natural, LaneWidth::W1);
+    }
+    settings.broadphase = bytes::one(&mut random, &BroadPhaseKind::ALL);
+    settings.integrator =
+        if random.random_ratio(1, 5) { Integrator::ExplicitEuler } else { Integrator::default() };
+    settings.rotation =
+        if random.random_ratio(1, 5) { RotationUpdate::Normalized } else { RotationUpdate::default() };
+    settings.record_impulses = true;
+    settings.observe_rule = random.random();
+    settings
+}
+
+/// Takes the steps, and freezes one of them; says how the run ended.
+fn steps(world: &mut World, frozen_step: u64) -> Result<String, String> {
+    let mut observation = Observation::new(world);
+    for step in 0..STEPS {
+        if step == frozen_step {
+            freeze(world)?;
+        }
+        if let Err(divergence) = world.step() {
+            return one_line(&divergence.to_string()).map(|_| "diverged".to_string());
+        }
+        let b = &world.bodies;
+        let columns = [
+            ("position", [&b.position_x, &b.position_y]),
+            ("rest of the position", [&b.position_x_lo, &b.position_y_lo]),
+            ("rotation", [&b.rotation_cos, &b.rotation_sin]),
+            ("velocity", [&b.velocity_x, &b.velocity_y]),
+            ("spin", [&b.angular_velocity; 2]),
+        ];
+        for (name, columns) in columns {
+            if columns.iter().any(|column| column.iter().any(|x| !x.is_finite())) {
+                return Err(format!("state: {name} is not finite, but the step did not diverge"));
+            }
+        }
+        observation.observe(world);
+        if let Some(blow_up) = observation.blown_up() {
+            return one_line(&blow_up.to_string()).map(|_| "blown up".to_string());
+        }
+    }
+    let errors = format!("{:?}", observation.errors());
+    match errors.split(", ").find(|field| field.contains("NaN") || field.contains("inf")) {
+        Some(field) => Err(format!("errors: {field}")),
+        None => Ok("ran".to_string()),
+    }
+}
+
+/// The problem of the coming step comes back from its file, or says why it cannot be one.
+fn freeze(world: &mut World) -> Result<(), String> {
+    let frozen = Frozen { problem: capture(world, "fuzz"), reference: None };
+    if frozen.problem.contacts.len() > MOST_FROZEN {
+        return Ok(());
+    }
+    match frozen.to_text() {
+        Ok(text) => same_frozen(&frozen, &text),
+        Err(error) => refused(&error, "").map(drop),
+    }
+}
+
+fn same_frozen(frozen: &Frozen, text: &str) -> Result<(), String> {
+    let back = Frozen::from_text(text, Path::new("x")).map_err(|e| format!("own file: refused, {e}"))?;
+    let same = back == *frozen && back.to_text().is_ok_and(|again| again == text);
+    if same { Ok(()) } else { Err("own file: another problem came back".to_string()) }
+}
+
+/// A frozen problem is refused in one line; or it comes back as it was, and can be solved and
+/// measured or says why not.
+pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
+    let text = String::from_utf8_lossy(input);
+    let frozen = match Frozen::from_text(&text, Path::new("fuzz.frozen")) {
+        Ok(frozen) => frozen,
+        Err(error) => return refused(&error, "fuzz.frozen: "),
+    };
+    let again = frozen.to_text().map_err(|e| format!("own file: not written, {e}"))?;
+    same_frozen(&frozen, &again)?;
+    let Frozen { problem, reference: known } = &frozen;
+    if problem.contacts.len() > MOST_CONTACTS {
+        return Ok("accepted: large".to_string());
+    }
+    let solution = match reference(problem) {
+        Ok(found) => {
+            found.check(problem).map_err(|why| format!("reference: does not hold, {why}"))?;
+            format!("{:?} {:?}", found.certificate.method, found.certificate.uniqueness)
+        }
+        Err(why) => {
+            one_line(&why.to_string())?;
+            "no reference".to_string()
+        }
+    };
+    let mut random = Random::seed_from_u64(salt);
+    let solvers = vec![bytes::one(&mut random, &VARIANTS)];
+    let options = Options { solvers, max_iterations: 6, rounds: 0, ..Options::default() };
+    let curves = match converge::converge(problem, known.as_ref(), &options) {
+        Ok(report) => {
+            converge::table::text(&report);
+            let written =
+                [converge::table::csv(&report), converge::table::json(&report), converge::plot::svg(&report)];
+            for text in written {
+                text.map_err(|e| format!("report: not written, {e}"))?;
+            }
+            "curves".to_string()
+        }
+        Err(error) => refused(&error, "")?,
+    };
+    Ok(format!("accepted: {solution}, {curves}, {} contacts", problem.contacts.len()))
+}
+
+/// Words of the command line: parameters, limits, scene names.
+pub fn word(input: &[u8], salt: u64) -> Result<String, String> {
+    let text = String::from_utf8_lossy(input);
+    let unit = bytes::one(&mut Random::seed_from_u64(salt), &["m", "s", "N", "", "m/s"]);
+    let number = limits::quantity("max", &text, unit);
+    let set = text.parse::<Override>().and_then(|given| overrides::check(&VARIANTS, &[given]));
+    let size = text.split_once(':').and_then(|(_, size)| size.parse::<u32>().ok());
+    // Large scenes are slow to make.
+    let scene = if size.is_some_and(|size| size > 100) { None } else { Some(scenes::load(&text)) };
+    let mut shape = String::new();
+    for result in [number.map(drop), set, scene.map_or(Ok(()), |s| s.map(drop))] {
+        shape += &match result {
+            Ok(()) => "accepted; ".to_string(),
+            Err(error) => refused(&error, "")?,
+        };
+    }
+    Ok(shape)
+}
+
+/// A message of one line that begins with its file and says something; its words without what is quoted.
+fn refused(error: &Error, start: &str) -> Result<String, String> {
+    let message = error.to_string();
+    one_line(&message)?;
+    let rest = message.strip_prefix(start).ok_or_else(|| format!("message: without its file, {message}"))?;
+    if rest.len() < 8 {
+        return Err(format!("message: says nothing, {message}"));
+    }
+    // Only how deep its place is: names would make every message another one.
+    let (place, what) = rest.rsplit_once(": ").unwrap_or(("", rest));
+    let mut words = format!("{} ", place.matches(['.', '[']).count().min(6));
+    let mut quote = None;
+    for c in what.chars() {
+        match quote {
+            Some(end) if c == end => quote = None,
+            Some(_) => {}
+            None if "`'\"".contains(c) => quote = Some(c),
+            None if c.is_ascii_alphabetic() || c == ' ' => words.push(c),
+            None => {}
+        }
+    }
+    Ok(words)
+}
+
+fn one_line(message: &str) -> Result<(), String> {
+    if let Some(c) = message.chars().find(|c| c.is_control()) {
+        return Err(format!("message: {c:?} in {message:?}").chars().take(LONGEST_MESSAGE).collect());
+    }
+    match message.chars().count() {
+        n if n > LONGEST_MESSAGE => Err(format!("message length: {n} characters")),
+        _ => Ok(()),
+    }
+}
+
+/// The second line of a frozen problem, or all of what has no second line.
+pub fn payload(text: &[u8]) -> &[u8] {
+    let start = text.iter().position(|&b| b == b'\n').map_or(0, |i| i + 1);
+    text[start..].strip_suffix(b"\n").unwrap_or(&text[start..])
+}
+
+/// A file whose header fits the payload.
+pub fn signed(payload: &[u8]) -> Vec<u8> {
+    let payload = String::from_utf8_lossy(payload);
+    let payload = payload.strip_suffix('\n').unwrap_or(&payload);
+    // FNV-1a, written anew.
+    let mut hash = 14_695_981_039_346_656_037_u64;
+    for byte in payload.bytes() {
+        hash = (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211);
+    }
+    let bytes = payload.len();
+    format!(
+        "{{\"format\":\"simpulse-frozen\",\"version\":1,\"bytes\":{bytes},\"checksum\":\"fnv1a64:{hash:016x}\"}}\n{payload}\n"
+    )
+    .into_bytes()
+}
+
+/// A parent with another header.
+pub fn with_header(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
+    let text = bytes::pick(random, corpus);
+    let end = text.iter().position(|&b| b == b'\n').unwrap_or(text.len());
+    let mut whole = values::mutate_line(random, &text[..end]);
+    whole.extend(&text[end..]);
+    whole
+}
