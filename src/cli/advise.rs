@@ -1,6 +1,6 @@
 //! `simpulse advise`: the cheapest setting that is good enough, with the evidence.
 
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::{VARIANTS, find};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::{Limits, quantity};
@@ -10,7 +10,7 @@ use crate::lab::files::Pending;
 use crate::lab::overrides;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{digits, ratio, si, si_short};
+use crate::lab::report::units::{self, digits, ratio, si, si_short};
 use crate::lab::study::open_scene;
 use clap::Args;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
@@ -56,7 +56,8 @@ pub struct AdviseArgs {
     /// Solvers [default: all]
     #[arg(long, value_delimiter = ',', value_name = "SOLVER,…")]
     pub solvers: Vec<String>,
-    /// Lane widths: 1, 4, 8, 16; with 1 also natural order [default: all]
+    /// Lane widths: 1, 4, 8, 16; with 1 also natural order [default: the widest that this build has
+    /// instructions for]
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub lanes: Vec<usize>,
     /// Steps of the runs that measure errors [default: those of the scene]
@@ -116,7 +117,7 @@ impl AdviseArgs {
                 true => VARIANTS.to_vec(),
                 false => self.solvers.iter().map(|name| find(name)).collect::<Result<_, _>>()?,
             },
-            widths: if widths.is_empty() { LaneWidth::ALL.to_vec() } else { widths },
+            widths: if widths.is_empty() { vec![native_width()] } else { widths },
             steps: self.steps,
             repeats: self.repeats,
             seed: self.seed,
@@ -204,10 +205,9 @@ fn name(trial: &Trial) -> String {
 }
 
 fn lanes(trial: &Trial) -> String {
-    match (trial.setting.order, trial.time.map_or(1, |t| t.lanes)) {
-        (Order::Natural, _) => "natural order".to_string(),
-        (Order::Colored, 1) => "1 lane".to_string(),
-        (Order::Colored, lanes) => format!("{lanes} lanes"),
+    match trial.setting.order {
+        Order::Natural => "natural order".to_string(),
+        Order::Colored => units::lanes(trial.time.map_or(1, |t| t.lanes)),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::cli::converge::ConvergeArgs;
 use crate::cli::growth::GrowthArgs;
 use crate::cli::profile::ProfileArgs;
 use crate::cli::verify::VerifyArgs;
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::quantity;
@@ -90,7 +90,7 @@ pub struct StudyArgs {
     /// Solvers (`simpulse solvers` lists them)
     #[arg(long, value_delimiter = ',', value_name = "SOLVER,…")]
     pub solvers: Vec<String>,
-    /// Lane widths: 1, 4, 8, 16
+    /// Lane widths: 1, 4, 8, 16 [default: 1, 4, 8, and 16 where this build has instructions for it]
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub lanes: Vec<usize>,
     /// Constraint orders: natural, colored
@@ -145,7 +145,8 @@ pub struct RunArgs {
     /// A solver of `simpulse solvers`
     #[arg(long, default_value = crate::engine::solvers::DEFAULT)]
     pub solver: String,
-    /// Lanes: 1, 4, 8 or 16 [default: 8, in natural order 1]
+    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for, in natural
+    /// order 1]
     #[arg(long, value_name = "N")]
     pub lanes: Option<usize>,
     /// Constraint order: natural or colored
@@ -270,6 +271,11 @@ fn widths(lanes: &[usize]) -> Result<Vec<LaneWidth>, Error> {
 pub fn width(lanes: usize) -> Result<LaneWidth, Error> {
     let refused = || Error::invalid("lanes", format!("{lanes} is none of 1, 4, 8, 16"));
     LaneWidth::from_lanes(lanes).ok_or_else(refused)
+}
+
+/// The width of `lanes` lanes; where none are given, the widest that this build has instructions for.
+pub fn width_or_native(lanes: Option<usize>) -> Result<LaneWidth, Error> {
+    lanes.map_or(Ok(native_width()), width)
 }
 
 /// The constraint order of that name.

@@ -1,7 +1,7 @@
 //! `simpulse converge`: every solver on exactly the same contact problem.
 
 use super::capture::{RunArgs, freeze};
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::{self, VARIANTS};
 use crate::lab::converge::{Options, converge, plot, table};
 use crate::lab::error::Error;
@@ -46,9 +46,9 @@ pub struct ConvergeArgs {
     /// Most iterations
     #[arg(long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub max_iterations: u32,
-    /// Lanes in coloured order: 1, 4, 8 or 16
-    #[arg(long, value_name = "LANES", default_value_t = 8)]
-    pub width: usize,
+    /// Lanes in coloured order: 1, 4, 8 or 16 [default: the widest that this build has instructions for]
+    #[arg(long, value_name = "LANES")]
+    pub width: Option<usize>,
     /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
@@ -70,9 +70,9 @@ impl ConvergeArgs {
         } else {
             self.solvers.iter().map(|name| solvers::find(name)).collect::<Result<_, _>>()?
         };
-        let width = LaneWidth::ALL.into_iter().find(|w| w.lanes() == self.width);
-        let width = width
-            .ok_or_else(|| Error::invalid("--width", format!("is {}, must be 1, 4, 8 or 16", self.width)))?;
+        let lanes = self.width.unwrap_or(native_width().lanes());
+        let refused = || Error::invalid("--width", format!("is {lanes}, must be 1, 4, 8 or 16"));
+        let width = LaneWidth::from_lanes(lanes).ok_or_else(refused)?;
         overrides::check(&solvers, &self.set)?;
         Ok(Options {
             solvers,

@@ -9,6 +9,7 @@ use crate::lab::profile::growth::{Entry, Measurement, measure, size_for, verdict
 use crate::lab::profile::growth_report;
 use crate::lab::profile::islands::islands;
 use crate::lab::profile::waiting;
+use crate::lab::report::units::lanes;
 use crate::lab::scenes::{CATALOG, MAX_BODIES, Scene, Size};
 use crate::lab::study::{is_path, open_scene};
 use clap::Args;
@@ -44,9 +45,9 @@ pub struct GrowthArgs {
     /// A solver of `simpulse solvers`
     #[arg(long, default_value = DEFAULT)]
     pub solver: String,
-    /// Lanes: 1, 4, 8 or 16
-    #[arg(long, default_value_t = 8, value_name = "N")]
-    pub lanes: usize,
+    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for]
+    #[arg(long, value_name = "N")]
+    pub lanes: Option<usize>,
     /// Steps before a scene is held still
     #[arg(long, default_value_t = 8, value_name = "STEPS")]
     pub settle: u32,
@@ -156,7 +157,8 @@ fn free_memory() -> Option<f64> {
 /// Runs the command.
 pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     let solver = find(&args.solver)?;
-    let settings = Settings { width: super::args::width(args.lanes)?, ..Settings::new(solver) };
+    let width = super::args::width_or_native(args.lanes)?;
+    let settings = Settings { width, ..Settings::new(solver) };
     let targets = targets(&args.contacts)?;
     // Unknown names first; a path is read when it is opened.
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
@@ -192,7 +194,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         eprintln!("round {} of {}: whole steps on held states", round + 1, args.repeats);
     });
     drop(entries);
-    let title = format!("{} · {}, {} lanes: cost of a contact", args.scene, solver.name, args.lanes);
+    let title = format!("{} · {}, {}: cost of a contact", args.scene, solver.name, lanes(width.lanes()));
     let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows, &memory)));
     out += &notes;
     out += &waiting::note(waiting);

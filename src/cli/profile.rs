@@ -56,9 +56,9 @@ pub struct ProfileArgs {
     /// A solver of `simpulse solvers`
     #[arg(long, default_value = DEFAULT)]
     pub solver: String,
-    /// Lanes: 1, 4, 8 or 16
-    #[arg(long, default_value_t = 8, value_name = "N")]
-    pub lanes: usize,
+    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for]
+    #[arg(long, value_name = "N")]
+    pub lanes: Option<usize>,
     /// Substeps [default: the solver's]
     #[arg(long, value_name = "N")]
     pub substeps: Option<u32>,
@@ -105,7 +105,7 @@ fn parse(name: &str) -> Result<Vec<Phase>, Error> {
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
     let solver = find(&args.solver)?;
-    let width = super::args::width(args.lanes)?;
+    let width = super::args::width_or_native(args.lanes)?;
     let mut chosen = solver.budget;
     chosen.substeps = args.substeps.unwrap_or(chosen.substeps);
     budget::check(&chosen, solver)?;

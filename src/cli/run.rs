@@ -1,6 +1,6 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and what happened as CSV.
 
-use super::args::{RunArgs, order, width};
+use super::args::{RunArgs, order, width_or_native};
 use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::Budget;
@@ -12,7 +12,7 @@ use crate::lab::metrics::Observation;
 use crate::lab::metrics::state::Angles;
 use crate::lab::overrides;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{digits, si};
+use crate::lab::report::units::{digits, lanes, si};
 use crate::lab::scenes::holds::Watch;
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
 use std::path::Path;
@@ -102,7 +102,7 @@ fn settings(args: &RunArgs) -> Result<Settings, Error> {
         (Order::Natural, Some(lanes)) if lanes != 1 => {
             return Err(Error::invalid("lanes", format!("{lanes}, but natural order has 1 lane")));
         }
-        (_, lanes) => width(lanes.unwrap_or(8))?,
+        (_, lanes) => width_or_native(lanes)?,
     };
     let own = solver.budget;
     let chosen = Budget {
@@ -128,7 +128,7 @@ fn head(world: &World, scene: &crate::lab::scenes::Scene) -> String {
     let s = &world.settings;
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
-        Order::Colored => format!("{} lanes", s.width.lanes()),
+        Order::Colored => lanes(s.width.lanes()),
     };
     format!(
         "{}: {} bodies, {} steps of {} · {}, {}, {order}\n\n",

@@ -3,7 +3,7 @@
 use crate::engine::broadphase::BroadPhaseKind;
 use crate::engine::constraints::Features;
 use crate::engine::constraints::motion::{Integrator, RotationUpdate};
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
 
@@ -52,11 +52,12 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Standard settings of `solver`: its budget, 8 lanes, coloured, gravity (0, −10), 1/60 s.
+    /// Standard settings of `solver`: its budget, the widest lanes that this build has instructions
+    /// for, coloured, gravity (0, −10), 1/60 s.
     pub fn new(solver: &'static Variant) -> Self {
         Settings {
             solver,
-            width: LaneWidth::W8,
+            width: native_width(),
             order: Order::Colored,
             budget: solver.budget,
             gravity: [0.0, -10.0],

@@ -27,7 +27,7 @@ mod setup;
 pub mod table;
 mod timing;
 
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
@@ -67,7 +67,7 @@ impl Default for Options {
             solvers: VARIANTS.to_vec(),
             max_iterations: 1000,
             seed: 1,
-            width: LaneWidth::W8,
+            width: native_width(),
             overrides: Vec::new(),
             rounds: 15,
         }

@@ -6,6 +6,7 @@
 
 use super::replay::{Sequence, Start};
 use super::{Curve, Point, Reached, Report};
+use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
@@ -123,7 +124,7 @@ fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report) -> Drawn {
     let y = HEADING + 10 + LEGEND_LINE * solvers.len().div_ceil(4) as i32;
     let orders = [
         (Sequence::Natural, "natural order".to_string()),
-        (Sequence::Colored, format!("colored, {} lanes", report.lanes)),
+        (Sequence::Colored, format!("colored, {} lanes{}", report.lanes, emulated(report.lanes))),
         (Sequence::Shuffled(0), "shuffled".to_string()),
     ];
     for (i, (order, name)) in orders.into_iter().enumerate() {
@@ -231,4 +232,8 @@ fn decade(exponent: i32) -> String {
         2 => "100".into(),
         n => format!("1e{n}"),
     }
+}
+/// What is said of lanes that are wider than what this build has instructions for.
+fn emulated(lanes: usize) -> &'static str {
+    if lanes > native_width().lanes() { ", emulated" } else { "" }
 }

@@ -4,6 +4,7 @@ use super::{PhaseReport, Report, waiting};
 use crate::engine::clock::Phase;
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::digits;
+use crate::lab::report::units::lanes;
 
 /// Phases whose arithmetic is partly outside of lanes: their operations are a lower bound.
 fn is_partly_scalar(phase: Phase) -> bool {
@@ -39,11 +40,11 @@ pub fn text(report: &Report) -> String {
 pub fn head(report: &Report) -> String {
     let c = &report.counts;
     format!(
-        "{} · {}, {} substeps, {} lanes · {} bodies, {} contacts, {} points, {} colours, {:.0} % of lanes filled\n",
+        "{} · {}, {} substeps, {} · {} bodies, {} contacts, {} points, {} colours, {:.0} % of lanes filled\n",
         report.scene,
         report.solver,
         report.substeps,
-        report.lanes,
+        lanes(report.lanes),
         report.bodies,
         c.contacts,
         c.points,
@@ -172,9 +173,9 @@ fn ceilings(report: &Report, multiply_adds: f64) -> String {
         ]);
     }
     format!(
-        "\nthis machine, one thread, measured in turn with the above\n{}  multiply-adds, {} lanes: {} GFLOP/s\n\n",
+        "\nthis machine, one thread, measured in turn with the above\n{}  multiply-adds, {}: {} GFLOP/s\n\n",
         finish(rows, 1),
-        report.lanes,
+        lanes(report.lanes),
         digits(multiply_adds)
     )
 }

@@ -1,6 +1,7 @@
 //! The study as `study.csv` and `study.json`.
 
 use super::environment::Environment;
+use super::units::is_emulated;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
@@ -19,6 +20,7 @@ struct Line<'a> {
     solver: &'a str,
     order: Order,
     lanes: usize,
+    lanes_emulated: bool,
     substeps: u32,
     velocity_iterations: u32,
     relax_iterations: u32,
@@ -97,6 +99,7 @@ impl<'a> Line<'a> {
             solver: r.solver,
             order: r.order,
             lanes: r.lanes,
+            lanes_emulated: is_emulated(r.lanes),
             substeps: r.budget.substeps,
             velocity_iterations: r.budget.velocity_iterations,
             relax_iterations: r.budget.relax_iterations,

@@ -1,6 +1,6 @@
 //! The study in plain words: what to use where.
 
-use super::units::{digits, ratio, si};
+use super::units::{digits, lanes, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::study::Record;
 use crate::lab::study::answer::Answer;
@@ -44,10 +44,9 @@ fn tied(answer: &Answer) -> String {
 }
 
 fn setting(record: &Record) -> String {
-    let lanes = match (record.order, record.lanes) {
-        (Order::Natural, _) => "natural order".to_string(),
-        (Order::Colored, 1) => "1 lane".to_string(),
-        (Order::Colored, lanes) => format!("{lanes} lanes"),
+    let lanes = match record.order {
+        Order::Natural => "natural order".to_string(),
+        Order::Colored => lanes(record.lanes),
     };
     let time = record.lap.as_ref().map_or(0.0, |lap| lap.median_ns / 1e3);
     let mut text = format!("{}, {}, {lanes}, {} µs", record.solver, record.budget_text, digits(time));

@@ -1,6 +1,6 @@
 //! Tables for the terminal, to be read at 160 columns.
 
-use super::units::{digits, ratio, si};
+use super::units::{digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
 use crate::lab::study::ablation::NeedCost;
@@ -81,6 +81,7 @@ pub fn scene_table(records: &[Record]) -> String {
 fn lanes(record: &Record) -> String {
     match record.order {
         Order::Natural => "nat".to_string(),
+        Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
         Order::Colored => record.lanes.to_string(),
     }
 }

@@ -1,5 +1,7 @@
 //! Numbers for people: three digits, with the prefix that fits.
 
+use crate::engine::lanes::native_width;
+
 /// `value` of a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 5] = [(1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
@@ -41,6 +43,19 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A lane width in words: `1 lane`, `8 lanes`, `16 lanes, emulated` where the build has no
+/// instructions that wide.
+pub fn lanes(count: usize) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    let emulated = if is_emulated(count) { ", emulated" } else { "" };
+    format!("{count} lane{plural}{emulated}")
+}
+
+/// Whether lanes of this width are wider than what this build has instructions for.
+pub fn is_emulated(lanes: usize) -> bool {
+    lanes > native_width().lanes()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,6 +69,14 @@ mod tests {
             (si(0.00123, ""), si(0.0, ""), si(0.5, "1")),
             ("1.2e-3".into(), "0".into(), "5.0e-1".into())
         );
+    }
+
+    #[test]
+    fn emulated_lanes_say_so() {
+        assert_eq!(lanes(1), "1 lane");
+        let widest = native_width().lanes();
+        assert_eq!(lanes(2 * widest), format!("{} lanes, emulated", 2 * widest));
+        assert!(!is_emulated(widest));
     }
 
     #[test]

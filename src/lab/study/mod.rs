@@ -16,7 +16,7 @@ pub mod profile;
 pub mod record;
 pub mod slices;
 
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::{Divergence, Order, Settings};
@@ -80,7 +80,7 @@ impl Default for StudyPlan {
         StudyPlan {
             scenes: DEFAULT_SCENES.map(String::from).to_vec(),
             solvers: VARIANTS.to_vec(),
-            widths: LaneWidth::ALL.to_vec(),
+            widths: widths(native_width()),
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
             overrides: Vec::new(),
@@ -91,6 +91,11 @@ impl Default for StudyPlan {
             seed: 1,
         }
     }
+}
+
+/// 1, 4 and 8 lanes, and wider ones where they are not emulated.
+fn widths(native: LaneWidth) -> Vec<LaneWidth> {
+    LaneWidth::ALL.into_iter().filter(|&w| w <= LaneWidth::W8 || w <= native).collect()
 }
 
 impl StudyPlan {
@@ -429,4 +434,18 @@ fn timed_records(
         records[i].speed_up = ratio.map(|r| r.median);
     }
     Ok(records)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_lanes_run_by_themselves_where_they_are_native() {
+        assert_eq!(widths(LaneWidth::W16), LaneWidth::ALL);
+        for native in [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8] {
+            assert_eq!(widths(native), [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8]);
+        }
+        assert_eq!(Settings::new(VARIANTS[0]).width, native_width());
+    }
 }
