@@ -5,6 +5,10 @@ use crate::cli::capture::CaptureArgs;
 use crate::cli::converge::ConvergeArgs;
 use crate::cli::growth::GrowthArgs;
 use crate::cli::profile::ProfileArgs;
+use crate::cli::replay::ReplayArgs;
+use crate::cli::report::ReportArgs;
+use crate::cli::setting::SettingArgs;
+use crate::cli::snapshot::SnapshotArgs;
 use crate::cli::verify::VerifyArgs;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::{VARIANTS, Variant, find};
@@ -59,6 +63,12 @@ pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
+    /// Draw one frame of a scene as SVG or PNG
+    Snapshot(SnapshotArgs),
+    /// Make a page that plays recordings side by side
+    Replay(ReplayArgs),
+    /// Make the page of a study again, from its records
+    Report(ReportArgs),
     /// Run one scene; print the time of each phase and the errors
     Run(RunArgs),
     /// Find the cheapest setting within given tolerances on a scene
@@ -142,47 +152,25 @@ Examples:
 pub struct RunArgs {
     /// A scene of `simpulse scenes`, or a .json file
     pub scene: String,
-    /// A solver of `simpulse solvers`
-    #[arg(long, default_value = crate::engine::solvers::DEFAULT)]
-    pub solver: String,
-    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for, in natural
-    /// order 1]
-    #[arg(long, value_name = "N")]
-    pub lanes: Option<usize>,
-    /// Constraint order: natural or colored
-    #[arg(long, default_value = "colored")]
-    pub order: String,
-    /// Substeps [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub substeps: Option<u32>,
-    /// Velocity sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub velocity_iterations: Option<u32>,
-    /// Relaxing sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub relax_iterations: Option<u32>,
-    /// Position sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub position_iterations: Option<u32>,
+    /// How it runs
+    #[command(flatten)]
+    pub setting: SettingArgs,
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
-    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
-    pub set: Vec<Override>,
-    /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    pub dt: Option<f64>,
-    /// Random seed of scenes that have one
-    #[arg(long)]
-    pub seed: Option<u64>,
     /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
     #[arg(long, value_name = "FILE.csv")]
     pub state: Option<PathBuf>,
     /// Write contact points with their impulses (N·s over the step)
     #[arg(long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
-    /// Write every K-th step [default: the last step only]
+    /// Write a recording for `simpulse replay`
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Keep contact points and impulses in the recording, too
+    #[arg(long, requires = "record")]
+    pub record_contacts: bool,
+    /// Write every K-th step [default: of CSV files the last step only, of a recording all]
     #[arg(long, value_name = "K")]
     pub every: Option<u32>,
 }

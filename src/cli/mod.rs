@@ -8,14 +8,17 @@ pub mod capture;
 pub mod converge;
 pub mod growth;
 pub mod profile;
+pub mod replay;
+pub mod report;
 pub mod run;
+pub mod setting;
+pub mod snapshot;
 pub mod verify;
 
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
-use crate::lab::report;
 use crate::lab::scenes::CATALOG;
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::study::{self, Progress, ablation, budget, open_scene};
@@ -60,6 +63,9 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
                 Ok(ExitCode::FAILURE)
             }
         },
+        Some(Command::Snapshot(args)) => print(&snapshot::run(&args)?),
+        Some(Command::Replay(args)) => print(&replay::run(&args)?),
+        Some(Command::Report(args)) => print(&report::run(&args)?),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
@@ -98,8 +104,8 @@ fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
         false => with_lines(&plan.scenes, |tell| study::run(&plan, tell))?,
     };
     let costs = ablation::ablation(&plan)?;
-    let paths = report::write_study(&args.out, &plan, &records, &costs)?;
-    let mut text = report::text(&records, &costs) + "\n";
+    let paths = crate::lab::report::write_study(&args.out, &plan, &records, &costs)?;
+    let mut text = crate::lab::report::text(&records, &costs) + "\n";
     for path in paths {
         text += &format!("wrote {}\n", path.display());
     }

@@ -1,16 +1,12 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and what happened as CSV.
 
-use super::args::{RunArgs, order, width_or_native};
+use super::args::RunArgs;
 use crate::engine::clock::{Phase, Timings};
-use crate::engine::lanes::LaneWidth;
-use crate::engine::params::Budget;
-use crate::engine::solvers::find;
-use crate::engine::world::{Order, Settings, World};
+use crate::engine::world::{Order, World};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::metrics::Observation;
 use crate::lab::metrics::state::Angles;
-use crate::lab::overrides;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, lanes, si};
 use crate::lab::scenes::holds::Watch;
@@ -27,19 +23,22 @@ pub enum Ending {
 
 /// Runs the scene that was asked for; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<Ending, Error> {
-    let settings = settings(args)?;
+    let settings = args.setting.settings()?;
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
-    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
-        return Err(Error::invalid("every", "needs --state or --contacts"));
+    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() && args.record.is_none() {
+        return Err(Error::invalid("every", "needs --state, --contacts or --record"));
+    }
+    if args.record.is_some() && [&args.state, &args.contacts].contains(&&args.record) {
+        return Err(Error::invalid("record", "is the same file as --state or --contacts"));
     }
     if args.state.is_some() && args.state == args.contacts {
         return Err(Error::invalid("contacts", "is the same file as --state"));
     }
-    let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
+    let mut loaded = open_scene(&args.scene, args.setting.seed, args.steps, args.setting.dt)?;
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;
     let mut state = args.state.as_deref().map(|path| Sheet::new(path, &STATE)).transpose()?;
@@ -92,36 +91,6 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         sheet.commit()?;
     }
     Ok(Ending::Finished(text))
-}
-
-fn settings(args: &RunArgs) -> Result<Settings, Error> {
-    let solver = find(&args.solver)?;
-    let order = order(&args.order)?;
-    let lanes = match (order, args.lanes) {
-        (Order::Natural, None) => LaneWidth::W1,
-        (Order::Natural, Some(lanes)) if lanes != 1 => {
-            return Err(Error::invalid("lanes", format!("{lanes}, but natural order has 1 lane")));
-        }
-        (_, lanes) => width_or_native(lanes)?,
-    };
-    let own = solver.budget;
-    let chosen = Budget {
-        substeps: args.substeps.unwrap_or(own.substeps),
-        velocity_iterations: args.velocity_iterations.unwrap_or(own.velocity_iterations),
-        relax_iterations: args.relax_iterations.unwrap_or(own.relax_iterations),
-        position_iterations: args.position_iterations.unwrap_or(own.position_iterations),
-    };
-    budget::check(&chosen, solver)?;
-    overrides::check(&[solver], &args.set)?;
-    Ok(Settings {
-        width: lanes,
-        order,
-        budget: chosen,
-        parameters: overrides::values(solver, &args.set)?,
-        record_impulses: true,
-        timed: true,
-        ..Settings::new(solver)
-    })
 }
 
 fn head(world: &World, scene: &crate::lab::scenes::Scene) -> String {

@@ -79,9 +79,9 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "overrides"],
+    &["files", "overrides", "units"],
     &["metrics", "reference"],
-    &["scenes", "capture"],
+    &["scenes", "capture", "picture"],
     &["verify", "study", "converge"],
     &["advise", "report"],
     &["profile"],

@@ -7,7 +7,7 @@ pub mod plot;
 pub mod profiles;
 pub mod reading;
 pub mod table;
-pub mod units;
+pub use crate::lab::units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
