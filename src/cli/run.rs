@@ -2,15 +2,17 @@
 
 use super::args::RunArgs;
 use crate::engine::clock::{Phase, Timings};
-use crate::engine::world::{Order, World};
+use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::metrics::Observation;
 use crate::lab::metrics::state::Angles;
+use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, lanes, si};
 use crate::lab::scenes::holds::Watch;
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
+use std::io::Write;
 use std::path::Path;
 
 /// How a run ended.
@@ -44,6 +46,17 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     let mut state = args.state.as_deref().map(|path| Sheet::new(path, &STATE)).transpose()?;
     let mut contacts = args.contacts.as_deref().map(|path| Sheet::new(path, &CONTACTS)).transpose()?;
 
+    let every = args.every.unwrap_or(1);
+    let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
+        let caption = Caption {
+            scene: scene.name.clone(),
+            solver: world.settings.solver.name.into(),
+            setting: how(&world.settings),
+        };
+        // Begun now, so that a file that cannot be written is refused before the run.
+        Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
+    });
+    let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
@@ -58,6 +71,9 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
             return Ok(Ending::Diverged(divergence.into()));
         }
         times.add(&world.timings);
+        if let Some((_, recorder)) = &mut recorder {
+            recorder.add(&world)?;
+        }
         observation.observe(&world);
         watch.observe(&world);
         angles.add(&world);
@@ -86,6 +102,12 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
         Some(broken) => format!("  does not hold: {broken}\n"),
         None => "  holds\n".to_string(),
     };
+    if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
+        let outcome = watch.broken().map_or("holds".to_string(), |broken| broken.to_string());
+        file.write_all(&recorder.finish(&outcome)?).map_err(Error::io(path))?;
+        file.commit()?;
+        text += &format!("wrote {}\n", path.display());
+    }
     for sheet in [state, contacts].into_iter().flatten() {
         text += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;
@@ -93,20 +115,25 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     Ok(Ending::Finished(text))
 }
 
-fn head(world: &World, scene: &crate::lab::scenes::Scene) -> String {
-    let s = &world.settings;
+/// Budget and order or lanes.
+fn how(s: &Settings) -> String {
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(s.width.lanes()),
     };
+    format!("{}, {order}", budget::brief(&s.budget, s.solver))
+}
+
+fn head(world: &World, scene: &crate::lab::scenes::Scene) -> String {
+    let s = &world.settings;
     format!(
-        "{}: {} bodies, {} steps of {} · {}, {}, {order}\n\n",
+        "{}: {} bodies, {} steps of {} · {}, {}\n\n",
         scene.name,
         scene.bodies.len(),
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,
-        budget::brief(&s.budget, s.solver),
+        how(s),
     )
 }
 

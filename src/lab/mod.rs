@@ -22,6 +22,7 @@ pub mod metrics;
 pub mod overrides;
 pub mod picture;
 pub mod profile;
+pub mod recording;
 pub mod reference;
 pub mod report;
 pub mod scenes;

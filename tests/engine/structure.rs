@@ -82,6 +82,7 @@ const LAB: &[&[&str]] = &[
     &["files", "overrides", "units"],
     &["metrics", "reference"],
     &["scenes", "capture", "picture"],
+    &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
     &["profile"],

@@ -6,6 +6,7 @@ pub mod export;
 pub mod plot;
 pub mod profiles;
 pub mod reading;
+pub mod style;
 pub mod table;
 pub use crate::lab::units;
 
