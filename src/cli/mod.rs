@@ -104,7 +104,10 @@ fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
         false => with_lines(&plan.scenes, |tell| study::run(&plan, tell))?,
     };
     let costs = ablation::ablation(&plan)?;
-    let paths = crate::lab::report::write_study(&args.out, &plan, &records, &costs)?;
+    let replays = study::telling::recordings(&plan, &records)?;
+    let replays = crate::lab::report::html::write_recordings(&args.out, &replays)?;
+    let mut paths = crate::lab::report::write_study(&args.out, &plan, &records, &costs)?;
+    paths.extend(replays);
     let mut text = crate::lab::report::text(&records, &costs) + "\n";
     for path in paths {
         text += &format!("wrote {}\n", path.display());

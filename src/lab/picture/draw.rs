@@ -163,11 +163,11 @@ fn depths(stage: &Stage, frame: &Frame) -> Vec<f64> {
     depths
 }
 
-/// The median width of the shapes that move, in pixels.
+/// The median size of the shapes that move, in pixels: the side of a square of their area.
 fn typical(stage: &Stage, scale: f64) -> f64 {
     let moving = stage.shapes.iter().filter(|(body, _)| stage.kinds[*body as usize] != BodyKind::Static);
-    let mut widths: Vec<f64> = moving.map(|(_, s)| 2.0 * f64::from(s.min_half_extent())).collect();
-    widths.retain(|w| w.is_finite());
+    let mut widths: Vec<f64> = moving.map(|(_, s)| s.mass(1.0).mass.sqrt()).collect();
+    widths.retain(|w| *w > 0.0 && w.is_finite());
     widths.sort_by(f64::total_cmp);
     scale * widths.get(widths.len() / 2).copied().unwrap_or(1.0)
 }

@@ -19,7 +19,7 @@ pub fn outline(shape: &Shape) -> Vec<[f64; 2]> {
     let count = core.len();
     let direction = |i: usize| {
         let ([px, py], [qx, qy]) = (core[i % count], core[(i + 1) % count]);
-        (px - qx).atan2(qy - py) + TAU / 2.0
+        (px - qx).atan2(qy - py)
     };
     let mut points = Vec::new();
     for (i, [x, y]) in core.iter().enumerate() {

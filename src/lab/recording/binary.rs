@@ -25,6 +25,17 @@ pub fn whole(half: u16) -> f32 {
     f32::from_bits(u32::from(half) << 16)
 }
 
+/// Adler-32 of RFC 1950, which ends a zlib stream, the highest byte first.
+pub fn adler32(bytes: &[u8]) -> u32 {
+    const PRIME: u32 = 65_521;
+    // 5552 bytes are the most whose sums fit before a remainder is taken.
+    let (a, b) = bytes.chunks(5552).fold((1, 0), |(a, b), chunk| {
+        let sums = chunk.iter().fold((a, b), |(a, b), &byte| (a + u32::from(byte), b + a + u32::from(byte)));
+        (sums.0 % PRIME, sums.1 % PRIME)
+    });
+    (b << 16) | a
+}
+
 /// Reads from the front of a slice; nothing where it ends too early.
 pub struct Reader<'a> {
     bytes: &'a [u8],
@@ -93,6 +104,14 @@ mod tests {
         assert_eq!(values.map(|_| reader.signed().unwrap()), values);
         assert_eq!((reader.remaining(), reader.signed()), (0, None));
         assert_eq!(Reader::new(&[0x80; 20]).unsigned(), None);
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_rfc() {
+        assert_eq!(adler32(b"Wikipedia"), 0x11e6_0398);
+        let bytes = vec![255; 100_000];
+        let stream = miniz_oxide::deflate::compress_to_vec_zlib(&bytes, 6);
+        assert_eq!(adler32(&bytes).to_be_bytes(), stream[stream.len() - 4..]);
     }
 
     #[test]

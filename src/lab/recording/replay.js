@@ -127,7 +127,15 @@
     const deepest = largest((p) => -p.separation);
     const size = median(recordings[0].shapes.filter((s) => recordings[0].kinds[s.body] !== "s").map((s) => {
       const xs = s.points.map((p) => p[0]), ys = s.points.map((p) => p[1]);
-      return 2 * s.radius + Math.max(Math.min(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)), 0);
+      const extent = (list) => 2 * s.radius + Math.max(...list) - Math.min(...list);
+      return Math.sqrt(extent(xs) * extent(ys));
+    }));
+    const thickness = median(recordings[0].shapes.filter((s) => recordings[0].kinds[s.body] !== "s").map((s) => {
+      const at = s.points, n = at.length;
+      // Across the first edge; a segment or a point has its radius only.
+      const [ux, uy] = n > 2 ? [at[1][0] - at[0][0], at[1][1] - at[0][1]] : [1, 0];
+      const depths = n > 2 ? at.map(([x, y]) => Math.abs(ux * (y - at[0][1]) - uy * (x - at[0][0])) / Math.hypot(ux, uy)) : [0];
+      return 2 * s.radius + Math.min(Math.max(...depths), n > 2 ? Math.hypot(ux, uy) : 0);
     }));
     // Arrows compare with what the median frame carries; an impact is cut at three bodies' widths.
     const carried = median(recordings.flatMap((r) => r.frames.map((f) => Math.max(0, ...f.points.map((p) => Math.hypot(p.ix, p.iy))))).filter((v) => v > 0));
@@ -163,14 +171,17 @@
         depth[p.b] = Math.max(depth[p.b], -p.separation);
       }
       c.lineJoin = "round";
-      c.lineWidth = Math.min(Math.max(0.03 * size * scale, 0.3), 1.2);
-      c.strokeStyle = "#52606d";
+      const thin = thickness * scale < 3;
+      c.lineWidth = Math.min(Math.max(0.03 * size * scale, 0.5), 1.2);
       for (const { body, points: corners, radius } of recording.shapes) {
         const [x, y, angle] = poses.subarray(3 * body, 3 * body + 3);
         const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
         const at = corners.map(([u, v]) => [px(x + cos * u - sin * v), py(y + sin * u + cos * v)]);
         const r = radius * scale;
         const kind = recording.kinds[body];
+        // What is too thin for an inside shows its colour on its border.
+        const bare = kind === "d" && state.depths && deepest > 0;
+        c.strokeStyle = bare && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * depth[body] / deepest) : "#52606d";
         c.fillStyle = kind === "s" ? "#d3d8de" : kind === "k" ? "#d9d2e9" : state.depths && deepest > 0 ? ramp(depth[body] / deepest) : "#e3ebf5";
         c.beginPath();
         if (at.length === 1) {
@@ -233,7 +244,7 @@
       c.lineTo(12 + metres * scale, h - 14);
       c.stroke();
       c.font = "11px system-ui, sans-serif";
-      c.fillText(si(metres, "m").replace(/\.?0+ /, " "), 14, h - 16);
+      c.fillText(si(metres, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
     }
 
     // Limits of each curve over all recordings, so that panels compare.
@@ -285,9 +296,9 @@
 
     const controls = element("div", { className: "controls" }, root);
     const button = (label, title, act) => element("button", { type: "button", textContent: label, title, onclick: act }, controls);
-    const back = button("⏴", "one step back (←)", () => step(-1));
+    const back = button("←", "one step back (←)", () => step(-1));
     const play = button("▶", "play or pause (space)", () => toggle());
-    const forth = button("⏵", "one step on (→)", () => step(1));
+    const forth = button("→", "one step on (→)", () => step(1));
     back.className = "back";
     play.className = "play";
     forth.className = "forth";
@@ -312,7 +323,7 @@
       const index = Math.round(state.time / tick);
       slider.value = index;
       output.textContent = `${state.time.toFixed(3)} s of ${end.toFixed(2)} s · step ${Math.round(state.time / recordings[0].dt)}`;
-      play.textContent = state.playing ? "⏸" : "▶";
+      play.textContent = state.playing ? "▮▮" : "▶";
     }
     function seek(time) {
       state.time = Math.min(Math.max(time, 0), end);

@@ -8,6 +8,9 @@ use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::study::ablation::NeedCost;
+use crate::lab::study::answer::Answer;
+use crate::lab::study::curve::ErrorAxis;
+use crate::lab::study::profile::Profile;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
 
@@ -190,8 +193,34 @@ pub fn json(
         "settings": settings(plan),
         "records": records,
         "ablation": ablation,
+        "answers": answers(records),
+        "profiles": profiles(records),
     });
     serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
+}
+
+/// What to use on each scene, as places in the list of records.
+fn answers(records: &[Record]) -> Vec<Value> {
+    let place = |r: &Record| records.iter().position(|other| std::ptr::eq(other, r));
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of);
+    let each = |answer: Answer| {
+        json!({
+            "scene": answer.scene,
+            "good": answer.good.iter().filter_map(|r| place(r)).collect::<Vec<_>>(),
+            "tied": answer.tied().filter_map(place).collect::<Vec<_>>(),
+            "nearest": answer.nearest.and_then(place),
+        })
+    };
+    scenes.map(each).collect()
+}
+
+/// Performance profiles: per solver its times on the scenes that it solves, in times the fastest.
+fn profiles(records: &[Record]) -> Vec<Value> {
+    let profile = |axis: ErrorAxis| {
+        let Profile { scenes, solvable, ratios, .. } = Profile::of(records, axis);
+        json!({ "error": axis.name(), "scenes": scenes, "solvable": solvable, "ratios": ratios })
+    };
+    ErrorAxis::ALL.into_iter().map(profile).collect()
 }
 
 /// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.

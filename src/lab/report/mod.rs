@@ -3,6 +3,7 @@
 pub(crate) mod axes;
 pub mod environment;
 pub mod export;
+pub mod html;
 pub mod plot;
 pub mod profiles;
 pub mod reading;
@@ -34,10 +35,10 @@ pub fn text(records: &[Record], ablation: &[NeedCost]) -> String {
     text + "\n" + &slices + "\n" + &profiles + "\n" + &reading::reading(records)
 }
 
-/// Writes `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into `folder`;
-/// returns their paths.
+/// Writes `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into `folder`, and the
+/// [page](html) made from what is there then; returns their paths.
 ///
-/// All are made before the first is written.
+/// All but the page are made before the first is written.
 pub fn write_study(
     folder: &Path,
     plan: &StudyPlan,
@@ -58,5 +59,6 @@ pub fn write_study(
         files::write(&path, &bytes)?;
         paths.push(path);
     }
+    paths.push(html::write(folder)?);
     Ok(paths)
 }

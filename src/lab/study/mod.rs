@@ -15,6 +15,7 @@ pub mod pareto;
 pub mod profile;
 pub mod record;
 pub mod slices;
+pub mod telling;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;

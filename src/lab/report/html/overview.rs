@@ -1,0 +1,115 @@
+//! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
+//! tolerances of each scene.
+
+use super::panel::{Frame, Panel, legend};
+use super::scale::{Scale, number};
+use super::study::{Entry, Study, fastest};
+use crate::lab::report::style::Style;
+
+/// A setting on a scene.
+struct Dot<'a> {
+    entry: &'a Entry,
+    /// Time in times that of the fastest that holds there.
+    slower: f64,
+    /// Which of the solver's budgets.
+    budget: usize,
+}
+
+/// Errors this much within tolerance are as good as none.
+const LEAST: f64 = 1e-3;
+/// Errors this much beyond it are as good as any.
+const MOST: f64 = 1e4;
+
+fn dots(study: &Study) -> Vec<Dot<'_>> {
+    let mut dots = Vec::new();
+    for scene in study.scenes() {
+        let entries: Vec<&Entry> = fastest(scene).into_iter().filter(|e| !e.is_natural()).collect();
+        let holding = entries.iter().filter(|e| e.broke().is_none());
+        let least = holding.filter_map(|e| e.time()).fold(f64::INFINITY, f64::min);
+        if !least.is_finite() {
+            continue;
+        }
+        for solver in study.solvers() {
+            let own = entries.iter().filter(|e| e.solver == solver);
+            for (budget, entry) in own.enumerate() {
+                dots.extend(entry.time().map(|time| Dot { entry, slower: time / least, budget }));
+            }
+        }
+    }
+    dots
+}
+
+fn mean(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v.ln()).sum::<f64>() / values.len().max(1) as f64).exp()
+}
+
+/// The plot with its legend.
+pub fn overview(study: &Study) -> String {
+    let dots = dots(study);
+    if dots.is_empty() {
+        return "<p>No setting holds on any scene.</p>\n".into();
+    }
+    let wrong = |e: &Entry| e.excess().map(|x| x.clamp(LEAST, MOST));
+    let x = Scale::log(dots.iter().filter_map(|d| wrong(d.entry)).chain([0.1, 10.0]), "");
+    let y = Scale::log(dots.iter().map(|d| d.slower).chain([1.0, 3.0]), "×");
+    let frame = Frame {
+        size: [980.0, 560.0],
+        title: "",
+        names: [
+            "largest error, in the tolerance of its scene (1 = just within)",
+            "time of a step, in times that of the fastest setting that holds",
+        ],
+        band: true,
+    };
+    let mut panel = Panel::new(&frame, x, y);
+    panel.shade_left(1.0);
+    panel.upright(1.0, "tolerance", "tolerance of the scene");
+    let [left, top, ..] = panel.sides();
+    panel.write([left + 10.0, top + 18.0], "note", "within tolerance");
+    for dot in &dots {
+        let e = dot.entry;
+        let title = format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.setting(), number(dot.slower));
+        match wrong(e) {
+            Some(x) => {
+                let title = format!("{title}, error {} tolerances", number(x));
+                panel.marker(panel.at(x, dot.slower), 2.6, &e.solver, false, true, &title);
+            }
+            None => {
+                let title = format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its truth".into()));
+                let place = Style::of(&e.solver).marker as usize as f64 / 7.0;
+                panel.marker(panel.in_band(dot.slower, place), 2.6, &e.solver, false, true, &title);
+            }
+        }
+    }
+    for solver in study.solvers() {
+        let mut line = Vec::new();
+        let own: Vec<&Dot> = dots.iter().filter(|d| d.entry.solver == solver).collect();
+        for budget in 0..=own.iter().map(|d| d.budget).max().unwrap_or(0) {
+            let all = own.iter().filter(|d| d.budget == budget);
+            let held: Vec<(f64, f64)> =
+                all.clone().filter_map(|d| wrong(d.entry).map(|x| (x, d.slower))).collect();
+            if held.is_empty() {
+                continue;
+            }
+            let (xs, ys): (Vec<f64>, Vec<f64>) = held.iter().copied().unzip();
+            let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
+            let title = format!(
+                "{solver}, {name}: holds on {} of {} scenes; there {} tolerances and {}× in the mean",
+                held.len(),
+                all.count(),
+                number(mean(&xs)),
+                number(mean(&ys))
+            );
+            line.push((panel.at(mean(&xs), mean(&ys)), title));
+        }
+        let at: Vec<[f64; 2]> = line.iter().map(|l| l.0).collect();
+        panel.line(&at, "curve", Style::of(solver).color);
+        for (i, (at, title)) in line.iter().enumerate() {
+            panel.marker(*at, 6.0 + 1.5 * i as f64, solver, false, false, title);
+        }
+        if let Some(last) = at.last() {
+            panel.write([last[0] + 13.0, last[1] + 4.0], "dot-name", solver);
+        }
+    }
+    legend(&study.solvers()) + &panel.finish()
+}
