@@ -44,7 +44,7 @@ Examples:
 ///
 /// Without a command, runs the default study: every solver on scenes whose truth is known
 /// or that are hard, at lane widths 1, 4, 8 and 16 and three budgets each. It prints a table
-/// per scene and writes study.csv, study.json, speed_vs_error.svg and
+/// per scene and writes report.html, study.csv, study.json, speed_vs_error.svg and
 /// profiles.svg.
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]

@@ -72,7 +72,7 @@ fn the_page_is_whole_in_a_browser() {
     let ratio = found["time"].as_f64().unwrap() / found["tick"].as_f64().unwrap();
     assert!((ratio - 5.0).abs() < 1e-6, "{found}");
 
-    let pixels = screenshot(&browser, &page, "overview", [1300, 1000]);
+    let pixels = screenshot(&browser, &page, "", [1300, 2000]);
     // The shaded side within tolerance, the band of failures, and marks of pgs.
     for (what, color, least) in
         [("within", [0xea, 0xf5, 0xf0], 20_000), ("band", [0xf3, 0xe3, 0xdc], 3000), ("pgs", [0xd5, 0x5e, 0x00], 100)]

@@ -5,8 +5,10 @@
 //! `a` and `b` are one and two below the baseline. Points of one stroke follow each other, strokes
 //! are separated by spaces; a stroke that goes nowhere is a dot.
 
-/// Width of a letter with the space behind it, in units.
-pub const ADVANCE: f64 = 5.6;
+/// Width of a digit with the space behind it, in units.
+const ADVANCE: f64 = 5.6;
+/// Space behind a letter.
+const GAP: f64 = 1.7;
 /// Height of a capital, in units.
 pub const HEIGHT: f64 = 6.0;
 
@@ -126,9 +128,22 @@ pub fn strokes(letter: char) -> Vec<Vec<[f64; 2]>> {
     code.split(' ').filter(|s| !s.is_empty()).map(stroke).collect()
 }
 
+/// Where the strokes of a letter begin, and how far on the next letter is; digits are all as wide, so
+/// that numbers stand in columns.
+pub fn extent(letter: char) -> [f64; 2] {
+    let points = strokes(letter).concat();
+    let least = points.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
+    let most = points.iter().map(|p| p[0]).fold(0.0, f64::max);
+    match letter {
+        ' ' => [0.0, 3.0],
+        digit if digit.is_ascii_digit() => [0.0, ADVANCE],
+        _ => [least, most - least + GAP],
+    }
+}
+
 /// Width of a text (in units).
 pub fn width(text: &str) -> f64 {
-    (text.chars().count() as f64 * ADVANCE - (ADVANCE - 4.0)).max(0.0)
+    (text.chars().map(|c| extent(c)[1]).sum::<f64>() - GAP).max(0.0)
 }
 
 #[cfg(test)]
@@ -151,5 +166,7 @@ mod tests {
             assert!(LETTERS.iter().any(|l| l.0 == letter), "{letter}");
         }
         assert_eq!(strokes('語').len(), 1);
+        assert_eq!((extent('i'), extent('m')[1], extent('1')), ([2.0, GAP], 4.0 + GAP, extent('8')));
+        assert_eq!((width(""), width("ii")), (0.0, GAP));
     }
 }

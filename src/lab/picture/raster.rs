@@ -44,12 +44,13 @@ impl Canvas {
                 };
                 let mut left = x - before * unit * letters::width(text);
                 for letter in text.chars() {
+                    let [begin, advance] = letters::extent(letter);
                     for stroke in letters::strokes(letter) {
                         let points: Vec<_> =
-                            stroke.iter().map(|[u, v]| [left + unit * u, y - unit * v]).collect();
+                            stroke.iter().map(|[u, v]| [left + unit * (u - begin), y - unit * v]).collect();
                         self.stroke(&points, false, *color, 0.095 * size);
                     }
-                    left += unit * letters::ADVANCE;
+                    left += unit * advance;
                 }
             }
         }

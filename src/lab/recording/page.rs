@@ -25,8 +25,10 @@ pub struct Panel<'a> {
 
 /// The player as a part of a page that has [`STYLE`] and [`SCRIPT`]. Without JavaScript it says what
 /// it would play.
-pub fn fragment(panels: &[Panel]) -> String {
-    let mut text = String::from("<div class=\"replay\">\n<div class=\"panels\">\n");
+///
+/// It begins at a share of its time, in [0, 1].
+pub fn fragment(panels: &[Panel], share: f64) -> String {
+    let mut text = format!("<div class=\"replay\" data-start=\"{share}\">\n<div class=\"panels\">\n");
     for Panel { bytes, header, color } in panels {
         let outcome = if header.outcome == "holds" { "holds" } else { "broken" };
         text += &format!(
@@ -56,7 +58,7 @@ pub fn page(panels: &[Panel]) -> String {
          <style>body {{ margin: 1rem; font: 15px/1.45 system-ui, sans-serif; color: #1f2933; }}\n\
          h1 {{ font-size: 1.3rem; margin: 0 0 .5rem; }}\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{}\
          <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
-        fragment(panels)
+        fragment(panels, 0.0)
     )
 }
 

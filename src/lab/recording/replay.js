@@ -396,10 +396,11 @@
       try {
         const scripts = [...root.querySelectorAll("figure > script")];
         root.player = start(root, await Promise.all(scripts.map((s) => decode(s.textContent))));
+        root.player.seek(root.dataset.start * root.player.end);
         if (i > 0) continue;
         const number = (name, or) => (Number.isFinite(parseFloat(parameters.get(name))) ? parseFloat(parameters.get(name)) : or);
         root.player.state.zoom = Math.max(number("zoom", 1), 0.02);
-        root.player.seek(number("t", 0));
+        root.player.seek(number("t", root.player.state.time));
         if (parameters.get("play") === "1") root.player.toggle();
       } catch (error) {
         element("p", { className: "failed", textContent: `This replay cannot be played: ${error.message}` }, root);

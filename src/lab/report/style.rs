@@ -5,6 +5,7 @@
 //! and sixty-four solvers differ in one of them.
 
 use crate::engine::solvers::VARIANTS;
+use crate::lab::picture::Color;
 
 const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222", "#8a7f00"];
@@ -56,6 +57,11 @@ impl Style {
         let known = VARIANTS.iter().position(|v| v.name == solver);
         let place = known.unwrap_or_else(|| solver.bytes().fold(7, |sum, b| (sum * 31 + b as usize) % 64));
         Style::at(place)
+    }
+
+    /// The colour as numbers.
+    pub fn rgb(self) -> Color {
+        Color::rgb(u32::from_str_radix(&self.color[1..], 16).unwrap_or_default())
     }
 
     fn at(place: usize) -> Style {
@@ -129,6 +135,7 @@ mod tests {
         }
         let styles: Vec<Style> = VARIANTS.iter().map(|v| Style::of(v.name)).collect();
         assert!((0..styles.len()).all(|i| !styles[..i].contains(&styles[i])));
+        assert_eq!(Style::at(0).rgb(), Color(0x00, 0x72, 0xb2, 255));
         // One that is not here keeps its own, too.
         assert_eq!(Style::of("somebody_elses"), Style::of("somebody_elses"));
     }

@@ -10,6 +10,7 @@ use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::scenes::Loaded;
 use crate::lab::scenes::holds::Watch;
 use crate::lab::units::lanes;
+use std::cmp::Reverse;
 
 /// Runs side by side.
 const MOST: usize = 4;
@@ -36,9 +37,9 @@ pub fn telling(records: &[Record]) -> Vec<&Record> {
         });
         chosen.extend(first);
         let mut broken: Vec<&Record> = colored().filter(|r| !r.holds() && r.failure.is_none()).collect();
-        broken.sort_by_key(|r| r.broken.map_or(0, |b| b.step));
+        broken.sort_by_key(|r| (r.broken.map_or(0, |b| b.step), Reverse(r.lanes)));
         let mut others: Vec<&Record> = colored().filter(|r| r.holds()).collect();
-        others.sort_by(|a, b| a.excess().total_cmp(&b.excess()));
+        others.sort_by(|a, b| a.excess().total_cmp(&b.excess()).then(b.lanes.cmp(&a.lanes)));
         // The worst, the next worst, and then who holds best.
         for (list, limit) in [(&broken, MOST - 1), (&others, MOST), (&broken, MOST)] {
             for record in list {

@@ -111,6 +111,7 @@ fn short(margin: f64) -> String {
         m if m < 0.01 => "&lt; .01".into(),
         m if m < 10.0 => format!("{m:.2}"),
         m if m < 1000.0 => format!("{m:.0}"),
+        m if m < 9950.0 => format!("{:.1}k", 1e-3 * m),
         m => number(m),
     }
 }

@@ -121,7 +121,7 @@ fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]
             .iter()
             .map(|(bytes, header)| Panel { bytes, header, color: Style::of(&header.solver).color.into() })
             .collect();
-        section("replay", "Replay of the most telling scene", &lead, fragment(&panels));
+        section("replay", "Replay of the most telling scene", &lead, fragment(&panels, 0.6));
     }
     let mut by_scene = panel::legend(&study.solvers());
     for scene in study.scenes() {

@@ -1,7 +1,7 @@
 //! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
 //! tolerances of each scene.
 
-use super::panel::{Frame, Panel, legend};
+use super::panel::{Frame, Labels, Panel, legend};
 use super::scale::{Scale, number};
 use super::study::{Entry, Study, fastest};
 use crate::lab::report::style::Style;
@@ -81,6 +81,7 @@ pub fn overview(study: &Study) -> String {
             }
         }
     }
+    let (mut labels, mut names) = (Labels::default(), Vec::new());
     for solver in study.solvers() {
         let mut line = Vec::new();
         let own: Vec<&Dot> = dots.iter().filter(|d| d.entry.solver == solver).collect();
@@ -93,22 +94,27 @@ pub fn overview(study: &Study) -> String {
             }
             let (xs, ys): (Vec<f64>, Vec<f64>) = held.iter().copied().unzip();
             let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
+            let (held_on, of) = (held.len(), all.clone().count());
             let title = format!(
                 "{solver}, {name}: holds on {} of {} scenes; there {} tolerances and {}× in the mean",
-                held.len(),
-                all.count(),
+                held_on,
+                of,
                 number(mean(&xs)),
                 number(mean(&ys))
             );
-            line.push((panel.at(mean(&xs), mean(&ys)), title));
+            line.push((panel.at(mean(&xs), mean(&ys)), title, format!("{solver} {held_on}/{of}")));
         }
         let at: Vec<[f64; 2]> = line.iter().map(|l| l.0).collect();
         panel.line(&at, "curve", Style::of(solver).color);
-        for (i, (at, title)) in line.iter().enumerate() {
+        for (i, (at, title, _)) in line.iter().enumerate() {
+            labels.block(*at, 6.0 + 1.5 * i as f64);
             panel.marker(*at, 6.0 + 1.5 * i as f64, solver, false, false, title);
         }
-        if let Some(last) = at.last() {
-            panel.write([last[0] + 13.0, last[1] + 4.0], "dot-name", solver);
+        names.extend(line.pop().map(|(at, _, name)| (at, name)));
+    }
+    for (at, name) in names {
+        if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides()) {
+            panel.write(place, "dot-name", &name);
         }
     }
     legend(&study.solvers()) + &panel.finish()

@@ -34,7 +34,7 @@ impl Panel {
     /// Draws the frame.
     pub fn new(frame: &Frame, x: Scale, y: Scale) -> Panel {
         let [width, height] = frame.size;
-        let (left, top, bottom) = (62.0, if frame.title.is_empty() { 10.0 } else { 30.0 }, height - 46.0);
+        let (left, top, bottom) = (70.0, if frame.title.is_empty() { 10.0 } else { 30.0 }, height - 46.0);
         let right = width - 12.0 - if frame.band { BAND } else { 0.0 };
         let title = escaped(frame.title);
         let mut text = format!(
@@ -76,7 +76,7 @@ impl Panel {
         let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
         text += &format!(
             "\n<text class=\"name\" x=\"{middle}\" y=\"{}\">{}</text>\n\
-             <text class=\"name\" transform=\"translate(12 {half}) rotate(-90)\">{}</text>\n",
+             <text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
             px(height - 10.0),
             escaped(frame.names[0]),
             escaped(frame.names[1])
@@ -172,6 +172,48 @@ impl Panel {
     /// The whole element.
     pub fn finish(self) -> String {
         self.text + "</svg>\n"
+    }
+}
+
+/// Labels beside points, where there is room.
+#[derive(Default)]
+pub struct Labels {
+    taken: Vec<[f64; 4]>,
+}
+
+impl Labels {
+    /// Where the left end of a label's baseline goes, `width` pixels wide and `size` high, beside a
+    /// point of radius `r`; none where every place is taken.
+    pub fn place(
+        &mut self,
+        [x, y]: [f64; 2],
+        r: f64,
+        [width, size]: [f64; 2],
+        [left, top, right, bottom]: [f64; 4],
+    ) -> Option<[f64; 2]> {
+        let (near, far) = (x + r + 2.0, x - r - 2.0 - width);
+        let corners = [
+            [near, y - 2.0],
+            [near, y + size],
+            [far, y - 2.0],
+            [far, y + size],
+            [x - 0.5 * width, y - r - 3.0],
+            [x - 0.5 * width, y + r + size],
+        ];
+        let own = corners.into_iter().find(|&[u, v]| {
+            let inside = u > left && u + width < right && v - size > top && v < bottom;
+            let free = |t: &[f64; 4]| u > t[2] || u + width < t[0] || v - size > t[3] || v < t[1];
+            inside && self.taken.iter().all(free)
+        });
+        self.block([x, y], r);
+        let [u, v] = own?;
+        self.taken.push([u, v - size, u + width, v]);
+        own
+    }
+
+    /// Keeps labels off a point of radius `r`.
+    pub fn block(&mut self, [x, y]: [f64; 2], r: f64) {
+        self.taken.push([x - r, y - r, x + r, y + r]);
     }
 }
 

@@ -1,11 +1,11 @@
 //! Work-precision plots: time against three errors, scene by scene, with every number in a table.
 
-use super::panel::{Frame, Panel};
+use super::panel::{Frame, Labels, Panel};
 use super::scale::{Scale, number};
 use super::study::{Axis, Entry, FLOOR, fastest};
 use crate::lab::picture::svg::escaped;
 use crate::lab::report::style::Style;
-use crate::lab::units::{digits, si};
+use crate::lab::units::{digits, lanes, si};
 
 /// Name and unit of an error on a scene.
 fn name(scene: &[Entry], axis: Axis) -> Option<(String, String)> {
@@ -94,7 +94,7 @@ fn panel(settings: &[&Entry], axis: Axis, name: &str, unit: &str) -> String {
                 let title = format!("{what} ({bars}), {}", shown(value, unit));
                 let at = panel.at(error(entry), time);
                 panel.marker(at, 3.2 + 0.9 * size as f64, &entry.solver, entry.is_natural(), false, &title);
-                if let Some(place) = labels.place(at, &entry.label(), panel.sides()) {
+                if let Some(place) = labels.place(at, 4.0, [4.3 * entry.label().chars().count() as f64, 8.0], panel.sides()) {
                     panel.write(place, "point", &entry.label());
                 }
             }
@@ -106,30 +106,6 @@ fn panel(settings: &[&Entry], axis: Axis, name: &str, unit: &str) -> String {
         }
     }
     panel.finish()
-}
-
-/// Labels beside points, where there is room.
-#[derive(Default)]
-struct Labels {
-    taken: Vec<[f64; 4]>,
-}
-
-impl Labels {
-    /// Where a label's left end of the baseline goes; none where every side is taken.
-    fn place(&mut self, [x, y]: [f64; 2], label: &str, [left, top, right, bottom]: [f64; 4]) -> Option<[f64; 2]> {
-        let (w, h) = (4.3 * label.chars().count() as f64, 8.0);
-        let corners =
-            [[x + 6.0, y - 2.0], [x + 6.0, y + 8.0], [x - 6.0 - w, y - 2.0], [x - 6.0 - w, y + 8.0]];
-        let own = corners.into_iter().find(|&[u, v]| {
-            let inside = u > left && u + w < right && v - h > top && v < bottom;
-            let free = |t: &[f64; 4]| u > t[2] || u + w < t[0] || v - h > t[3] || v < t[1];
-            inside && self.taken.iter().all(free)
-        });
-        self.taken.push([x - 4.0, y - 4.0, x + 4.0, y + 4.0]);
-        let [u, v] = own?;
-        self.taken.push([u, v - h, u + w, v]);
-        own
-    }
 }
 
 fn table(entries: &[Entry], settings: &[&Entry]) -> String {
@@ -147,7 +123,7 @@ fn table(entries: &[Entry], settings: &[&Entry]) -> String {
             (None, Some(x)) => format!("<td>{}× tolerance", number(x)),
             (None, None) => "<td>missed its truth".into(),
         };
-        let order = if entry.is_natural() { "natural".into() } else { format!("{} lanes", entry.lanes) };
+        let order = if entry.is_natural() { "natural".into() } else { lanes(entry.lanes) };
         text += &format!(
             "<tr><th>{}<td>{}<td>{order}<td>{}<td>{}<td>{}<td>{}<td>{}{verdict}</tr>\n",
             escaped(&entry.solver),

@@ -34,12 +34,19 @@ impl Scale {
             let all = exponents.clone().flat_map(|e| digits.iter().map(move |d| d * 10f64.powi(e)));
             all.filter(|t| (low..=high).contains(t)).collect()
         };
-        let digits: [&[f64]; 3] =
-            [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]];
-        let ticks = digits.iter().map(|d| within(d)).find(|t| t.len() >= 3);
-        let ticks = ticks.unwrap_or_else(|| within(digits[2]));
+        let digits: [&[f64]; 5] = [
+            &[1.0],
+            &[1.0, 2.0, 5.0],
+            &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
+            &[1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0],
+            &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.2, 2.4, 2.6, 3.0],
+        ];
+        // The first with enough of them; where none has, the one with most.
+        let sets: Vec<Vec<f64>> = digits.iter().map(|d| within(d)).collect();
+        let enough = sets.iter().find(|t| t.len() >= 3).cloned();
+        let ticks = enough.or_else(|| sets.into_iter().max_by_key(Vec::len)).unwrap_or_default();
         let stride = ticks.len().div_ceil(MOST).max(1);
-        let minor = if (high / low).log10() < 7.0 { within(digits[2]) } else { within(digits[0]) };
+        let minor = if (high / low).log10() < 7.0 { within(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) } else { within(digits[0]) };
         let ticks = ticks.into_iter().step_by(stride).map(|t| (t, label(t, unit))).collect();
         Scale { log: true, low, high, ticks, minor }
     }
@@ -91,10 +98,18 @@ pub fn number(value: f64) -> String {
     if size == 0.0 {
         return "0".into();
     }
-    if (0.0099..9999.0).contains(&size) {
-        let digits = if size < 1.0 { 3 } else { 2 };
+    if (0.00099..9999.0).contains(&size) {
+        let digits = match size {
+            x if x < 0.0099 => 4,
+            x if x < 0.99 => 3,
+            x if x < 99.0 => 2,
+            _ => 0,
+        };
         let text = format!("{value:.digits$}");
-        return text.trim_end_matches('0').trim_end_matches('.').to_string();
+        return match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+            false => text,
+        };
     }
     let exponent = size.log10().floor() as i32;
     let digit = value / 10f64.powi(exponent);
@@ -141,6 +156,6 @@ mod tests {
             [label(2e4, "N"), label(1e-3, "m"), label(0.5, "%")].map(String::from),
             ["20 kN", "1 mm", "50 %"]
         );
-        assert_eq!([1e-6, 2e-7, 0.05, 100.0, 2.5e4].map(number), ["10⁻⁶", "2·10⁻⁷", "0.05", "100", "2.5·10⁴"]);
+        assert_eq!([1e-6, 2e-7, 0.005, 0.05, 100.0, 2.5e4].map(number), ["10⁻⁶", "2·10⁻⁷", "0.005", "0.05", "100", "2.5·10⁴"]);
     }
 }

@@ -72,6 +72,7 @@ pub fn lanes(study: &Study) -> String {
         let colors = all.iter().filter_map(|e| e.lap.as_ref()).map(|l| l.load.colors);
         let colors = (colors.clone().min().unwrap_or(0), colors.max().unwrap_or(0));
         let colors = match colors {
+            (1, 1) => "1 colour".to_string(),
             (a, b) if a == b => format!("{a} colours"),
             (a, b) => format!("{a} to {b} colours"),
         };

@@ -1,5 +1,6 @@
 //! `study.json` as far as the page needs it.
 
+use crate::lab::units::lanes;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -207,7 +208,7 @@ impl Entry {
     pub fn setting(&self) -> String {
         match self.is_natural() {
             true => format!("{}, natural order", self.budget_text),
-            false => format!("{}, {} lanes", self.budget_text, self.lanes),
+            false => format!("{}, {}", self.budget_text, lanes(self.lanes)),
         }
     }
 

@@ -112,7 +112,7 @@ pub fn answer(study: &Study) -> String {
         );
     }
     text += "</tbody></table>\n<p class=\"soft\">Time, of the cheapest: geometric mean over the scenes on which \
-             the solver is within tolerance.</p>\n<table class=\"numbers\"><caption>The cheapest setting within \
+             the solver is within tolerance.</p>\n<table class=\"numbers answer\"><caption>The cheapest setting within \
              tolerance, by scene</caption><thead><tr><th>scene<th>solver<th>setting<th>time<th>penetration\
              <th>residual<th>to truth<th>runner-up</tr></thead><tbody>\n";
     for verdict in &study.answers {
