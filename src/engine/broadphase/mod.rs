@@ -21,7 +21,9 @@
 
 mod all_pairs;
 mod bounds;
+mod curve;
 mod hash_grid;
+mod node;
 mod sort;
 mod tree;
 
