@@ -288,7 +288,7 @@ fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
     let mut world = build(&scenes::load("stack:10").unwrap().scene, "pgs");
     world.settings.budget.velocity_iterations = 1;
     assert!(observe(&mut world, 5).own_rms.unwrap() > 1e-3);
-    // Not asked for, and after bounces: none.
+    // Not requested, and after bounces: none.
     world.settings.observe_rule = false;
     assert_eq!(observe(&mut world, 5).own_rms, None);
     assert_eq!(observe(&mut build(&scenes::load("bounce").unwrap().scene, "pgs"), 90).own_rms, None);

@@ -421,16 +421,16 @@ mod tests {
     }
 
     #[test]
-    fn a_worn_order_is_made_anew() {
+    fn a_degraded_order_is_rebuilt() {
         let mut tree = Tree::new();
         let mut out = Vec::new();
         for frame in 0..200 {
             let proxies = scene(frame, 400);
             tree.pairs(&proxies, &mut out);
             let cost = tree.cost();
-            let mut anew = Tree::new();
-            anew.pairs(&proxies, &mut out);
-            assert!(cost <= 1.3 * anew.cost(), "frame {frame}: {cost} against {}", anew.cost());
+            let mut fresh = Tree::new();
+            fresh.pairs(&proxies, &mut out);
+            assert!(cost <= 1.3 * fresh.cost(), "frame {frame}: {cost} against {}", fresh.cost());
         }
     }
 }

@@ -151,14 +151,14 @@ impl<'a> Replay<'a> {
         self.work.observe = true;
         self.work.last_rule = None;
         let input = StepInput { budget, ..self.input };
-        let effort =
+        let count =
             variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
         let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
         let bodies = self.problem.bodies.len();
         Outcome {
             velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
             impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
-            sweeps: effort.sweeps,
+            sweeps: count.sweeps,
             own: self.own_law(),
         }
     }
