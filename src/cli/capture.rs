@@ -1,5 +1,6 @@
 //! `simpulse capture`: freezes the contact problem of one step.
 
+use super::terminal::{note, print_beside};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{self, DEFAULT};
 use crate::engine::world::{Settings, World};
@@ -103,7 +104,7 @@ pub fn freeze(name: &str, step: u64, run: &RunArgs) -> Result<(Frozen, Option<St
         return Err(Error::invalid("--step", format!("step {step} of '{name}' has no contacts")));
     }
     if problem.contacts.len() > PATIENCE {
-        eprintln!("looking for a reference of {} contact points", problem.contacts.len());
+        note(&format!("looking for a reference of {} contact points\n", problem.contacts.len()));
     }
     Ok(match reference(&problem) {
         Ok(reference) => (Frozen { problem, reference: Some(reference) }, None),
@@ -127,8 +128,8 @@ pub fn run(args: &CaptureArgs) -> Result<ExitCode, Error> {
     let (frozen, why_not) = freeze(&args.scene, args.step, &args.run)?;
     frozen.write(&args.output)?;
     let Frozen { problem, reference } = &frozen;
-    println!(
-        "{}: {} bodies, {} contact points, written to {}",
+    let mut text = format!(
+        "{}: {} bodies, {} contact points, written to {}\n",
         problem.name,
         problem.bodies.len(),
         problem.contacts.len(),
@@ -137,10 +138,10 @@ pub fn run(args: &CaptureArgs) -> Result<ExitCode, Error> {
     match (reference, why_not) {
         (Some(reference), _) => {
             let c = &reference.certificate;
-            println!("reference: {}, natural-map residual {:.1e}", c.method, c.natural_map);
+            text += &format!("reference: {}, natural-map residual {:.1e}\n", c.method, c.natural_map);
         }
-        (None, Some(why)) => println!("written without a reference: {why}"),
+        (None, Some(why)) => text += &format!("written without a reference: {why}\n"),
         (None, None) => {}
     }
-    Ok(ExitCode::SUCCESS)
+    print_beside([args.output.as_path()], &text)
 }

@@ -1,14 +1,16 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met.
+//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met, 130 a signal.
 
 pub mod advise;
 pub mod args;
 pub mod capture;
 pub mod converge;
 pub mod growth;
+pub mod interrupt;
 pub mod profile;
 pub mod run;
+pub mod terminal;
 pub mod verify;
 
 use crate::engine::solvers::{VARIANTS, Variant};
@@ -22,12 +24,15 @@ use crate::lab::study::{self, Progress, ablation, budget, open_scene};
 use args::{Cli, Command, SceneArgs, StudyArgs};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
+use terminal::{note, print, print_beside};
 
 /// Parses the command line, runs the command, reports; see the [module](self) for exit codes.
 pub fn main() -> ExitCode {
+    interrupt::install();
     let result = match Cli::try_parse() {
         Ok(cli) => execute(cli),
         // Help and version are answers; clap's advice on the rest goes on one line.
@@ -36,14 +41,16 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             return ExitCode::from(2);
         }
     };
     match result {
         Ok(code) => code,
+        // A reader that has left has seen what it wanted.
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             ExitCode::from(2)
         }
     }
@@ -54,9 +61,12 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         None => study(&cli.study),
         Some(Command::Study(args)) => study(&args),
         Some(Command::Run(args)) => match run::run(&args)? {
-            run::Ending::Finished(text) => print(&text),
+            run::Ending::Finished(text) => {
+                let files = [&args.state, &args.contacts].into_iter().flatten();
+                print_beside(files.map(PathBuf::as_path), &text)
+            }
             run::Ending::Diverged(failure) => {
-                eprintln!("failed: {} {failure}; nothing written", args.scene);
+                note(&format!("failed: {} {failure}; nothing written\n", args.scene));
                 Ok(ExitCode::FAILURE)
             }
         },
@@ -69,14 +79,6 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Scenes) => print(&scenes()),
         Some(Command::Solvers) => print(&solvers()),
         Some(Command::Scene(args)) => print(&scene(&args)?),
-    }
-}
-
-/// To standard output; a reader that has left is not an error.
-fn print(text: &str) -> Result<ExitCode, Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
-        _ => Ok(ExitCode::SUCCESS),
     }
 }
 
@@ -122,7 +124,7 @@ fn with_bar<T>(work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
 
 /// Where there is no terminal, a line when the times of a scene are begun.
 fn with_lines<T>(scenes: &[String], work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
-    eprintln!("measuring errors of {} scenes, then times", scenes.len());
+    note(&format!("measuring errors of {} scenes, then times\n", scenes.len()));
     let last = Mutex::new(String::new());
     work(&|progress: Progress| {
         let Progress { done, total, what } = progress;
@@ -131,7 +133,7 @@ fn with_lines<T>(scenes: &[String], work: impl FnOnce(&(dyn Fn(Progress) + Sync)
             && *last != scene
         {
             *last = scene.to_string();
-            eprintln!("{done}/{total} times of {scene}");
+            note(&format!("{done}/{total} times of {scene}\n"));
         }
     })
 }

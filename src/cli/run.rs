@@ -7,7 +7,7 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::find;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
+use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::Observation;
 use crate::lab::metrics::state::Angles;
 use crate::lab::overrides;
@@ -36,8 +36,11 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
     if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
         return Err(Error::invalid("every", "needs --state or --contacts"));
     }
-    if args.state.is_some() && args.state == args.contacts {
-        return Err(Error::invalid("contacts", "is the same file as --state"));
+    if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
+        && same_file(state, contacts)
+    {
+        let message = format!("'{}' is the same file as --state; give another name", contacts.display());
+        return Err(Error::invalid("--contacts", message));
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
