@@ -28,9 +28,9 @@ fn json(bodies: &str, gravity: f64) -> Scene {
 }
 
 #[test]
-fn a_scene_without_bodies_has_no_errors() {
+fn a_world_without_bodies_has_no_errors() {
     for variant in &VARIANTS {
-        let errors = observe(&mut build(&json("", -10.0), variant.name), 3);
+        let errors = observe(&mut World::new(Settings::new(variant)), 3);
         assert_eq!(errors, Errors { steps: 3, ..Errors::default() });
     }
 }

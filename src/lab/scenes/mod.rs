@@ -33,7 +33,7 @@ mod truth;
 mod tumbler;
 mod washer;
 
-pub use check::{MAX_BODIES, MAX_FRICTION};
+pub use check::{MAX_BODIES, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };
