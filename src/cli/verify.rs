@@ -1,20 +1,23 @@
 //! `simpulse verify`: hard cases with known truths, against every solver.
 
-use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
+use super::output::{self, finite, print_json};
+use super::progress::Bar;
+use super::values::{self, Solvers};
+use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
 use crate::lab::verify::{
-    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Required, Sweep, SweepRow,
 };
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use std::io::Write;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Judge every solver, at its standard budget, by cases whose truth is known on paper.
+/// Run the hard cases whose truth is known on paper
+///
+/// Every case runs with every solver at its standard budget and compares one number with its
+/// reference value. What fails is shown as failing, and where a bound or a required mark was ever
+/// relaxed, `--list` says so.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,
@@ -23,19 +26,19 @@ Exit code 0: it passed all of those that ran; 1: it did not; 2: a request that c
 
 Examples:
   simpulse verify
-  simpulse verify --case A1,B4.heavy --solver pgs,soft_step
-  simpulse verify --solver soft_step --json verify.json
+  simpulse verify --cases A1,B4.heavy --solvers pgs,soft_step
+  simpulse verify --solvers all --json > verify.json
   simpulse verify --list")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long = "case", value_delimiter = ',', value_name = "ID,…")]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…")]
     pub cases: Vec<String>,
-    /// Solvers [default: all]
-    #[arg(long = "solver", value_delimiter = ',', value_name = "SOLVER,…")]
-    pub solvers: Vec<String>,
-    /// Write everything measured to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Solvers
+    #[command(flatten)]
+    pub solvers: Solvers,
+    /// Print JSON instead of text: everything that was measured
+    #[arg(long)]
+    pub json: bool,
     /// Only list the cases: tolerances, and what is required of the default solver
     #[arg(long)]
     pub list: bool,
@@ -48,27 +51,22 @@ pub struct VerifyArgs {
 pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let cases = verify::select(&args.cases)?;
     if args.list {
-        return print(&list(&cases), ExitCode::SUCCESS);
+        return match args.json {
+            true => print_json(&cases.iter().map(described).collect()),
+            false => print(&list(&cases), ExitCode::SUCCESS),
+        };
     }
-    let solvers: Vec<&Variant> = match args.solvers.is_empty() {
-        true => VARIANTS.to_vec(),
-        false => args.solvers.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?,
-    };
-    // Before the long wait, not after it.
-    let file = args.json.as_deref().map(Pending::new).transpose()?;
-    let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &|progress: Progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(progress.what);
-    });
-    bar.finish_and_clear();
-    if let (Some(file), Some(path)) = (file, &args.json) {
-        write(file, path, &json(&matrix))?;
+    let solvers = args.solvers.chosen();
+    let note = values::left_out(&solvers);
+    let bar = Bar::new();
+    let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
+    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &tell);
+    drop(bar);
+    if args.json {
+        print_json(&json(&matrix))?;
+        return Ok(exit_code(&matrix));
     }
-    print(&(text(&matrix) + &verdict(&matrix)), exit_code(&matrix))
+    print(&(text(&matrix) + &note + &verdict(&matrix)), exit_code(&matrix))
 }
 
 /// 1 if the default solver ran and broke a promise.
@@ -232,8 +230,6 @@ fn number(value: f64) -> String {
 }
 
 fn json(matrix: &Matrix) -> Value {
-    // JSON has no infinities: they are words.
-    let finite = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
             "case": case.id, "solver": solver.name, "budget": solver.budget, "unit": case.unit,
@@ -265,39 +261,37 @@ fn json(matrix: &Matrix) -> Value {
     let results: Vec<_> = (matrix.cases.iter().zip(&matrix.cells))
         .flat_map(|(case, cells)| matrix.solvers.iter().zip(cells).map(|(solver, c)| cell(case, solver, c)))
         .collect();
-    let of = |case: &&Case| {
-        let (required, why) = match case.required {
-            Required::Yes(why) => (true, why),
-            Required::No(why) => (false, why),
-        };
-        json!({ "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance, "required": required, "why": why })
-    };
     json!({
         "version": 1,
         "default_solver": DEFAULT,
         "broken_promises": matrix.broken_promises(DEFAULT),
-        "cases": matrix.cases.iter().map(of).collect::<Vec<_>>(),
+        "cases": matrix.cases.iter().map(described).collect::<Vec<_>>(),
         "results": results,
         "needs_joints": NEEDS_JOINTS.iter().map(|(id, what)| json!({ "case": id, "what": what })).collect::<Vec<_>>(),
     })
 }
 
-fn write(mut file: Pending, path: &Path, value: &Value) -> Result<(), Error> {
-    writeln!(file, "{value:#}").map_err(Error::io(path))?;
-    file.commit()
+/// A case: what it measures, and what is required.
+fn described(case: &&Case) -> Value {
+    let (required, why) = match case.required {
+        Required::Yes(why) => (true, why),
+        Required::No(why) => (false, why),
+    };
+    json!({
+        "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance,
+        "required": required, "why": why,
+    })
 }
 
-/// To standard output; a reader that has left is not an error.
+/// To standard output, with this exit code.
 fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
-        _ => Ok(code),
-    }
+    output::print(text).map(|_| code)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::solvers::VARIANTS;
 
     #[test]
     fn numbers_have_four_digits() {
@@ -334,16 +328,11 @@ mod tests {
     }
 
     #[test]
-    fn the_file_is_replaced_as_a_whole() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("verify.json");
+    fn json_holds_every_cell() {
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
         let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_| ());
-        write(Pending::new(&path).unwrap(), &path, &json(&matrix)).unwrap();
-        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-        assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
-        assert_eq!(read["broken_promises"], json!([]));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(Pending::new(&folder.path().join("missing/verify.json")).is_err());
+        let value = json(&matrix);
+        assert_eq!(value["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
+        assert_eq!(value["broken_promises"], json!([]));
     }
 }
