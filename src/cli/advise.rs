@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json};
 use super::progress::Bar;
-use super::values::{self, Solvers};
+use super::values::{self, Solvers, scene_help};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::{Limits, quantity};
@@ -36,7 +36,8 @@ Examples:
   simpulse advise arch --max-penetration 5mm --max-time 50us --max-residual 1e-3
   simpulse advise incline_slip --max-reference 1mm --solvers soft_step,pgs --lanes 8 --json > advice.json")]
 pub struct AdviseArgs {
-    /// A scene of `simpulse scenes`, or a .json file
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// Deepest penetration allowed, such as 1mm
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]

@@ -18,6 +18,7 @@ use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::budget::BudgetGrid;
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -28,6 +29,12 @@ Examples:
   simpulse run pyramid:50 --solver soft_step --lanes 16
   simpulse scene arch --json > my.json           a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
+
+const COMPLETION_EXAMPLES: &str = "\
+Examples:
+  simpulse completions bash > ~/.local/share/bash-completion/completions/simpulse
+  simpulse completions zsh > ~/.zfunc/_simpulse
+  simpulse completions fish > ~/.config/fish/completions/simpulse.fish";
 
 const STUDY_EXAMPLES: &str = "\
 Without any budget option, each solver runs at half its standard budget, at that budget,
@@ -76,6 +83,11 @@ pub enum Command {
     Solvers(ListArgs),
     /// Describe a scene, or print it as a file to edit
     Scene(SceneArgs),
+    /// Describe the columns of every CSV file
+    Columns(ListArgs),
+    /// Print completions for a shell
+    #[command(after_help = COMPLETION_EXAMPLES)]
+    Completions(CompletionArgs),
 }
 
 /// What lists have in common.
@@ -86,11 +98,18 @@ pub struct ListArgs {
     pub json: bool,
 }
 
+/// A shell.
+#[derive(Args, Debug)]
+pub struct CompletionArgs {
+    /// Which one
+    pub shell: Shell,
+}
+
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
-    /// Scenes (`simpulse scenes` lists them), with a size after a colon, or .json files
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…")]
+    /// Scenes
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", help = values::scenes_help())]
     pub scenes: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -147,8 +166,12 @@ pub struct StudyArgs {
 /// A scene to look at.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// A scene of `simpulse scenes`, or a .json file
-    pub name: String,
+    /// Scene
+    #[arg(value_name = "SCENE", help = values::scene_help(), required_unless_present = "schema")]
+    pub name: Option<String>,
+    /// Print the JSON schema of scene files
+    #[arg(long, exclusive = true)]
+    pub schema: bool,
     /// Print JSON instead of text: the scene in the file format
     #[arg(long)]
     pub json: bool,

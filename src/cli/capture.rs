@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
-use super::values::SettingArgs;
+use super::values::{SettingArgs, scene_help};
 use crate::engine::world::{Settings, World};
 use crate::lab::capture::capture;
 use crate::lab::error::Error;
@@ -30,8 +30,8 @@ Examples:
   simpulse capture my_scene.json --step 30 -o impact.frozen --solver pgs --velocity-iterations 50
       The same, but with the steps before it solved more accurately.")]
 pub struct CaptureArgs {
-    /// Scene of the catalogue, with its size after a colon (`pyramid:10`), or a JSON file
-    #[arg(value_name = "SCENE")]
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// Step whose problem to freeze, from 1; the steps before it are run
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]

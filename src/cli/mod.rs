@@ -20,13 +20,14 @@ use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
+use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::report::environment::Environment;
 use crate::lab::report::{self, export};
-use crate::lab::scenes::CATALOG;
+use crate::lab::scenes::{CATALOG, SCHEMA};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::study::{self, budget, open_scene};
-use args::{Cli, Command, ListArgs, SceneArgs, StudyArgs};
-use clap::Parser;
+use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs, StudyArgs};
+use clap::{CommandFactory, Parser};
 use output::{print, print_json};
 use progress::Bar;
 use serde_json::{Value, json};
@@ -70,6 +71,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Scenes(args)) => scenes(&args),
         Some(Command::Solvers(args)) => solvers(&args),
         Some(Command::Scene(args)) => print(&scene(&args)?),
+        Some(Command::Columns(args)) => columns(&args),
+        Some(Command::Completions(args)) => completions(&args),
     }
 }
 
@@ -151,8 +154,32 @@ fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
     print(&format!("* in the default study; --solvers all runs every solver\n{lines}"))
 }
 
+fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
+    let column = |c: &Column| json!({ "name": c.name, "unit": c.unit, "meaning": c.meaning });
+    let sheet = |s: &&Sheet| {
+        json!({
+            "file": s.file, "command": s.command, "line": s.line,
+            "columns": s.columns.iter().map(column).collect::<Vec<_>>(),
+        })
+    };
+    match args.json {
+        true => print_json(&SHEETS.iter().map(sheet).collect()),
+        false => print(&columns::text()),
+    }
+}
+
+fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "simpulse", &mut script);
+    print(&String::from_utf8_lossy(&script))
+}
+
 fn scene(args: &SceneArgs) -> Result<String, Error> {
-    let loaded = open_scene(&args.name, args.seed, None, None)?;
+    let name = match &args.name {
+        Some(name) if !args.schema => name,
+        _ => return Ok(SCHEMA.to_string()),
+    };
+    let loaded = open_scene(name, args.seed, None, None)?;
     let scene = loaded.scene;
     if args.json {
         return Ok(scene.to_json());

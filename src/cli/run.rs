@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
-use super::values::{self, SettingArgs};
+use super::values::{self, SettingArgs, scene_help};
 use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::{Order, Settings, World};
@@ -11,6 +11,7 @@ use crate::lab::files::Pending;
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
+use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{digits, lanes, ratio, si};
@@ -35,7 +36,8 @@ Examples:
   simpulse run arch --solver pgs --velocity-iterations 32 --all
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
 pub struct RunArgs {
-    /// A scene of `simpulse scenes`, or a .json file
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// Solver, budget and parameters
     #[command(flatten)]
@@ -98,8 +100,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;
-    let mut state = args.state.as_deref().map(|path| Sheet::new(path, &STATE)).transpose()?;
-    let mut contacts = args.contacts.as_deref().map(|path| Sheet::new(path, &CONTACTS)).transpose()?;
+    let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
+    let mut contacts = args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
 
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
@@ -344,33 +346,18 @@ impl Times {
     }
 }
 
-const STATE: [&str; 9] = ["step", "time", "body", "x", "y", "angle", "vx", "vy", "omega"];
-const CONTACTS: [&str; 11] = [
-    "step",
-    "body_a",
-    "body_b",
-    "feature",
-    "px",
-    "py",
-    "nx",
-    "ny",
-    "separation",
-    "normal_impulse",
-    "tangent_impulse",
-];
-
 /// A CSV file that appears when it is whole.
-struct Sheet {
+struct CsvFile {
     writer: csv::Writer<Pending>,
     path: String,
 }
 
-impl Sheet {
-    fn new(path: &Path, header: &[&str]) -> Result<Self, Error> {
+impl CsvFile {
+    fn new(path: &Path, sheet: &columns::Sheet) -> Result<Self, Error> {
         let path_text = path.display().to_string();
-        let mut sheet = Sheet { writer: csv::Writer::from_writer(Pending::new(path)?), path: path_text };
-        sheet.row(header)?;
-        Ok(sheet)
+        let mut file = CsvFile { writer: csv::Writer::from_writer(Pending::new(path)?), path: path_text };
+        file.row(sheet.names())?;
+        Ok(file)
     }
 
     fn row(&mut self, row: impl serde::Serialize) -> Result<(), Error> {
@@ -378,14 +365,14 @@ impl Sheet {
     }
 
     fn commit(self) -> Result<(), Error> {
-        let Sheet { writer, path } = self;
+        let CsvFile { writer, path } = self;
         let pending = writer.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
         pending.commit()
     }
 }
 
 /// A line per body: origin, angle with all turns since the start, velocity of the centre of mass.
-fn write_state(sheet: &mut Sheet, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
+fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
@@ -398,7 +385,7 @@ fn write_state(sheet: &mut Sheet, world: &World, angles: &Angles, dt: f64) -> Re
 
 /// A line per contact point: geometry at the start of the step, where the centres of mass
 /// were at `starts`; impulses on body b over the step.
-fn write_contacts(sheet: &mut Sheet, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
+fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
     for contact in &world.contacts {
         let normal = contact.manifold.normal;
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {

@@ -26,7 +26,7 @@ Examples:
   simpulse savings
   simpulse savings --scenes circle_pile:2000,pyramid:60 --solver pgs --lanes 8")]
 pub struct SavingsArgs {
-    /// Scenes (`simpulse scenes` lists them), with a size after a colon, or .json files
+    /// Scenes, with a size after a colon where they have one, or .json files
     #[arg(long, value_delimiter = ',', value_name = "SCENE,…",
         default_value = "card_house,pyramid:40,circle_pile:500")]
     pub scenes: Vec<String>,

@@ -7,7 +7,8 @@ use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, default_solvers};
+use crate::lab::scenes::CATALOG;
+use crate::lab::study::{DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -62,6 +63,22 @@ pub fn left_out(ran: &[&'static Variant]) -> String {
         [] => String::new(),
         names => format!("left out (--solvers all runs every solver): {}\n", names.join(", ")),
     }
+}
+
+/// Help for one scene.
+pub fn scene_help() -> String {
+    format!("Scene, with a size after a colon where it has one, or a .json file: {}", scene_names())
+}
+
+/// Help for several scenes.
+pub fn scenes_help() -> String {
+    let default = DEFAULT_SCENES.join(",");
+    let names = scene_names();
+    format!("Scenes, with a size after a colon, or .json files [default: {default}] [scenes: {names}]")
+}
+
+fn scene_names() -> String {
+    CATALOG.iter().map(|e| e.name).collect::<Vec<_>>().join(", ")
 }
 
 fn described() -> impl Iterator<Item = PossibleValue> {

@@ -21,7 +21,8 @@ use std::process::ExitCode;
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,
-so that up to 1 passes. '*' marks the cases that the default solver is required to pass; --list says why.
+so that up to 1 passes. '*' marks the cases that the default solver is required to pass, '†' those whose
+bound or mark was relaxed after a failure; --list says why and how.
 Exit code 0: it passed all of those that ran; 1: it did not; 2: a request that cannot be met.
 
 Examples:
@@ -106,6 +107,9 @@ fn list(cases: &[&Case]) -> String {
         };
         text += &format!("{}  {} [{}]{law}\n", case.id, case.summary, case.unit);
         text += &format!("    tolerance: {}\n    {word} of {DEFAULT}: {why}\n", case.tolerance);
+        if let Some(how) = case.relaxed {
+            text += &format!("    relaxed after a failure: {how}\n");
+        }
     }
     text + &skipped()
 }
@@ -115,12 +119,19 @@ fn skipped() -> String {
     format!("skipped, needs joints: {}\n", list.join(", "))
 }
 
+const LEGEND: &str = "\
+A cell: pass or FAIL, the measured value, and in brackets the margin, error over tolerance: up to 1 passes.
+reference: what it should be.  n/a: the reference value is that of soft contacts.
+*: required of the default solver.  †: its bound or mark was relaxed after a failure; --list says how.
+";
+
 fn text(matrix: &Matrix) -> String {
     let mut table = plain();
     let names = matrix.solvers.iter().map(|s| s.name.to_string());
-    table.set_header(["case", "what", "truth", "tolerance"].map(String::from).into_iter().chain(names));
+    table.set_header(["case", "what", "reference", "tolerance"].map(String::from).into_iter().chain(names));
     for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
         let star = if case.required.is_required() { "*" } else { "" };
+        let star = format!("{star}{}", if case.relaxed.is_some() { "†" } else { "" });
         let (truth, tolerance) = (common(cells, |f| f.truth), common(cells, |f| f.tolerance));
         let own = truth.is_none() || tolerance.is_none();
         let shown = |value: Option<f64>| value.map_or("per solver".into(), number);
@@ -129,7 +140,7 @@ fn text(matrix: &Matrix) -> String {
         row.extend(cells.iter().map(|cell| cell_text(cell, own)));
         table.add_row(row);
     }
-    let mut text = format!("{table}\n");
+    let mut text = format!("{LEGEND}\n{table}\n");
     for (c, case) in matrix.cases.iter().enumerate() {
         text += &sweeps(matrix, c, case);
         for (solver, cell) in matrix.solvers.iter().zip(&matrix.cells[c]) {
@@ -145,7 +156,7 @@ fn text(matrix: &Matrix) -> String {
     }
     let others = CASES.len() - matrix.cases.len();
     let left = if others > 0 {
-        format!("not asked for: {others} of {} cases\n", CASES.len())
+        format!("left out: {others} of {} cases\n", CASES.len())
     } else {
         String::new()
     };
@@ -169,7 +180,7 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
         Cell::Found(f) => {
             let word = if f.passed() { "pass" } else { "FAIL" };
             let truth = if with_truth {
-                format!(", truth {} ± {}", number(f.truth), number(f.tolerance))
+                format!(", reference {} ± {}", number(f.truth), number(f.tolerance))
             } else {
                 String::new()
             };
@@ -279,7 +290,7 @@ fn described(case: &&Case) -> Value {
     };
     json!({
         "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance,
-        "required": required, "why": why,
+        "required": required, "why": why, "relaxed": case.relaxed,
     })
 }
 
@@ -314,7 +325,7 @@ mod tests {
     fn a_cell_shows_verdict_value_and_margin() {
         let cell = Cell::Found(Finding::new(1.5, 1.0, 0.25));
         assert_eq!(cell_text(&cell, false), "FAIL 1.5 (2)");
-        assert_eq!(cell_text(&cell, true), "FAIL 1.5, truth 1 ± 0.25 (2)");
+        assert_eq!(cell_text(&cell, true), "FAIL 1.5, reference 1 ± 0.25 (2)");
         assert_eq!(cell_text(&Cell::Foreign, false), "n/a");
     }
 

@@ -145,8 +145,8 @@ pub struct Report {
     pub has_warm_start: bool,
     /// Lanes in coloured order.
     pub lanes: usize,
-    /// Exact factor per sweep of Gauss–Seidel near the reference; none without one, or where no error
-    /// outlives a sweep.
+    /// Exact factor per sweep of Gauss–Seidel near its solution; none where it does not come to one, or
+    /// no error outlives a sweep.
     pub gauss_seidel_rate: Option<f64>,
     /// See [`TOLERANCES`].
     pub tolerances: [f64; TOLERANCES.len()],
@@ -239,7 +239,7 @@ pub fn converge_watched(
         certificate: reference.map(|r| r.certificate),
         has_warm_start,
         lanes: options.width.lanes(),
-        gauss_seidel_rate: reference.and_then(|r| gauss_seidel_rate(problem, &r.impulses)),
+        gauss_seidel_rate: gauss_seidel_rate(problem),
         tolerances: TOLERANCES,
         curves,
     })

@@ -55,8 +55,12 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
         [] => format!("To {goal}: no solver gets there"),
         [(least, _), ..] => {
             let first: Vec<&str> = reached.iter().filter(|r| r.0 == *least).map(|r| r.1).collect();
-            let plural = if *least == 1 { "" } else { "s" };
-            let mut text = format!("To {goal}: {} in {least} sweep{plural}", first.join(" and "));
+            let when = match least {
+                0 => "at the start".to_string(),
+                1 => "in 1 sweep".to_string(),
+                n => format!("in {n} sweeps"),
+            };
+            let mut text = format!("To {goal}: {} {when}", first.join(" and "));
             let others: Vec<String> =
                 reached.iter().filter(|r| r.0 > *least).map(|(n, name)| format!("{name} {n}")).collect();
             if !others.is_empty() {
@@ -74,7 +78,7 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
 /// Measured rates beside that of Gauss–Seidel.
 fn exact(report: &Report, curves: &[&Curve]) -> String {
     let Some(exact) = report.gauss_seidel_rate else {
-        return "Gauss-Seidel's exact rate is not known: it needs a reference, and errors that last.\n".into();
+        return "Gauss-Seidel has no rate here: it comes to no solution, or at once.\n".into();
     };
     let sweeps = |tolerance: f64| (tolerance.ln() / exact.ln()).ceil();
     let mut text = format!("Gauss-Seidel's exact rate is {exact:.4} per sweep");

@@ -1,4 +1,4 @@
-//! The exact rate of Gauss–Seidel on a problem whose solution is known.
+//! The exact rate of Gauss–Seidel on a problem.
 //!
 //! Near a solution without ties the sweeps of projected Gauss–Seidel are linear: separated contacts
 //! stay at zero, the tangential impulse of a sliding one is ±µ times its normal impulse, and every
@@ -8,6 +8,8 @@
 //! that are watched.
 
 use super::problem::{ContactProblem, Pair, Velocity};
+use super::residual::Target;
+use super::sweeps::{Status, Stop, Sweep, pgs};
 
 /// Sweeps of the power iteration, in blocks whose factors are compared.
 const BLOCK: usize = 200;
@@ -28,9 +30,21 @@ enum State {
     Slides(f64),
 }
 
-/// Factor by which a forward sweep of Gauss–Seidel reduces the error near the solution `impulses`,
-/// in the order of the contacts. None if nothing is left after a sweep or two.
-pub fn gauss_seidel_rate(problem: &ContactProblem, impulses: &[Pair]) -> Option<f64> {
+/// Most rows that are updated on the way to the solution.
+const MOST_UPDATES: usize = 100_000_000;
+
+/// Factor by which a forward sweep of Gauss–Seidel, in the order of the contacts, reduces the error near
+/// the solution that it comes to from zero. (Where loads are not unique, another solution would have
+/// another rate.) None where it does not get there, or nothing is left after a sweep or two.
+pub fn gauss_seidel_rate(problem: &ContactProblem) -> Option<f64> {
+    let count = problem.contacts.len();
+    let stop = Stop { tolerance: 1e-12, iterations: MOST_UPDATES / count.max(1) };
+    let run = pgs(problem, Target::Rigid, &vec![[0.0; 2]; count], Sweep::Forward, stop);
+    (run.status == Status::Converged).then(|| rate_at(problem, &run.impulses))?
+}
+
+/// The same near the solution `impulses`.
+fn rate_at(problem: &ContactProblem, impulses: &[Pair]) -> Option<f64> {
     let largest = impulses.iter().map(|l| l[0]).fold(0.0, f64::max);
     let state = |(c, l): (&super::ProblemContact, &Pair)| {
         let bound = c.friction * l[0];
@@ -110,15 +124,12 @@ fn sweep(
 #[cfg(test)]
 mod tests {
     use super::super::gallery::{box_pyramid, disc_column, heavy_on_light, sliding_box};
-    use super::super::certify::reference;
     use super::super::rates::rate;
-    use super::super::residual::Target;
-    use super::super::sweeps::{Stop, Sweep, pgs};
     use super::*;
     use std::f64::consts::PI;
 
     fn of(problem: &ContactProblem) -> f64 {
-        gauss_seidel_rate(problem, &reference(problem).unwrap().impulses).unwrap()
+        gauss_seidel_rate(problem).unwrap()
     }
 
     #[test]
@@ -134,7 +145,7 @@ mod tests {
 
     #[test]
     fn it_is_the_rate_that_sweeps_have() {
-        for problem in [box_pyramid(4, 0.0), sliding_box()] {
+        for problem in [box_pyramid(4, 0.0), box_pyramid(5, 0.5), sliding_box()] {
             let stop = Stop { tolerance: 1e-11, iterations: 100_000 };
             let start = vec![[0.0; 2]; problem.contacts.len()];
             let run = pgs(&problem, Target::Rigid, &start, Sweep::Forward, stop);

@@ -53,13 +53,14 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     let holding = records.iter().filter(|r| r.holds()).count();
     let good = records.iter().filter(|r| r.excess() <= 1.0).count();
     format!(
-        "{scenes} scene{}, {} solver{}; {}\n{} settings: {holding} hold, {good} are good enough\n{}; lanes up to {} have instructions\n",
+        "{scenes} scene{}, {} solver{}; {}\n{} settings: {holding} hold, {good} are good enough\n{}; {}: {} lanes per instruction\n",
         if scenes == 1 { "" } else { "s" },
         solvers_of(records).len(),
         if solvers_of(records).len() == 1 { "" } else { "s" },
         ways.join(", "),
         records.len(),
         environment.cpu,
+        environment.instructions(),
         environment.native_lanes,
     )
 }

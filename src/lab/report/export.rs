@@ -241,3 +241,18 @@ fn settings(plan: &StudyPlan) -> Value {
         },
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::report::columns::STUDY;
+    use crate::lab::study::record::tests::record;
+
+    #[test]
+    fn every_column_is_documented() {
+        let bytes = csv(&[record(8, 1, 1.0, 0.0)]).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        assert_eq!(header, STUDY.names());
+    }
+}

@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub(crate) mod axes;
+pub mod columns;
 pub mod environment;
 pub mod export;
 pub mod plot;
