@@ -15,6 +15,8 @@ pub mod ceilings;
 pub mod growth;
 pub mod growth_report;
 pub mod islands;
+pub mod limit;
+pub mod records;
 pub mod roofline;
 pub mod text;
 pub mod traffic;

@@ -1,7 +1,9 @@
-//! What is printed. A reader that has left (`| head -1`) is not an error.
+//! What is printed: text and JSON to standard output, notes to standard error. A reader that has
+//! left (`| head -1`) is not an error.
 
 use crate::lab::error::Error;
 use crate::lab::files::is_standard_output;
+use serde_json::Value;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -27,4 +29,19 @@ pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -
 /// What happens, and errors, to standard error; nobody need read it.
 pub fn note(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// The same as JSON. What is not finite is a word there: [`finite`].
+pub fn print_json(value: &Value) -> Result<ExitCode, Error> {
+    print(&format!("{value:#}\n"))
+}
+
+/// Anything that can be serialised.
+pub fn value(of: &impl serde::Serialize) -> Result<Value, Error> {
+    serde_json::to_value(of).map_err(|e| Error::invalid("json", e.to_string()))
+}
+
+/// JSON has no infinities: they are words.
+pub fn finite(number: f64) -> Value {
+    if number.is_finite() { number.into() } else { number.to_string().into() }
 }
