@@ -1,12 +1,14 @@
 //! `simpulse replay`: recordings side by side on one page.
 
+use super::output::print_beside;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::recording::page::{MOST, Panel, page};
-use crate::lab::recording::read::read_file;
+use crate::lab::recording::read::{Recording, read_file};
 use crate::lab::report::style::Style;
 use clap::Args;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 /// Make a page that plays recordings side by side
 ///
@@ -27,23 +29,22 @@ pub struct ReplayArgs {
     pub output: PathBuf,
 }
 
-/// Runs the command; what it prints.
-pub fn run(args: &ReplayArgs) -> Result<String, Error> {
+/// Runs the command.
+pub fn run(args: &ReplayArgs) -> Result<ExitCode, Error> {
     if args.files.len() > MOST {
         return Err(Error::invalid("replay", format!("{} recordings, at most {MOST} fit", args.files.len())));
     }
     let read = args.files.iter().map(|path| read_file(path)).collect::<Result<Vec<_>, _>>()?;
-    let panel = |(bytes, recording): &'_ (Vec<u8>, crate::lab::recording::read::Recording)| {
-        let color = Style::of(&recording.header.solver).color.to_string();
-        (bytes.clone(), recording.header.clone(), color)
+    let panel = |(bytes, recording): &'_ (Vec<u8>, Recording)| Panel {
+        bytes: bytes.clone(),
+        header: recording.header.clone(),
+        color: Style::of(&recording.header.solver).color.to_string(),
     };
-    let owned: Vec<_> = read.iter().map(panel).collect();
-    let panels: Vec<Panel> = owned
-        .iter()
-        .map(|(bytes, header, color)| Panel { bytes, header, color: color.clone() })
-        .collect();
+    let panels: Vec<Panel> = read.iter().map(panel).collect();
     let text = page(&panels);
     files::write(&args.output, text.as_bytes())?;
     let size = text.len().div_ceil(1024);
-    Ok(format!("wrote {} ({} recordings, {size} KiB)\n", args.output.display(), panels.len()))
+    let count = panels.len();
+    let text = format!("wrote {} ({count} recordings, {size} KiB)\n", args.output.display());
+    print_beside([args.output.as_path()], &text)
 }

@@ -1,13 +1,15 @@
 //! `simpulse report`: the page of a study, from its records.
 
+use super::output::print;
 use crate::lab::error::Error;
 use crate::lab::report::html;
 use clap::Args;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 /// Make the page of a study again, from its records
 ///
-/// Reads study.json of the folder, and if they are there verify.json (`simpulse verify --json`) and
+/// Reads study.json of the folder, and if they are there verify.json (`simpulse verify --json > DIR/verify.json`) and
 /// the recordings of the study; writes report.html.
 #[derive(Args, Debug)]
 pub struct ReportArgs {
@@ -16,7 +18,7 @@ pub struct ReportArgs {
     pub folder: PathBuf,
 }
 
-/// Runs the command; what it prints.
-pub fn run(args: &ReportArgs) -> Result<String, Error> {
-    Ok(format!("wrote {}\n", html::write(&args.folder)?.display()))
+/// Runs the command.
+pub fn run(args: &ReportArgs) -> Result<ExitCode, Error> {
+    print(&format!("wrote {}\n", html::write(&args.folder)?.display()))
 }

@@ -1,6 +1,10 @@
 //! `simpulse snapshot`: one frame of a scene as a picture.
 
-use super::setting::SettingArgs;
+use super::output::print_beside;
+use super::run::settings;
+use super::values::{self, SettingArgs, scene_help};
+use crate::engine::lanes::LaneWidth;
+use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::metrics::overlaps::Overlaps;
@@ -11,6 +15,7 @@ use crate::lab::study::{budget, open_scene};
 use crate::lab::units::{lanes, si};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Draw one frame of a scene as SVG or PNG
 ///
@@ -23,8 +28,8 @@ Examples:
   simpulse snapshot pyramid:20 --step 120 -o pyramid.svg
   simpulse snapshot arch --step 60 --solver pgs --velocity-iterations 4 -o arch.png --width 1600")]
 pub struct SnapshotArgs {
-    /// A scene of `simpulse scenes`, or a .json file
-    #[arg(value_name = "SCENE")]
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// The step after which the frame is taken; 0 is the start
     #[arg(long, value_name = "N", default_value_t = 60)]
@@ -35,9 +40,21 @@ pub struct SnapshotArgs {
     /// Width of the picture in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
     pub width: u32,
-    /// How it runs
+    /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
+    /// Lanes per instruction [default: as `simpulse run`]
+    #[arg(long, value_name = "N", value_parser = values::lanes())]
+    pub lanes: Option<LaneWidth>,
+    /// Constraint order
+    #[arg(long, default_value = "colored", value_name = "ORDER", value_parser = values::order())]
+    pub order: Order,
+    /// Step in seconds [default: that of the scene]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub dt: Option<f64>,
+    /// Random seed of scenes that have one
+    #[arg(long)]
+    pub seed: Option<u64>,
 }
 
 /// What a file name asks for.
@@ -49,15 +66,15 @@ fn encoder(path: &Path) -> Result<fn(&Picture) -> Vec<u8>, Error> {
     }
 }
 
-/// Runs the command; what it prints.
-pub fn run(args: &SnapshotArgs) -> Result<String, Error> {
+/// Runs the command.
+pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
     let encode = encoder(&args.output)?;
     if !(WIDTHS[0]..=WIDTHS[1]).contains(&args.width) {
         let [least, most] = WIDTHS;
         return Err(Error::invalid("width", format!("{} is not from {least} to {most}", args.width)));
     }
-    let settings = args.setting.settings()?;
-    let loaded = open_scene(&args.scene, args.setting.seed, None, args.setting.dt)?;
+    let settings = settings(&args.setting, args.order, args.lanes)?;
+    let loaded = open_scene(&args.scene, args.seed, None, args.dt)?;
     let mut world = loaded.scene.build(settings)?;
     for _ in 0..args.step {
         world.step().map_err(|divergence| Error::invalid("step", divergence.to_string()))?;
@@ -66,8 +83,8 @@ pub fn run(args: &SnapshotArgs) -> Result<String, Error> {
     let frame = Frame::of(&world, &stage, Some(&mut Overlaps::default()));
     let s = &world.settings;
     let order = match s.order {
-        crate::engine::world::Order::Natural => "natural order".to_string(),
-        crate::engine::world::Order::Colored => lanes(s.width.lanes()),
+        Order::Natural => "natural order".to_string(),
+        Order::Colored => lanes(s.width.lanes()),
     };
     let time = si(f64::from(args.step) * loaded.scene.dt, "s");
     let title = format!("{} · step {} ({time})", loaded.scene.name, args.step);
@@ -82,5 +99,6 @@ pub fn run(args: &SnapshotArgs) -> Result<String, Error> {
     );
     let picture = draw(&stage, &frame, &title, &subtitle, args.width);
     files::write(&args.output, &encode(&picture))?;
-    Ok(format!("{title}: {subtitle}\nwrote {}\n", args.output.display()))
+    let text = format!("{title}: {subtitle}\nwrote {}\n", args.output.display());
+    print_beside([args.output.as_path()], &text)
 }

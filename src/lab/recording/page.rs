@@ -14,11 +14,11 @@ pub const STYLE: &str = include_str!("replay.css");
 pub const SCRIPT: &str = include_str!("replay.js");
 
 /// A recording on a page.
-pub struct Panel<'a> {
+pub struct Panel {
     /// The bytes of the file.
-    pub bytes: &'a [u8],
+    pub bytes: Vec<u8>,
     /// What it is of.
-    pub header: &'a Header,
+    pub header: Header,
     /// CSS colour of its curves.
     pub color: String,
 }
@@ -83,7 +83,7 @@ mod tests {
             contacts: false,
             curves: Vec::new(),
         };
-        let text = page(&[Panel { bytes: b"1234", header: &header, color: "#123456".into() }]);
+        let text = page(&[Panel { bytes: b"1234".to_vec(), header, color: "#123456".into() }]);
         assert!(text.contains("&lt;script&gt;") && text.contains("a&amp;b") && text.contains("MTIzNA=="));
         assert!(text.contains("class=\"broken\">fell at step 3"));
         for outside in ["http://", "https://", "src=", "@import"] {

@@ -41,6 +41,22 @@ impl Environment {
     }
 }
 
+impl Environment {
+    /// The widest instructions that the compiler was allowed to use, in the usual spelling.
+    pub fn instructions(&self) -> &'static str {
+        let names = [
+            ("avx512f", "AVX-512"),
+            ("avx2", "AVX2"),
+            ("avx", "AVX"),
+            ("sse2", "SSE2"),
+            ("neon", "NEON"),
+            ("simd128", "WebAssembly SIMD"),
+        ];
+        let has = |feature: &str| self.target_features.contains(&feature);
+        names.into_iter().find(|(feature, _)| has(feature)).map_or("no SIMD", |(_, name)| name)
+    }
+}
+
 fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

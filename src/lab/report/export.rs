@@ -7,10 +7,11 @@ use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
-use crate::lab::study::ablation::NeedCost;
 use crate::lab::study::answer::Answer;
+use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::profile::Profile;
+use crate::lab::study::ranking::ranking;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
 
@@ -181,37 +182,36 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// `study.json`: the environment, every setting, the records, and the ablation.
-pub fn json(
-    environment: &Environment,
-    plan: &StudyPlan,
-    records: &[Record],
-    ablation: &[NeedCost],
-) -> Result<Vec<u8>, Error> {
+/// `study.json`: the environment, every setting, the records, and what follows from them: the answer on
+/// each scene, the ranking, the profiles.
+pub fn json(environment: &Environment, plan: &StudyPlan, records: &[Record]) -> Result<Vec<u8>, Error> {
     let whole = json!({
         "environment": environment,
         "settings": settings(plan),
         "records": records,
-        "ablation": ablation,
         "answers": answers(records),
+        "ranking": ranking(records),
         "profiles": profiles(records),
     });
     serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
 }
 
-/// What to use on each scene, as places in the list of records.
+/// What to use on each scene; records by their place in the list.
 fn answers(records: &[Record]) -> Vec<Value> {
     let place = |r: &Record| records.iter().position(|other| std::ptr::eq(other, r));
-    let scenes = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of);
     let each = |answer: Answer| {
+        let runner_up = answer.runner_up();
+        let laps = runner_up.and_then(|r| r.lap.as_ref()).zip(answer.best().and_then(|r| r.lap.as_ref()));
         json!({
             "scene": answer.scene,
-            "good": answer.good.iter().filter_map(|r| place(r)).collect::<Vec<_>>(),
-            "tied": answer.tied().filter_map(place).collect::<Vec<_>>(),
+            "best": answer.best().and_then(place),
             "nearest": answer.nearest.and_then(place),
+            "tied": answer.tied_solvers(),
+            "runner_up": runner_up.and_then(place),
+            "slower": laps.and_then(|(next, best)| Ratio::of(next, best)).map(|r| r.median),
         })
     };
-    scenes.map(each).collect()
+    records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).map(each).collect()
 }
 
 /// Performance profiles: per solver its times on the scenes that it solves, in times the fastest.
@@ -276,4 +276,19 @@ fn settings(plan: &StudyPlan) -> Value {
             "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
         },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::report::columns::STUDY;
+    use crate::lab::study::record::tests::record;
+
+    #[test]
+    fn every_column_is_documented() {
+        let bytes = csv(&[record(8, 1, 1.0, 0.0)]).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        assert_eq!(header, STUDY.names());
+    }
 }

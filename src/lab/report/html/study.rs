@@ -16,6 +16,9 @@ pub struct Study {
     /// Which settings to use, by scene.
     #[serde(default)]
     pub answers: Vec<Verdict>,
+    /// Solvers over all scenes, the best first.
+    #[serde(default)]
+    pub ranking: Vec<Standing>,
     /// Performance profiles, one per error.
     #[serde(default)]
     pub profiles: Vec<Profile>,
@@ -116,12 +119,27 @@ pub struct Fronts {
 #[derive(Debug, Deserialize)]
 pub struct Verdict {
     pub scene: String,
-    /// Those that hold within tolerance, the cheapest first.
-    pub good: Vec<usize>,
-    /// Those of them that tie with the cheapest.
-    pub tied: Vec<usize>,
+    /// The cheapest that holds within tolerance.
+    pub best: Option<usize>,
     /// The nearest that is not within tolerance.
     pub nearest: Option<usize>,
+    /// Other solvers that tie with the cheapest.
+    pub tied: Vec<String>,
+    /// The cheapest of another solver.
+    pub runner_up: Option<usize>,
+    /// Its time in times that of the cheapest.
+    pub slower: Option<f64>,
+}
+
+/// A [`crate::lab::study::ranking::Standing`].
+#[derive(Debug, Deserialize)]
+pub struct Standing {
+    pub solver: String,
+    pub score: f64,
+    pub holds: usize,
+    pub good: usize,
+    pub fastest: usize,
+    pub close: usize,
 }
 
 /// See [`crate::lab::study::profile::Profile`].
