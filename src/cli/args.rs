@@ -7,6 +7,7 @@ use super::growth::GrowthArgs;
 use super::profile::ProfileArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
+use super::study::Shard;
 use super::values::{self, Solvers};
 use super::verify::VerifyArgs;
 use crate::engine::lanes::LaneWidth;
@@ -158,6 +159,9 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
+    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
     /// Folder for the results
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,

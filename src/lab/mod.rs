@@ -16,6 +16,7 @@ pub mod capture;
 pub mod converge;
 pub mod error;
 pub mod files;
+pub mod interned;
 pub mod metrics;
 pub mod overrides;
 pub mod profile;

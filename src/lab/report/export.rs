@@ -1,6 +1,5 @@
 //! The study as `study.csv` and `study.json`.
 
-use super::environment::Environment;
 use super::units::is_emulated;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
@@ -177,23 +176,13 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// `study.json`: the environment, every setting, and the records.
-pub fn json(environment: &Environment, plan: &StudyPlan, records: &[Record]) -> Result<Vec<u8>, Error> {
-    let whole = json!({
-        "environment": environment,
-        "settings": settings(plan),
-        "records": records,
-    });
-    serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
-}
-
 /// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
 fn decimal(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// Everything that was chosen, by the caller or by a constant.
-fn settings(plan: &StudyPlan) -> Value {
+pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
     struct Solver {
         name: &'static str,
