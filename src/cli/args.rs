@@ -2,8 +2,10 @@
 
 use super::advise::AdviseArgs;
 use super::capture::CaptureArgs;
+use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
+use super::merge::MergeArgs;
 use super::profile::ProfileArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
@@ -70,6 +72,8 @@ pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
+    Compare(CompareArgs),
+    Merge(MergeArgs),
     Run(RunArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),

@@ -1,13 +1,16 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met, 130 a signal.
+//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
+//! that cannot be met, 130 a signal.
 
 pub mod advise;
 pub mod args;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod growth;
 pub mod interrupt;
+pub mod merge;
 pub mod output;
 pub mod profile;
 pub mod progress;
@@ -63,6 +66,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
         None => study::run(&cli.study),
         Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),

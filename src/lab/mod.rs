@@ -13,6 +13,7 @@
 
 pub mod advise;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod error;
 pub mod files;

@@ -84,7 +84,7 @@ const LAB: &[&[&str]] = &[
     &["scenes", "capture"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile"],
+    &["profile", "compare"],
 ];
 
 #[test]

@@ -49,6 +49,71 @@ impl StudyFile {
         }
     }
 
+    /// One study of several parts that were chosen alike; `names` is what the parts are called in errors.
+    /// Scenes take turns, the first of every part first, which is the order of a study that was split.
+    ///
+    /// Errors: no parts; parts that differ in what was chosen; a scene in two parts.
+    pub fn merged(parts: Vec<StudyFile>, names: &[String]) -> Result<Self, Error> {
+        let chosen = |study: &StudyFile| {
+            let mut settings = study.settings.clone();
+            if let Some(map) = settings.as_object_mut() {
+                map.remove("scenes");
+            }
+            settings
+        };
+        let Some(first) = parts.first() else { return Err(Error::invalid("merge", "no parts given")) };
+        let mut whole = StudyFile {
+            environment: first.environment.clone(),
+            settings: first.settings.clone(),
+            missing_scenes: Vec::new(),
+            parts: Vec::new(),
+            records: Vec::new(),
+        };
+        let mut found: Vec<(String, &String)> = Vec::new();
+        for (part, name) in parts.iter().zip(names) {
+            if chosen(part) != chosen(first) {
+                let message = format!("{name} was run with other settings than {}", names[0]);
+                return Err(Error::invalid("merge", message));
+            }
+            for scene in part.scenes() {
+                if let Some((_, other)) = found.iter().find(|(known, _)| *known == scene) {
+                    return Err(Error::invalid("merge", format!("{scene} is in {other} and in {name}")));
+                }
+                found.push((scene, name));
+            }
+            match part.parts.is_empty() {
+                true => {
+                    whole.parts.push(Part { environment: part.environment.clone(), scenes: part.scenes() })
+                }
+                false => whole.parts.extend(part.parts.iter().cloned()),
+            }
+        }
+        let plan = |study: &StudyFile| -> Vec<String> {
+            let list = study.settings.get("scenes").and_then(Value::as_array).into_iter().flatten();
+            list.filter_map(|name| Some(name.as_str()?.to_string())).collect()
+        };
+        // What a part did not finish, and what no part had in its plan.
+        let finished =
+            |name: &String| parts.iter().any(|p| plan(p).contains(name) && !p.missing_scenes.contains(name));
+        let missing: Vec<String> = parts.iter().flat_map(|p| p.missing_scenes.clone()).collect();
+        for name in missing {
+            if !finished(&name) && !whole.missing_scenes.contains(&name) {
+                whole.missing_scenes.push(name);
+            }
+        }
+        let plans: Vec<Vec<String>> = parts.iter().map(plan).collect();
+        let scenes =
+            in_turns(plans.iter().map(|p| p.iter().map(|name| vec![name.clone()]).collect()).collect());
+        if let Some(map) = whole.settings.as_object_mut() {
+            map.insert("scenes".into(), scenes.into());
+        }
+        let by_scene = |study: StudyFile| -> Vec<Vec<Record>> {
+            study.records.chunk_by(|a, b| a.scene == b.scene).map(<[Record]>::to_vec).collect()
+        };
+        whole.records = in_turns(parts.into_iter().map(by_scene).collect());
+        Ok(whole)
+    }
+
     /// The scenes that have records, in their order.
     pub fn scenes(&self) -> Vec<String> {
         self.records.chunk_by(|a, b| a.scene == b.scene).map(|scene| scene[0].scene.clone()).collect()
@@ -86,6 +151,12 @@ impl StudyFile {
     }
 }
 
+/// The first of every list, then the second of every list, and so on.
+fn in_turns<T: Clone>(lists: Vec<Vec<Vec<T>>>) -> Vec<T> {
+    let longest = lists.iter().map(Vec::len).max().unwrap_or(0);
+    (0..longest).flat_map(|i| lists.iter().filter_map(move |list| list.get(i))).flatten().cloned().collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,6 +178,42 @@ mod tests {
         assert_eq!(back.to_json().unwrap(), text);
         assert_eq!(format!("{:?}", back.records[0].errors), format!("{:?}", study.records[0].errors));
         assert!(back.records[0].lap.as_ref().unwrap().blocks_ns[0][1].is_nan());
+    }
+
+    #[test]
+    fn parts_make_the_whole_again() {
+        let of = |scenes: &[&str], missing: &[&str]| {
+            let names = |list: &[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+            let plan = StudyPlan { scenes: names(scenes), ..StudyPlan::default() };
+            let done = scenes.iter().filter(|s| !missing.contains(s));
+            let records = done.map(|&s| Record { scene: s.into(), ..record(8, 1, 1.0, 0.0) }).collect();
+            StudyFile::new(&plan, records, names(missing))
+        };
+        let names = ["one".to_string(), "two".to_string()];
+        // A study of a, b, c, d, e in two parts.
+        let parts = vec![of(&["a", "c", "e"], &[]), of(&["b", "d"], &[])];
+        let parts = parts.into_iter().zip([vec!["b", "d"], vec!["a", "c", "e"]]).map(|(mut part, others)| {
+            part.missing_scenes = others.into_iter().map(String::from).collect();
+            part
+        });
+        let whole = StudyFile::merged(parts.collect(), &names).unwrap();
+        assert_eq!(whole.scenes(), ["a", "b", "c", "d", "e"]);
+        assert_eq!(whole.settings["scenes"], serde_json::json!(["a", "b", "c", "d", "e"]));
+        assert_eq!((whole.missing_scenes.len(), whole.parts.len()), (0, 2));
+        assert!(whole.caution().contains("2 runs"), "{}", whole.caution());
+        // One part was interrupted before d.
+        let cut = StudyFile::merged(vec![of(&["a", "c"], &[]), of(&["b", "d"], &["d"])], &names).unwrap();
+        assert_eq!(
+            (cut.scenes(), cut.missing_scenes),
+            (vec!["a".into(), "b".into(), "c".into()], vec!["d".to_string()])
+        );
+
+        let twice = StudyFile::merged(vec![of(&["a"], &[]), of(&["a"], &[])], &names).unwrap_err();
+        assert_eq!(twice.to_string(), "merge: a is in one and in two");
+        let mut other = of(&["b"], &[]);
+        other.settings["seed"] = 9.into();
+        let message = StudyFile::merged(vec![of(&["a"], &[]), other], &names).unwrap_err().to_string();
+        assert_eq!(message, "merge: two was run with other settings than one");
     }
 
     #[test]
