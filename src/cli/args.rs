@@ -2,14 +2,17 @@
 
 use super::advise::AdviseArgs;
 use super::capture::CaptureArgs;
+use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
+use super::merge::MergeArgs;
 use super::profile::ProfileArgs;
 use super::replay::ReplayArgs;
 use super::report::ReportArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
+use super::study::Shard;
 use super::values::{self, Solvers};
 use super::verify::VerifyArgs;
 use crate::engine::lanes::LaneWidth;
@@ -72,6 +75,8 @@ pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
+    Compare(CompareArgs),
+    Merge(MergeArgs),
     Run(RunArgs),
     Snapshot(SnapshotArgs),
     Replay(ReplayArgs),
@@ -164,6 +169,9 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
+    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
     /// Folder for the results
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,

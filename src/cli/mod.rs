@@ -1,13 +1,16 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met, 130 a signal.
+//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
+//! that cannot be met, 130 a signal.
 
 pub mod advise;
 pub mod args;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod growth;
 pub mod interrupt;
+pub mod merge;
 pub mod output;
 pub mod profile;
 pub mod progress;
@@ -16,6 +19,7 @@ pub mod report;
 pub mod run;
 pub mod savings;
 pub mod snapshot;
+pub mod study;
 pub mod values;
 pub mod verify;
 
@@ -25,15 +29,12 @@ use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
-use crate::lab::report::environment::Environment;
-use crate::lab::report::{answer, export, html, tables, write_study};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{CATALOG, SCHEMA};
-use crate::lab::study::{self, budget, open_scene};
-use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs, StudyArgs};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
 use clap::{CommandFactory, Parser};
 use output::{note, print, print_json};
-use progress::Bar;
 use serde_json::{Value, json};
 use std::io::ErrorKind;
 use std::process::ExitCode;
@@ -66,8 +67,10 @@ pub fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => study(&cli.study),
-        Some(Command::Study(args)) => study(&args),
+        None => study::run(&cli.study),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Snapshot(args)) => snapshot::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
@@ -93,31 +96,6 @@ fn one_line(message: &str) -> String {
     let message = message.split("\nUsage:").next().unwrap_or(message);
     let message = message.split("\nFor more information").next().unwrap_or(message);
     message.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
-    let plan = args.plan()?;
-    plan.check()?;
-    // Before the long wait, not after it.
-    crate::lab::files::prepare_folder(&args.out)?;
-    let bar = Bar::new();
-    let records = study::run(&plan, &|p| bar.show(p.done, p.total, p.what))?;
-    drop(bar);
-    let replays = html::write_recordings(&args.out, &study::telling::recordings(&plan, &records)?)?;
-    let mut paths = write_study(&args.out, &plan, &records)?;
-    paths.extend(replays);
-    let environment = Environment::current();
-    if args.json {
-        return print(&String::from_utf8_lossy(&export::json(&environment, &plan, &records)?));
-    }
-    let names: Vec<String> =
-        paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
-    let mut text = answer::text(&records, &environment, plan.steps);
-    text += &format!("\nwrote {} in {}\n", names.join(", "), args.out.display());
-    if args.verbose {
-        text += &format!("\n{}", tables(&records));
-    }
-    print(&text)
 }
 
 fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
@@ -146,7 +124,7 @@ fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
 }
 
 fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
-    let is_default = |v: &Variant| study::DEFAULT_SOLVERS.contains(&v.name);
+    let is_default = |v: &Variant| DEFAULT_SOLVERS.contains(&v.name);
     if args.json {
         let entry = |v: &&'static Variant| {
             json!({

@@ -3,6 +3,7 @@
 use super::output::print;
 use crate::lab::error::Error;
 use crate::lab::report::html;
+use crate::lab::report::study_file::StudyFile;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,5 +21,5 @@ pub struct ReportArgs {
 
 /// Runs the command.
 pub fn run(args: &ReportArgs) -> Result<ExitCode, Error> {
-    print(&format!("wrote {}\n", html::write(&args.folder)?.display()))
+    print(&format!("wrote {}\n", html::write(&args.folder, &StudyFile::read(&args.folder)?)?.display()))
 }

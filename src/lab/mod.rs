@@ -15,9 +15,11 @@
 
 pub mod advise;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod error;
 pub mod files;
+pub mod interned;
 pub mod metrics;
 pub mod overrides;
 pub mod picture;

@@ -79,13 +79,13 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "overrides", "units"],
+    &["files", "interned", "overrides", "units"],
     &["metrics", "reference"],
     &["scenes", "capture", "picture"],
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile"],
+    &["profile", "compare"],
 ];
 
 #[test]

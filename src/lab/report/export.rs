@@ -1,17 +1,11 @@
 //! The study as `study.csv` and `study.json`.
 
-use super::environment::Environment;
 use super::units::is_emulated;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
-use crate::lab::study::answer::Answer;
-use crate::lab::study::compare::Ratio;
-use crate::lab::study::curve::ErrorAxis;
-use crate::lab::study::profile::Profile;
-use crate::lab::study::ranking::ranking;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
 
@@ -182,54 +176,13 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// `study.json`: the environment, every setting, the records, and what follows from them: the answer on
-/// each scene, the ranking, the profiles.
-pub fn json(environment: &Environment, plan: &StudyPlan, records: &[Record]) -> Result<Vec<u8>, Error> {
-    let whole = json!({
-        "environment": environment,
-        "settings": settings(plan),
-        "records": records,
-        "answers": answers(records),
-        "ranking": ranking(records),
-        "profiles": profiles(records),
-    });
-    serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
-}
-
-/// What to use on each scene; records by their place in the list.
-fn answers(records: &[Record]) -> Vec<Value> {
-    let place = |r: &Record| records.iter().position(|other| std::ptr::eq(other, r));
-    let each = |answer: Answer| {
-        let runner_up = answer.runner_up();
-        let laps = runner_up.and_then(|r| r.lap.as_ref()).zip(answer.best().and_then(|r| r.lap.as_ref()));
-        json!({
-            "scene": answer.scene,
-            "best": answer.best().and_then(place),
-            "nearest": answer.nearest.and_then(place),
-            "tied": answer.tied_solvers(),
-            "runner_up": runner_up.and_then(place),
-            "slower": laps.and_then(|(next, best)| Ratio::of(next, best)).map(|r| r.median),
-        })
-    };
-    records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).map(each).collect()
-}
-
-/// Performance profiles: per solver its times on the scenes that it solves, in times the fastest.
-fn profiles(records: &[Record]) -> Vec<Value> {
-    let profile = |axis: ErrorAxis| {
-        let Profile { scenes, solvable, ratios, .. } = Profile::of(records, axis);
-        json!({ "error": axis.name(), "scenes": scenes, "solvable": solvable, "ratios": ratios })
-    };
-    ErrorAxis::ALL.into_iter().map(profile).collect()
-}
-
 /// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
 fn decimal(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// Everything that was chosen, by the caller or by a constant.
-fn settings(plan: &StudyPlan) -> Value {
+pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
     struct Solver {
         name: &'static str,

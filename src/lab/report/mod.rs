@@ -9,15 +9,16 @@ pub mod html;
 pub mod plot;
 pub mod profiles;
 pub mod savings;
+pub mod study_file;
 pub mod style;
 pub mod table;
 pub use crate::lab::units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::study::{Record, StudyPlan};
-use environment::Environment;
+use crate::lab::study::Record;
 use std::path::{Path, PathBuf};
+use study_file::StudyFile;
 
 /// Everything that a study measured, as tables: per scene, in equal time and to equal error, and the
 /// performance profiles.
@@ -32,15 +33,15 @@ pub fn tables(records: &[Record]) -> String {
 }
 
 /// Writes `tables.txt`, `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into
-/// `folder`, and the [page](html) made from what is there then; returns their paths.
+/// `folder`, and the [page](html) made from them and what else is there; returns their paths.
 ///
 /// All but the page are made before the first is written.
-pub fn write_study(folder: &Path, plan: &StudyPlan, records: &[Record]) -> Result<Vec<PathBuf>, Error> {
-    let environment = Environment::current();
+pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
+    let records = &study.records;
     let contents = [
         ("tables.txt", tables(records).into_bytes()),
         ("study.csv", export::csv(records)?),
-        ("study.json", export::json(&environment, plan, records)?),
+        ("study.json", study.to_json()?),
         ("speed_vs_error.svg", plot::svg(records)?.into_bytes()),
         ("profiles.svg", profiles::svg(records)?.into_bytes()),
     ];
@@ -51,6 +52,6 @@ pub fn write_study(folder: &Path, plan: &StudyPlan, records: &[Record]) -> Resul
         files::write(&path, &bytes)?;
         paths.push(path);
     }
-    paths.push(html::write(folder)?);
+    paths.push(html::write(folder, study)?);
     Ok(paths)
 }

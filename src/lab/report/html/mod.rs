@@ -1,9 +1,9 @@
 //! `report.html`: a study on one page that needs no network, made from its records alone.
 //!
 //! ```text
-//! study.json ──► Study ──► words, overview, precision, sections ─┐
-//! verify.json ──► Matrix ────────────────────────────────────────┼─► page
-//! replay-*.rec ──► recording::page::fragment ────────────────────┘
+//! study.json ──► StudyFile ──► words, overview, precision, sections ─┐
+//! verify.json ──► Matrix ───────────────────────────────────────────┼─► page
+//! replay-*.rec ──► recording::page::fragment ───────────────────────┘
 //! ```
 
 mod matrix;
@@ -12,7 +12,7 @@ mod panel;
 mod precision;
 mod scale;
 mod sections;
-mod study;
+mod setting;
 mod words;
 
 use crate::lab::error::Error;
@@ -21,11 +21,12 @@ use crate::lab::picture::svg::escaped;
 use crate::lab::recording::Header;
 use crate::lab::recording::page::{MOST, Panel, SCRIPT, STYLE, fragment};
 use crate::lab::recording::read::read_file;
+use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
+use crate::lab::study::curve::solvers_of;
 use matrix::Matrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use study::Study;
 
 /// Name of the page in the folder of a study.
 pub const NAME: &str = "report.html";
@@ -52,12 +53,11 @@ pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<Pat
     Ok(paths)
 }
 
-/// Writes the page of the study in `folder` from the records there: `study.json`, and if they are
-/// there `verify.json` and the recordings. Returns its path.
+/// Writes the page of a study into its folder, with what is there of `verify.json` and recordings;
+/// returns its path.
 ///
-/// Errors: no records, or what is none.
-pub fn write(folder: &Path) -> Result<PathBuf, Error> {
-    let study: Study = read_json(&folder.join("study.json"))?;
+/// Errors: files there that are not what their names say.
+pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
     let matrix_path = folder.join("verify.json");
     let matrix: Option<Matrix> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
     let mut recordings = Vec::new();
@@ -66,7 +66,7 @@ pub fn write(folder: &Path) -> Result<PathBuf, Error> {
         recordings.push((bytes, recording.header));
     }
     let path = folder.join(NAME);
-    files::write(&path, page(&study, matrix.as_ref(), &recordings).as_bytes())?;
+    files::write(&path, page(study, matrix.as_ref(), &recordings).as_bytes())?;
     Ok(path)
 }
 
@@ -76,21 +76,27 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
 }
 
 /// The whole page.
-fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]) -> String {
-    let (scenes, solvers) = (study.scenes().len(), study.solvers().len());
+fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]) -> String {
+    let (records, solvers) = (&study.records[..], solvers_of(&study.records));
+    let scenes = setting::scenes(records);
     let e = &study.environment;
     let mut text = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
          </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{STYLE}</style>\n</head>\n<body>\n\
          <h1>Which contact solver, how fast, and how wrong?</h1>\n\
-         <p class=\"soft\">{scenes} scenes, {solvers} solvers, {} settings · {}, {} lanes native · simpulse {}</p>\n",
+         <p class=\"soft\">{} scenes, {} solvers, {} settings · {}, {} lanes native · simpulse {}</p>\n",
         include_str!("page.css"),
-        study.records.len(),
+        scenes.len(),
+        solvers.len(),
+        records.len(),
         escaped(&e.cpu),
         e.native_lanes,
         escaped(&e.version),
     );
+    if !study.caution().is_empty() {
+        text += &format!("<p class=\"bad\">{}</p>\n", escaped(&study.caution()));
+    }
     let mut contents: Vec<(&str, &str)> = Vec::new();
     let mut body = String::new();
     let mut section = |id: &'static str, title: &'static str, lead: &str, content: String| {
@@ -102,14 +108,14 @@ fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]
         body += &content;
         body += "</section>\n";
     };
-    section("answer", "The answer", "", words::answer(study));
+    section("answer", "The answer", "", words::answer(records, study.settings["steps"].as_u64()));
     section(
         "overview",
         "Speed against error over all scenes",
         "Small marks: every solver and budget on every scene, in colours, at its fastest lane width. Large marks: \
          the geometric mean of a budget over the scenes on which it holds, from the smallest budget to the \
          largest. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
-        overview::overview(study),
+        overview::overview(records),
     );
     if !recordings.is_empty() {
         let scene = escaped(&recordings[0].1.scene);
@@ -124,8 +130,8 @@ fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]
             .collect();
         section("replay", "Replay of the most telling scene", &lead, fragment(&panels, 0.6));
     }
-    let mut by_scene = panel::legend(&study.solvers());
-    for scene in study.scenes() {
+    let mut by_scene = panel::legend(&solvers);
+    for scene in scenes {
         let name = &scene[0].scene;
         by_scene += &format!(
             "<h3 id=\"{}\">{} <span class=\"soft\">{} bodies</span></h3>\n{}",
@@ -144,31 +150,31 @@ fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]
          scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
         by_scene,
     );
-    let legend = || panel::legend(&study.solvers());
+    let legend = || panel::legend(&solvers);
     section(
         "profiles",
         "Performance profiles",
         "The share of scenes that a solver solves within a factor of the fastest. Upper left is better.",
-        legend() + &sections::profiles(&study.profiles),
+        legend() + &sections::profiles(records),
     );
     section(
         "lanes",
         "Lanes",
         "Each solver at its standard budget, coloured: how many times faster than one lane, and how many lanes \
          hold a contact.",
-        legend() + &sections::lanes(study),
+        legend() + &sections::lanes(records),
     );
     section(
         "phases",
         "Time per phase",
         "Each solver at its standard budget and fastest lane width (budget@lanes); ✗ where it does not hold.",
-        sections::phases(study),
+        sections::phases(records),
     );
     section(
         "iterations",
         "Iterations against error",
         "Sweeps over all constraints, of every kind, that a step takes; settings that hold, coloured.",
-        legend() + &sections::iterations(study),
+        legend() + &sections::iterations(records),
     );
     let cases = match matrix {
         Some(found) => matrix::matrix(found),
@@ -190,7 +196,7 @@ fn page(study: &Study, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]
     text + "</body>\n</html>\n"
 }
 
-fn machine(study: &Study) -> String {
+fn machine(study: &StudyFile) -> String {
     let e = &study.environment;
     let rows = [
         ("processor", format!("{}, {} in use", e.cpu, e.processors)),
@@ -256,8 +262,6 @@ fn command(settings: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::report::environment::Environment;
-    use crate::lab::report::export;
     use crate::lab::scenes::tolerance::Tolerances;
     use crate::lab::study::record::tests::{failed, fell, record};
     use crate::lab::study::{Record, StudyPlan, TruthError, mark_fronts};
@@ -284,9 +288,8 @@ mod tests {
         records
     }
 
-    fn read(records: &[Record]) -> Study {
-        let bytes = export::json(&Environment::current(), &StudyPlan::quick(), records).unwrap();
-        serde_json::from_slice(&bytes).unwrap()
+    fn read(records: &[Record]) -> StudyFile {
+        StudyFile::new(&StudyPlan::quick(), records.to_vec(), vec!["arch".into()])
     }
 
     /// Every element that is opened is closed, in order; cells and rows may close themselves.
@@ -315,6 +318,7 @@ mod tests {
         let study = read(&records());
         let page = page(&study, None, &[]);
         for part in [
+            "PARTIAL: without arch",
             "ranks first: it is good enough on",
             "fell at step 100",
             "blew up at step 7",
@@ -362,12 +366,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_study_is_refused_by_name() {
+    fn what_is_no_matrix_is_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(write(folder.path()).unwrap_err().to_string().contains("study.json"));
-        std::fs::write(folder.path().join("study.json"), "{\"records\": 3}").unwrap();
-        let message = write(folder.path()).unwrap_err().to_string();
-        assert!(message.contains("study.json") && !message.contains('\n'), "{message}");
+        std::fs::write(folder.path().join("verify.json"), "{\"cases\": 3}").unwrap();
+        let message = write(folder.path(), &read(&records())).unwrap_err().to_string();
+        assert!(message.contains("verify.json") && !message.contains('\n'), "{message}");
     }
 
     #[test]

@@ -3,12 +3,14 @@
 
 use super::panel::{Frame, Labels, Panel, legend};
 use super::scale::{Scale, number};
-use super::study::{Entry, Study, fastest};
+use super::setting::{Setting, fastest, scenes};
 use crate::lab::report::style::Style;
+use crate::lab::study::Record;
+use crate::lab::study::curve::solvers_of;
 
 /// A setting on a scene.
 struct Dot<'a> {
-    entry: &'a Entry,
+    entry: &'a Record,
     /// Time in times that of the fastest that holds there.
     slower: f64,
     /// Which of the solver's budgets.
@@ -20,16 +22,16 @@ const LEAST: f64 = 1e-3;
 /// Errors this much beyond it are as good as any.
 const MOST: f64 = 1e4;
 
-fn dots(study: &Study) -> Vec<Dot<'_>> {
+fn dots(records: &[Record]) -> Vec<Dot<'_>> {
     let mut dots = Vec::new();
-    for scene in study.scenes() {
-        let entries: Vec<&Entry> = fastest(scene).into_iter().filter(|e| !e.is_natural()).collect();
+    for scene in scenes(records) {
+        let entries: Vec<&Record> = fastest(scene).into_iter().filter(|e| !e.is_natural()).collect();
         let holding = entries.iter().filter(|e| e.broke().is_none());
         let least = holding.filter_map(|e| e.time()).fold(f64::INFINITY, f64::min);
         if !least.is_finite() {
             continue;
         }
-        for solver in study.solvers() {
+        for solver in solvers_of(records) {
             let own = entries.iter().filter(|e| e.solver == solver);
             for (budget, entry) in own.enumerate() {
                 dots.extend(entry.time().map(|time| Dot { entry, slower: time / least, budget }));
@@ -44,12 +46,12 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// The plot with its legend.
-pub fn overview(study: &Study) -> String {
-    let dots = dots(study);
+pub fn overview(records: &[Record]) -> String {
+    let dots = dots(records);
     if dots.is_empty() {
         return "<p>No setting holds on any scene.</p>\n".into();
     }
-    let wrong = |e: &Entry| e.excess().map(|x| x.clamp(LEAST, MOST));
+    let wrong = |e: &Record| e.worst().map(|x| x.clamp(LEAST, MOST));
     let x = Scale::log(dots.iter().filter_map(|d| wrong(d.entry)).chain([0.1, 10.0]), "");
     let y = Scale::log(dots.iter().map(|d| d.slower).chain([1.0, 3.0]), "×");
     let frame = Frame {
@@ -68,21 +70,21 @@ pub fn overview(study: &Study) -> String {
     panel.write([left + 10.0, top + 18.0], "note", "within tolerance");
     for dot in &dots {
         let e = dot.entry;
-        let title = format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.setting(), number(dot.slower));
+        let title = format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.words(), number(dot.slower));
         match wrong(e) {
             Some(x) => {
                 let title = format!("{title}, error {} tolerances", number(x));
-                panel.marker(panel.at(x, dot.slower), 2.6, &e.solver, false, true, &title);
+                panel.marker(panel.at(x, dot.slower), 2.6, e.solver, false, true, &title);
             }
             None => {
                 let title = format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its truth".into()));
-                let place = Style::of(&e.solver).marker as usize as f64 / 7.0;
-                panel.marker(panel.in_band(dot.slower, place), 2.6, &e.solver, false, true, &title);
+                let place = Style::of(e.solver).marker as usize as f64 / 7.0;
+                panel.marker(panel.in_band(dot.slower, place), 2.6, e.solver, false, true, &title);
             }
         }
     }
     let (mut labels, mut names) = (Labels::default(), Vec::new());
-    for solver in study.solvers() {
+    for solver in solvers_of(records) {
         let mut line = Vec::new();
         let own: Vec<&Dot> = dots.iter().filter(|d| d.entry.solver == solver).collect();
         for budget in 0..=own.iter().map(|d| d.budget).max().unwrap_or(0) {
@@ -117,5 +119,5 @@ pub fn overview(study: &Study) -> String {
             panel.write(place, "dot-name", &name);
         }
     }
-    legend(&study.solvers()) + &panel.finish()
+    legend(&solvers_of(records)) + &panel.finish()
 }

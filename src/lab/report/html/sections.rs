@@ -2,18 +2,21 @@
 
 use super::panel::{Frame, Panel};
 use super::scale::{Scale, number};
-use super::study::{Axis, Entry, FLOOR, Profile, Study, fastest, standard};
+use super::setting::{Setting, fastest, scenes, standard};
 use crate::engine::clock::Phase;
 use crate::lab::picture::svg::{escaped, px};
 use crate::lab::report::style::Style;
+use crate::lab::study::curve::{ErrorAxis as Axis, solvers_of};
+use crate::lab::study::profile::Profile;
+use crate::lab::study::{Record, answer};
 use crate::lab::units::si;
 
 /// Performance profiles, a panel per error.
-pub fn profiles(profiles: &[Profile]) -> String {
+pub fn profiles(records: &[Record]) -> String {
     let mut text = String::from("<div class=\"panels three\">\n");
-    for profile in profiles.iter().filter(|p| p.scenes > 0) {
+    for profile in Axis::ALL.map(|axis| Profile::of(records, axis)).iter().filter(|p| p.scenes > 0) {
         let most = profile.ratios.iter().flat_map(|(_, r)| r.iter().copied()).fold(2.0, f64::max);
-        let title = format!("{} within tolerance", profile.error);
+        let title = format!("{} within tolerance", profile.axis.name());
         let share = format!("share of {} scenes", profile.scenes);
         let names = ["time, in times that of the fastest", share.as_str()];
         let frame = Frame { size: [420.0, 310.0], title: &title, names, band: false };
@@ -53,21 +56,21 @@ pub fn profiles(profiles: &[Profile]) -> String {
 }
 
 /// Speed-up and occupancy against lane width, a pair of panels per scene.
-pub fn lanes(study: &Study) -> String {
-    let mut widths: Vec<usize> = study.records.iter().filter(|e| !e.is_natural()).map(|e| e.lanes).collect();
+pub fn lanes(records: &[Record]) -> String {
+    let mut widths: Vec<usize> = records.iter().filter(|e| !e.is_natural()).map(|e| e.lanes).collect();
     widths.sort_unstable();
     widths.dedup();
     if widths.len() < 2 {
         return "<p>Only one lane width ran.</p>\n".into();
     }
     let mut text = String::from("<div class=\"panels four\">\n");
-    for scene in study.scenes() {
+    for scene in scenes(records) {
         // The standard budget of each solver.
-        let runs = |solver: &str| -> Vec<&Entry> {
+        let runs = |solver: &'static str| -> Vec<&Record> {
             let Some(chosen) = standard(scene, solver).filter(|e| !e.is_natural()) else { return Vec::new() };
-            scene.iter().filter(|e| e.same_setting(chosen) && e.lap.is_some()).collect()
+            scene.iter().filter(|e| answer::same(e, chosen) && e.lap.is_some()).collect()
         };
-        let all: Vec<&Entry> = study.solvers().into_iter().flat_map(runs).collect();
+        let all: Vec<&Record> = solvers_of(records).into_iter().flat_map(runs).collect();
         let most = all.iter().filter_map(|e| e.speed_up).fold(1.0, f64::max);
         let colors = all.iter().filter_map(|e| e.lap.as_ref()).map(|l| l.load.colors);
         let colors = (colors.clone().min().unwrap_or(0), colors.max().unwrap_or(0));
@@ -83,18 +86,18 @@ pub fn lanes(study: &Study) -> String {
         let mut speed =
             panel([300.0, 250.0], &title, ["lanes", "speed-up over 1 lane"], Scale::linear(most, "×"));
         let mut filled = panel([300.0, 150.0], "", ["lanes", "lanes filled"], Scale::linear(1.0, "%"));
-        for solver in study.solvers() {
+        for solver in solvers_of(records) {
             let runs = runs(solver);
             for (panel, value) in [
-                (&mut speed, (|e: &Entry| e.speed_up) as fn(&Entry) -> Option<f64>),
-                (&mut filled, |e: &Entry| e.lap.as_ref().map(|l| l.load.occupancy)),
+                (&mut speed, (|e: &Record| e.speed_up) as fn(&Record) -> Option<f64>),
+                (&mut filled, |e: &Record| e.lap.as_ref().map(|l| l.load.occupancy)),
             ] {
                 let points = runs.iter().filter_map(|e| Some((e, value(e)?)));
                 let points: Vec<_> = points.map(|(e, v)| (panel.at(e.lanes as f64, v), *e, v)).collect();
                 let line: Vec<[f64; 2]> = points.iter().map(|p| p.0).collect();
                 panel.line(&line, "curve", Style::of(solver).color);
                 for (at, entry, value) in points {
-                    let title = format!("{solver}, {}: {}", entry.setting(), number(value));
+                    let title = format!("{solver}, {}: {}", entry.words(), number(value));
                     panel.marker(at, 3.4, solver, false, false, &title);
                 }
             }
@@ -111,10 +114,10 @@ const PHASES: [&str; Phase::ALL.len()] = [
 ];
 
 /// Time per phase as stacked bars, a plot per scene with a bar per solver.
-pub fn phases(study: &Study) -> String {
+pub fn phases(records: &[Record]) -> String {
     let mut text = String::from("<p class=\"legend\">");
     let used = |k: usize| {
-        study.records.iter().any(|e| e.lap.as_ref().is_some_and(|l| l.phase_ns.get(k).is_some_and(|&t| t > 0.0)))
+        records.iter().any(|e| e.lap.as_ref().is_some_and(|l| l.phase_ns.get(k).is_some_and(|&t| t > 0.0)))
     };
     for (k, phase) in Phase::ALL.iter().enumerate().filter(|p| used(p.0)) {
         text += &format!(
@@ -124,10 +127,10 @@ pub fn phases(study: &Study) -> String {
         );
     }
     text += "</p>\n<div class=\"panels two\">\n";
-    for scene in study.scenes() {
-        let rows: Vec<&Entry> =
-            study.solvers().into_iter().filter_map(|s| standard(scene, s)).filter(|e| e.lap.is_some()).collect();
-        let total = |e: &Entry| e.lap.as_ref().map_or(0.0, |l| l.phase_ns.iter().sum::<f64>());
+    for scene in scenes(records) {
+        let rows: Vec<&Record> =
+            solvers_of(records).into_iter().filter_map(|s| standard(scene, s)).filter(|e| e.lap.is_some()).collect();
+        let total = |e: &Record| e.lap.as_ref().map_or(0.0, |l| l.phase_ns.iter().sum::<f64>());
         let scale = Scale::linear(1e-9 * rows.iter().map(|e| total(e)).fold(0.0, f64::max), "s");
         let (left, right, top, row) = (190.0, 610.0, 26.0, 22.0);
         let bottom = top + row * rows.len() as f64;
@@ -147,14 +150,14 @@ pub fn phases(study: &Study) -> String {
         }
         for (i, entry) in rows.iter().enumerate() {
             let y = top + row * i as f64;
-            let Style { color, marker } = Style::of(&entry.solver);
+            let Style { color, marker } = Style::of(entry.solver);
             let hatched = if entry.broke().is_some() { " ✗" } else { "" };
             text += &format!(
                 "<path d=\"{}\" fill=\"{color}\"/><text class=\"row\" x=\"22\" y=\"{}\">{} <tspan class=\"soft\">\
                  {}{hatched}</tspan></text>\n",
                 marker.path([11.0, y + 0.5 * row], 4.5),
                 px(y + 0.5 * row + 4.0),
-                escaped(&entry.solver),
+                escaped(entry.solver),
                 escaped(&entry.label()),
             );
             let mut begun = 0.0;
@@ -170,7 +173,7 @@ pub fn phases(study: &Study) -> String {
                         px(to - from),
                         px(row - 6.0),
                         PHASES.get(k).unwrap_or(&"#777777"),
-                        escaped(&entry.solver),
+                        escaped(entry.solver),
                         Phase::ALL.get(k).map_or("", |p| p.name()),
                         si(1e-9 * ns, "s"),
                     );
@@ -184,16 +187,16 @@ pub fn phases(study: &Study) -> String {
 }
 
 /// Sweeps over the constraints against two errors, scene by scene.
-pub fn iterations(study: &Study) -> String {
+pub fn iterations(records: &[Record]) -> String {
     let mut text = String::from("<div class=\"panels four\">\n");
-    for scene in study.scenes() {
+    for scene in scenes(records) {
         for (axis, name, unit) in
-            [(Axis::Penetration, "deepest penetration", "m"), (Axis::Residual, "contact-law residual", "")]
+            [(Axis::Penetration, "deepest penetration", "m"), (Axis::Law, "contact-law residual", "")]
         {
-            let held: Vec<(&Entry, f64, f64)> = fastest(scene)
+            let held: Vec<(&Record, f64, f64)> = fastest(scene)
                 .into_iter()
                 .filter(|e| e.broke().is_none() && !e.is_natural())
-                .filter_map(|e| Some((e, e.lap.as_ref()?.load.sweeps.max(0.5), e.error(axis)?.max(FLOOR))))
+                .filter_map(|e| Some((e, e.lap.as_ref()?.load.sweeps.max(0.5), e.drawn(axis)?)))
                 .collect();
             let frame = Frame {
                 size: [300.0, 230.0],
@@ -203,7 +206,7 @@ pub fn iterations(study: &Study) -> String {
             };
             let x = Scale::log(held.iter().map(|h| h.1), "");
             let mut panel = Panel::new(&frame, x, Scale::log(held.iter().map(|h| h.2), unit));
-            for solver in study.solvers() {
+            for solver in solvers_of(records) {
                 let own = || held.iter().filter(|h| h.0.solver == solver);
                 let line: Vec<[f64; 2]> = own().map(|h| panel.at(h.1, h.2)).collect();
                 panel.line(&line, "curve", Style::of(solver).color);
