@@ -97,8 +97,7 @@ fn key(phase: Phase) -> String {
 fn phase() -> impl TypedValueParser<Value = Option<Phase>> {
     let names = Phase::ALL.into_iter().map(|p| PossibleValue::new(key(p)));
     let all = [PossibleValue::new("all")];
-    PossibleValuesParser::new(names.chain(all))
-        .map(|name| Phase::ALL.into_iter().find(|&p| key(p) == name))
+    PossibleValuesParser::new(names.chain(all)).map(|name| Phase::ALL.into_iter().find(|&p| key(p) == name))
 }
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
@@ -135,8 +134,12 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
         && missing(&phase)
     {
         let has = names(probes.iter().map(|p| p.phase));
-        let message =
-            format!("'{}' is none of what {} does on {}: {has}", key(*phase), args.setting.solver.name, scene.name);
+        let message = format!(
+            "'{}' is none of what {} does on {}: {has}",
+            key(*phase),
+            args.setting.solver.name,
+            scene.name
+        );
         return Err(Error::invalid("phase", message));
     }
     let what = if let [phase] = phases.as_slice() { phase.name() } else { "every phase in turn" };

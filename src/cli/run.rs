@@ -101,7 +101,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;
     let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
-    let mut contacts = args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
+    let mut contacts =
+        args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
 
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
@@ -231,7 +232,8 @@ fn everything(world: &World, found: &Found) -> String {
 /// Everything that a run measured, and what was run.
 fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
     let s = &world.settings;
-    let phases: serde_json::Map<String, Value> = found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();
+    let phases: serde_json::Map<String, Value> =
+        found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();
     Ok(json!({
         "environment": Environment::current(),
         "scene": scene.name,

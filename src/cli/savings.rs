@@ -27,8 +27,12 @@ Examples:
   simpulse savings --scenes circle_pile:2000,pyramid:60 --solver pgs --lanes 8")]
 pub struct SavingsArgs {
     /// Scenes, with a size after a colon where they have one, or .json files
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…",
-        default_value = "card_house,pyramid:40,circle_pile:500")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "SCENE,…",
+        default_value = "card_house,pyramid:40,circle_pile:500"
+    )]
     pub scenes: Vec<String>,
     /// Solver
     #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]

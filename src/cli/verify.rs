@@ -155,11 +155,8 @@ fn text(matrix: &Matrix) -> String {
         }
     }
     let others = CASES.len() - matrix.cases.len();
-    let left = if others > 0 {
-        format!("left out: {others} of {} cases\n", CASES.len())
-    } else {
-        String::new()
-    };
+    let left =
+        if others > 0 { format!("left out: {others} of {} cases\n", CASES.len()) } else { String::new() };
     text + &skipped() + &left
 }
 

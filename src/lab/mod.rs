@@ -17,6 +17,7 @@ pub mod converge;
 pub mod error;
 pub mod files;
 pub mod metrics;
+pub mod names;
 pub mod overrides;
 pub mod profile;
 pub mod reference;

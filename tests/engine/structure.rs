@@ -79,7 +79,7 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "overrides"],
+    &["files", "names", "overrides"],
     &["metrics", "reference"],
     &["scenes", "capture"],
     &["verify", "study", "converge"],

@@ -30,9 +30,9 @@ fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
         "minItems" => value.as_array().is_none_or(|a| a.len() as f64 >= number(key).unwrap()),
         "maxItems" => value.as_array().is_none_or(|a| a.len() as f64 <= number(key).unwrap()),
         "items" => value.as_array().is_none_or(|a| a.iter().all(|item| accepts(root, rule, item))),
-        "required" => value
-            .as_object()
-            .is_none_or(|o| rule.as_array().unwrap().iter().all(|name| o.contains_key(name.as_str().unwrap()))),
+        "required" => value.as_object().is_none_or(|o| {
+            rule.as_array().unwrap().iter().all(|name| o.contains_key(name.as_str().unwrap()))
+        }),
         "properties" => value.as_object().is_none_or(|o| {
             o.iter().all(|(name, item)| rule.get(name).is_none_or(|rule| accepts(root, rule, item)))
         }),
@@ -40,9 +40,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
             let known = &schema["properties"];
             value.as_object().is_none_or(|o| o.keys().all(|name| known.get(name).is_some()))
         }
-        "oneOf" => {
-            rule.as_array().unwrap().iter().filter(|schema| accepts(root, schema, value)).count() == 1
-        }
+        "oneOf" => rule.as_array().unwrap().iter().filter(|schema| accepts(root, schema, value)).count() == 1,
         other => panic!("a keyword that the test does not know: {other}"),
     })
 }
@@ -92,23 +90,52 @@ fn schema_and_reading_agree_on_every_member() {
     let places = [
         ["/name", "/gravity", "/dt", "/steps", "/bodies"].map(String::from).to_vec(),
         [
-            "type", "position", "angle", "velocity", "angular_velocity", "gravity_scale", "linear_damping",
-            "angular_damping", "group", "shapes",
+            "type",
+            "position",
+            "angle",
+            "velocity",
+            "angular_velocity",
+            "gravity_scale",
+            "linear_damping",
+            "angular_damping",
+            "group",
+            "shapes",
         ]
         .map(|name| format!("{body}/{name}"))
         .to_vec(),
         ["circle", "circle/radius", "circle/center", "density", "friction", "restitution"]
             .map(|name| shape(0, name))
             .to_vec(),
-        ["box/half", "box/half/0", "box/angle", "box/radius", "box/center"].map(|name| shape(1, name)).to_vec(),
+        ["box/half", "box/half/0", "box/angle", "box/radius", "box/center"]
+            .map(|name| shape(1, name))
+            .to_vec(),
         ["polygon/points", "polygon/points/0", "polygon/radius"].map(|name| shape(2, name)).to_vec(),
         ["capsule/a", "capsule/b", "capsule/radius"].map(|name| shape(3, name)).to_vec(),
     ]
     .concat();
     let values = [
-        json!(null), json!(true), json!("x"), json!(" "), json!("static"), json!(-1), json!(0), json!(1), json!(1.5),
-        json!(1e-3), json!(1e10), json!(1e39), json!(-1e39), json!([]), json!([1]), json!([1, 2]), json!([1, 2, 3]),
-        json!([1, "x"]), json!([[0, 0], [1, 0], [0, 1]]), json!([[0, 0], [1, 0]]), json!({}), json!({ "radius": 1 }),
+        json!(null),
+        json!(true),
+        json!("x"),
+        json!(" "),
+        json!("static"),
+        json!(-1),
+        json!(0),
+        json!(1),
+        json!(1.5),
+        json!(1e-3),
+        json!(1e10),
+        json!(1e39),
+        json!(-1e39),
+        json!([]),
+        json!([1]),
+        json!([1, 2]),
+        json!([1, 2, 3]),
+        json!([1, "x"]),
+        json!([[0, 0], [1, 0], [0, 1]]),
+        json!([[0, 0], [1, 0]]),
+        json!({}),
+        json!({ "radius": 1 }),
         json!({ "radius": 1, "x": 1 }),
     ];
     let (mut accepted, mut refused) = (0, 0);
@@ -148,7 +175,11 @@ fn two_geometries_or_none_are_refused_by_both() {
 #[test]
 fn defaults_of_the_schema_are_those_of_reading() {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
-    let read = Scene::from_json(r#"{"name":"x","bodies":[{"type":"static","position":[0,0],"shapes":[{"circle":{"radius":1}}]}]}"#, Path::new("x")).unwrap();
+    let read = Scene::from_json(
+        r#"{"name":"x","bodies":[{"type":"static","position":[0,0],"shapes":[{"circle":{"radius":1}}]}]}"#,
+        Path::new("x"),
+    )
+    .unwrap();
     let (body, shape) = (&read.bodies[0], &read.bodies[0].shapes[0]);
     for (place, value) in [
         ("/properties/gravity", json!(read.gravity)),
@@ -161,7 +192,8 @@ fn defaults_of_the_schema_are_those_of_reading() {
         ("/$defs/shape/properties/restitution", json!(shape.restitution)),
     ] {
         let given = &schema.pointer(place).unwrap()["default"];
-        let numbers = |v: &Value| v.as_array().map_or(vec![v.as_f64()], |a| a.iter().map(Value::as_f64).collect());
+        let numbers =
+            |v: &Value| v.as_array().map_or(vec![v.as_f64()], |a| a.iter().map(Value::as_f64).collect());
         assert_eq!(numbers(given), numbers(&value), "{place}");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::replay::{Sequence, Start};
 use super::{Curve, Reached, Report, TOLERANCES};
+use crate::engine::lanes::native_width;
 
 /// Places in [`TOLERANCES`] of the two that are told.
 const TOLD: [usize; 2] = [1, 3];
@@ -14,7 +15,9 @@ pub fn text(report: &Report) -> String {
         .iter()
         .filter(|c| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part)
         .collect();
-    let mut text = "In coloured order, against the rigid contact law:\n".to_string();
+    let emulated = if report.lanes > native_width().lanes() { ", emulated" } else { "" };
+    let mut text =
+        format!("In coloured order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
     for at in TOLD {
         for start in [Start::Cold, Start::Warm] {
             text += &sentence(&own, at, start);
@@ -30,7 +33,10 @@ pub fn text(report: &Report) -> String {
             format!("{} {}", c.solver, sweeps.join(", "))
         });
         let list: Vec<String> = each.collect();
-        text += &format!("Sweeps to the law that a solver itself sets, where that is another one, cold: {}.\n", list.join("; "));
+        text += &format!(
+            "Sweeps to the law that a solver itself sets, where that is another one, cold: {}.\n",
+            list.join("; ")
+        );
     }
     text + &exact(report, &own)
 }
@@ -45,8 +51,7 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
     let mut reached: Vec<(usize, &str)> =
         own().filter_map(|c| Some((to(c, &c.rigid, at)?, c.solver.as_str()))).collect();
     reached.sort();
-    let never: Vec<&str> =
-        own().filter(|c| c.rigid.first[at].is_none()).map(|c| c.solver.as_str()).collect();
+    let never: Vec<&str> = own().filter(|c| c.rigid.first[at].is_none()).map(|c| c.solver.as_str()).collect();
     if own().next().is_none() {
         return String::new();
     }
@@ -81,7 +86,7 @@ fn exact(report: &Report, curves: &[&Curve]) -> String {
         return "Gauss-Seidel has no rate here: it comes to no solution, or at once.\n".into();
     };
     let sweeps = |tolerance: f64| (tolerance.ln() / exact.ln()).ceil();
-    let mut text = format!("Gauss-Seidel's exact rate is {exact:.4} per sweep");
+    let mut text = format!("Gauss-Seidel's exact rate, that of its slowest error, is {exact:.4} per sweep");
     if exact < 1.0 {
         text += &format!(", {:.0} sweeps for 1e-2 and {:.0} for 1e-4", sweeps(1e-2), sweeps(1e-4));
     }

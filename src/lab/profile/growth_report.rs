@@ -75,7 +75,10 @@ pub(super) fn sentence(verdict: &Verdict) -> String {
         ),
         Change::Logarithm => "latency- or compute-bound, within n log n".to_string(),
         Change::Faster => {
-            format!("grows faster than n log n and bandwidth explain, which account for {}", digits(whole.memory))
+            format!(
+                "grows faster than n log n and bandwidth explain, which account for {}",
+                digits(whole.memory)
+            )
         }
     };
     let mut text = format!(

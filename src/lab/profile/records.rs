@@ -29,9 +29,7 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
             "limit": Limit::of(p, report.multiply_adds).map(Limit::word),
         })
     };
-    let level = |(level, b): &(super::ceilings::Level, super::Bandwidth)| {
-        json!({ "level": level.name, "bytes": level.bytes, "read_gb_per_s": b.read, "update_gb_per_s": b.update })
-    };
+    let level = |(level, b): &(super::ceilings::Level, super::Bandwidth)| json!({ "level": level.name, "bytes": level.bytes, "read_gb_per_s": b.read, "update_gb_per_s": b.update });
     json!({
         "environment": Environment::current(),
         "scene": report.scene,

@@ -23,8 +23,7 @@ slower: how much longer its steps take, over paired blocks; tie: no difference c
 
 /// The answer of a study, from its records alone; `steps` if runs were cut to so many.
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
-    let scenes: Vec<Answer> =
-        records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
+    let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let mut text = head(records, environment, scenes.len());
     if let Some(steps) = steps {
         text += &format!("Runs end after {steps} steps: what fails later is not seen.\n");
@@ -68,8 +67,17 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
 /// A line per scene.
 fn cheapest(scenes: &[Answer]) -> String {
     let mut rows = table(&[
-        "scene", "solver", "budget", "lanes", "µs/step", "±", "penetration", "residual", "reference",
-        "runner-up", "slower",
+        "scene",
+        "solver",
+        "budget",
+        "lanes",
+        "µs/step",
+        "±",
+        "penetration",
+        "residual",
+        "reference",
+        "runner-up",
+        "slower",
     ]);
     let mut notes = String::new();
     for answer in scenes {
@@ -101,9 +109,7 @@ fn setting(record: &Record) -> [String; 8] {
     let time = |ns: fn(&crate::lab::study::interleave::Sample) -> f64| {
         record.lap.as_ref().map_or("–".to_string(), |lap| digits(ns(lap) / 1e3))
     };
-    let error = |axis: ErrorAxis, show: &dyn Fn(f64) -> String| {
-        axis.of(record).map_or("–".to_string(), show)
-    };
+    let error = |axis: ErrorAxis, show: &dyn Fn(f64) -> String| axis.of(record).map_or("–".to_string(), show);
     [
         record.solver.to_string(),
         record.budget_text.clone(),
@@ -203,10 +209,7 @@ mod tests {
             let line = text.lines().find(|l| l.starts_with("stack:2")).unwrap();
             line.split_whitespace().collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(
-            line(&records),
-            "stack:2 pgs 2 sub 8 41.0 0.00 900 µm 0 – no other solver –"
-        );
+        assert_eq!(line(&records), "stack:2 pgs 2 sub 8 41.0 0.00 900 µm 0 – no other solver –");
         let with = |time| [&records[..], &[other(time)]].concat();
         assert!(line(&with(61.5)).ends_with("soft_step, 4 sub 50 %"), "{}", line(&with(61.5)));
         assert!(line(&with(41.8)).ends_with(" soft_step tie"), "{}", line(&with(41.8)));
@@ -217,7 +220,9 @@ mod tests {
     fn a_scene_without_an_answer_says_why() {
         let over = page(&[record(1, 1, 20.0, 14e-3)]);
         assert!(
-            over.contains("stack:2: none is good enough; nearest is pgs, 1 sub, 1 lanes, 20.0 µs: 1.40 times its"),
+            over.contains(
+                "stack:2: none is good enough; nearest is pgs, 1 sub, 1 lanes, 20.0 µs: 1.40 times its"
+            ),
             "{over}"
         );
         let text = page(&[failed(1), fell(8, 1, 1.0, 0.0)]);

@@ -60,8 +60,16 @@ pub static STUDY: Sheet = Sheet {
         column("penetration_mean", "m", "mean penetration of contact points, open ones counted as 0"),
         column("penetration_rms", "m", "root mean square of the same"),
         column("penetration_p99", "m", "what 99 % of contact points do not exceed"),
-        column("penetration_relative", "1", "greatest penetration over half the width of the thinnest dynamic shape"),
-        column("penetration_excess", "m", "greatest penetration of the last second beyond what soft contacts give way at rest"),
+        column(
+            "penetration_relative",
+            "1",
+            "greatest penetration over half the width of the thinnest dynamic shape",
+        ),
+        column(
+            "penetration_excess",
+            "m",
+            "greatest penetration of the last second beyond what soft contacts give way at rest",
+        ),
         column("soft_floor", "m", "the most that soft contacts give way under the last second's load"),
         column("law_rms", "1", "residual of the rigid contact law, rms, over weight of the scene × step"),
         column("law_rms_body", "1", "the same over mean weight of a body × step"),
@@ -99,7 +107,11 @@ pub static STUDY: Sheet = Sheet {
         column("bits_equal", "", "whether this width ended in the bits of the error run"),
         column("front_penetration", "", "whether on the Pareto front of time against penetration"),
         column("front_law", "", "whether on the Pareto front of time against the contact-law residual"),
-        column("front_truth", "", "whether on the Pareto front of time against the distance to the reference value"),
+        column(
+            "front_truth",
+            "",
+            "whether on the Pareto front of time against the distance to the reference value",
+        ),
         column("mark", "", "fell, slid, tunnelled or blew up, where the scene does not hold"),
         column("mark_step", "", "step at which it did"),
         column("tolerance_penetration", "m", "tolerance of penetration_max"),
@@ -128,7 +140,11 @@ pub static CONVERGE: Sheet = Sheet {
         column("time_ns", "ns", "time of these iterations, set-up excluded"),
         column("rigid_residual", "1", "residual of the rigid contact law, in the problem's unit of impulse"),
         column("own_residual", "1", "residual of the law that the solver itself sets"),
-        column("velocity_error", "1", "distance of the velocities from the reference, in the mass norm, relative"),
+        column(
+            "velocity_error",
+            "1",
+            "distance of the velocities from the reference, in the mass norm, relative",
+        ),
     ],
 };
 
@@ -208,7 +224,9 @@ impl Sheet {
         let is_any = |c: &Column| c.name.starts_with('<');
         let suffix = |c: &Column| c.name.split_once('>').map_or("", |(_, suffix)| suffix);
         let of_any = |name: &str| {
-            self.columns.iter().any(|c| is_any(c) && name.len() > suffix(c).len() && name.ends_with(suffix(c)))
+            self.columns
+                .iter()
+                .any(|c| is_any(c) && name.len() > suffix(c).len() && name.ends_with(suffix(c)))
         };
         let plain: Vec<&str> = self.columns.iter().filter(|c| !is_any(c)).map(|c| c.name).collect();
         let given: Vec<&str> = header.iter().copied().filter(|n| plain.contains(n) || !of_any(n)).collect();

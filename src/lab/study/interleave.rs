@@ -32,7 +32,7 @@ const LEAST_BLOCKS: u32 = 12;
 const LEAST_BLOCK: u32 = 3;
 
 /// Times and counts of one setting.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Sample {
     /// Median over the blocks (ns per step); a block's time is the median of its repeats.
     pub median_ns: f64,
@@ -49,7 +49,7 @@ pub struct Sample {
     pub load: Load,
     /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
     /// the setting took no part.
-    #[serde(skip)]
+    #[serde(with = "super::blocks")]
     pub blocks_ns: Vec<Vec<f64>>,
     /// Hash of the final state.
     #[serde(skip)]
@@ -57,7 +57,7 @@ pub struct Sample {
 }
 
 /// What a step has to do, averaged over a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Load {
     /// Contacts with at least one point.
     pub contacts: f64,

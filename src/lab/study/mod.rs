@@ -6,6 +6,7 @@
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
 pub mod answer;
+mod blocks;
 pub mod budget;
 pub mod compare;
 pub mod curve;

@@ -33,14 +33,8 @@ pub const CLOSE: f64 = 1.5;
 /// The solvers by their score, the best first; equal ones by name.
 pub fn ranking(records: &[Record]) -> Vec<Standing> {
     let solvers = solvers_of(records);
-    let standing = |&solver: &&'static str| Standing {
-        solver,
-        score: 0.0,
-        holds: 0,
-        good: 0,
-        fastest: 0,
-        close: 0,
-    };
+    let standing =
+        |&solver: &&'static str| Standing { solver, score: 0.0, holds: 0, good: 0, fastest: 0, close: 0 };
     let mut all: Vec<Standing> = solvers.iter().map(standing).collect();
     let mut scenes = 0;
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
