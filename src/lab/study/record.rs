@@ -32,6 +32,7 @@ pub struct Record {
     /// The same, for tables.
     pub budget_text: String,
     /// Times and counts; none if the run failed.
+    #[serde(rename = "timing")]
     pub lap: Option<Sample>,
     /// Times faster than one coloured lane; none without that run.
     pub speed_up: Option<f64>,
