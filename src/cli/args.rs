@@ -2,11 +2,14 @@
 
 use super::advise::AdviseArgs;
 use super::capture::CaptureArgs;
+use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
+use super::merge::MergeArgs;
 use super::profile::ProfileArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
+use super::study::Shard;
 use super::values::{self, Solvers};
 use super::verify::VerifyArgs;
 use crate::engine::lanes::LaneWidth;
@@ -69,6 +72,8 @@ pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
+    Compare(CompareArgs),
+    Merge(MergeArgs),
     Run(RunArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),
@@ -158,6 +163,9 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
+    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
     /// Folder for the results
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,

@@ -1,6 +1,6 @@
 //! `simpulse capture`: freezes the contact problem of one step.
 
-use super::output::{print, print_json, value};
+use super::output::{print_beside, print_json, value};
 use super::progress::Bar;
 use super::values::{SettingArgs, scene_help};
 use crate::engine::world::{Settings, World};
@@ -114,5 +114,5 @@ pub fn run(args: &CaptureArgs) -> Result<ExitCode, Error> {
         (None, Some(why)) => format!("written without a reference: {why}\n"),
         (None, None) => String::new(),
     };
-    print(&text)
+    print_beside([args.out.as_path()], &text)
 }

@@ -1,7 +1,7 @@
 //! `simpulse converge`: every solver on exactly the same contact problem.
 
 use super::capture::freeze;
-use super::output::print;
+use super::output::{note, print};
 use super::progress::Bar;
 use super::values::{self, Lanes, SettingArgs, Solvers};
 use crate::lab::converge::{Options, converge_watched, plot, summary, table};
@@ -93,7 +93,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     } else {
         let (frozen, why_not) = freeze(&args.problem, args.step, &SettingArgs::standard()?)?;
         if let Some(why) = why_not {
-            eprintln!("{why}");
+            note(&format!("{why}\n"));
         }
         frozen
     };

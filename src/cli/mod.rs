@@ -1,17 +1,22 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met.
+//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
+//! that cannot be met, 130 a signal.
 
 pub mod advise;
 pub mod args;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod growth;
+pub mod interrupt;
+pub mod merge;
 pub mod output;
 pub mod profile;
 pub mod progress;
 pub mod run;
 pub mod savings;
+pub mod study;
 pub mod values;
 pub mod verify;
 
@@ -21,20 +26,19 @@ use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
-use crate::lab::report::environment::Environment;
-use crate::lab::report::{self, export};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{CATALOG, SCHEMA};
-use crate::lab::study::{self, budget, open_scene};
-use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs, StudyArgs};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
 use clap::{CommandFactory, Parser};
-use output::{print, print_json};
-use progress::Bar;
+use output::{note, print, print_json};
 use serde_json::{Value, json};
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 /// Parses the command line, runs the command, reports; see the [module](self) for exit codes.
 pub fn main() -> ExitCode {
+    interrupt::install();
     let result = match Cli::try_parse() {
         Ok(cli) => execute(cli),
         // Help and version are answers; clap's advice on the rest goes on one line.
@@ -43,14 +47,16 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             return ExitCode::from(2);
         }
     };
     match result {
         Ok(code) => code,
+        // A reader that has left has seen what it wanted.
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             ExitCode::from(2)
         }
     }
@@ -58,8 +64,10 @@ pub fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => study(&cli.study),
-        Some(Command::Study(args)) => study(&args),
+        None => study::run(&cli.study),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
@@ -82,29 +90,6 @@ fn one_line(message: &str) -> String {
     let message = message.split("\nUsage:").next().unwrap_or(message);
     let message = message.split("\nFor more information").next().unwrap_or(message);
     message.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
-    let plan = args.plan()?;
-    plan.check()?;
-    // Before the long wait, not after it.
-    crate::lab::files::prepare_folder(&args.out)?;
-    let bar = Bar::new();
-    let records = study::run(&plan, &|p| bar.show(p.done, p.total, p.what))?;
-    drop(bar);
-    let paths = report::write_study(&args.out, &plan, &records)?;
-    let environment = Environment::current();
-    if args.json {
-        return print(&String::from_utf8_lossy(&export::json(&environment, &plan, &records)?));
-    }
-    let names: Vec<String> =
-        paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
-    let mut text = report::answer::text(&records, &environment, plan.steps);
-    text += &format!("\nwrote {} in {}\n", names.join(", "), args.out.display());
-    if args.verbose {
-        text += &format!("\n{}", report::tables(&records));
-    }
-    print(&text)
 }
 
 fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
@@ -133,7 +118,7 @@ fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
 }
 
 fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
-    let is_default = |v: &Variant| study::DEFAULT_SOLVERS.contains(&v.name);
+    let is_default = |v: &Variant| DEFAULT_SOLVERS.contains(&v.name);
     if args.json {
         let entry = |v: &&'static Variant| {
             json!({

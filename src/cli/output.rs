@@ -1,16 +1,34 @@
-//! Text and JSON to standard output.
+//! What is printed: text and JSON to standard output, notes to standard error. A reader that has
+//! left (`| head -1`) is not an error.
 
 use crate::lab::error::Error;
+use crate::lab::files::is_standard_output;
 use serde_json::Value;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
-/// To standard output; a reader that has left is not an error.
+/// An answer, to standard output.
 pub fn print(text: &str) -> Result<ExitCode, Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+/// An answer beside files: to standard error where one of them goes to standard output.
+pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -> Result<ExitCode, Error> {
+    if files.into_iter().any(is_standard_output) {
+        note(text);
+        return Ok(ExitCode::SUCCESS);
+    }
+    print(text)
+}
+
+/// What happens, and errors, to standard error; nobody need read it.
+pub fn note(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// The same as JSON. What is not finite is a word there: [`finite`].

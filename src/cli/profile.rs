@@ -1,6 +1,6 @@
 //! `simpulse profile`: one phase of a step, again and again.
 
-use super::output::{print, print_json};
+use super::output::{note, print, print_json};
 use super::settled;
 use super::values::{Lanes, SettingArgs, scene_help};
 use crate::engine::clock::Phase;
@@ -137,7 +137,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     let scene = open_scene(&args.scene, args.seed, None, None)?.scene;
     // Before the long wait, not after it.
     let file = args.roofline.as_deref().map(Pending::new).transpose()?;
-    eprintln!("settling {}: {} steps", scene.name, args.settle);
+    note(&format!("settling {}: {} steps\n", scene.name, args.settle));
     let mut world = scene.build(settings)?;
     let errors = settled(&mut world, args.settle, OBSERVED_STEPS)?;
     let mut frozen = world.hold();
@@ -157,7 +157,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     }
     let what = if let [phase] = phases.as_slice() { phase.name() } else { "every phase in turn" };
     let rest = if args.no_ceilings { "nothing else" } else { "the machine's ceilings between" };
-    eprintln!("repeating {what} for {} s, {rest} (process {})", args.seconds, std::process::id());
+    note(&format!("repeating {what} for {} s, {rest} (process {})\n", args.seconds, std::process::id()));
     let options = Options { phases, seconds: args.seconds, ceilings: !args.no_ceilings };
     let report = profile(&mut frozen, &probes, &scene.name, &options);
     let json = args.json.then(|| records::json(&report, errors.as_ref()));

@@ -1,13 +1,13 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and what happened as CSV.
 
-use super::output::{print, print_json, value};
+use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
 use super::values::{self, SettingArgs, scene_help};
 use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
+use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
@@ -94,8 +94,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
         return Err(Error::invalid("every", "needs --state or --contacts"));
     }
-    if args.state.is_some() && args.state == args.contacts {
-        return Err(Error::invalid("contacts", "is the same file as --state"));
+    if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
+        && same_file(state, contacts)
+    {
+        let message = format!("'{}' is the same file as --state; give another name", contacts.display());
+        return Err(Error::invalid("--contacts", message));
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
@@ -110,7 +113,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let mut times = Times::default();
     let bar = Bar::new();
     let diverged = |failure: Failure| {
-        eprintln!("failed: {} {failure}; nothing written", args.scene);
+        note(&format!("failed: {} {failure}; nothing written\n", args.scene));
         Ok(ExitCode::FAILURE)
     };
     for step in 1..=scene.steps {
@@ -155,7 +158,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let mut text = head(&world, scene);
     text += &if args.all { everything(&world, &found) } else { found.figures() };
-    print(&(text + &written))
+    let files = [&args.state, &args.contacts].into_iter().flatten();
+    print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
 fn settings(args: &RunArgs) -> Result<Settings, Error> {

@@ -86,6 +86,18 @@ pub(in crate::lab) fn plain(text: &str) -> String {
     format!("{head} … {left_out} characters … {tail}")
 }
 
+impl Error {
+    /// The same about a value inside `place`; other errors know where they are.
+    pub(in crate::lab) fn within(self, place: &str) -> Self {
+        match self {
+            Error::Invalid { place: inner, message } => {
+                Error::Invalid { place: format!("{place}.{inner}"), message }
+            }
+            other => other,
+        }
+    }
+}
+
 impl From<crate::engine::error::Error> for Error {
     fn from(error: crate::engine::error::Error) -> Self {
         use crate::engine::error::Error as Engine;

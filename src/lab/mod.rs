@@ -13,11 +13,12 @@
 
 pub mod advise;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod error;
 pub mod files;
+pub mod interned;
 pub mod metrics;
-pub mod names;
 pub mod overrides;
 pub mod profile;
 pub mod reference;

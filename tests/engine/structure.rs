@@ -79,12 +79,12 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "names", "overrides"],
+    &["files", "interned", "overrides"],
     &["metrics", "reference"],
     &["scenes", "capture"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile"],
+    &["profile", "compare"],
 ];
 
 #[test]

@@ -16,7 +16,7 @@ use super::restitution;
 use super::rules::{Rigid, Rule};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::System;
-use crate::engine::clock::{Clock, Phase};
+use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
 use crate::engine::params::{Budget, Parameters};
@@ -69,6 +69,8 @@ pub struct StepInput {
     pub h: f32,
     /// The solver's own parameters.
     pub parameters: Parameters,
+    /// Which phases run.
+    pub phases: PhaseFilter,
     /// Sum impulses into [`Contact::step_impulse`].
     pub record_impulses: bool,
     /// Points of all contacts, to count rows by.
@@ -103,7 +105,7 @@ impl<'a> Passes<'a> {
     ) -> Self {
         let mut passes = Passes { work, contacts, clock, input, width, count: WorkCount::default() };
         // A phase that is repeated finds the records, and the check, of the step before it.
-        if !passes.clock.skips(Phase::Prepare) {
+        if passes.input.phases.runs(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
                 batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
@@ -149,7 +151,7 @@ impl<'a> Passes<'a> {
 
     /// Sets all accumulated impulses to zero, for solvers without warm starting.
     pub fn forget_impulses(&mut self) {
-        if self.clock.skips(Phase::Prepare) {
+        if !self.input.phases.runs(Phase::Prepare) {
             return;
         }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
@@ -194,7 +196,7 @@ impl<'a> Passes<'a> {
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
     pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
@@ -215,7 +217,7 @@ impl<'a> Passes<'a> {
     /// does not while another phase is repeated alone. What solves rows is counted by
     /// [`Self::count_sweep`].
     pub fn run(&mut self, phase: Phase, pass: &dyn AnyPass) -> bool {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return false;
         }
         self.over_batches(pass);
@@ -251,7 +253,7 @@ impl<'a> Passes<'a> {
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
-        if self.input.features.restitution && !self.clock.skips(Phase::Restitution) {
+        if self.input.features.restitution && self.input.phases.runs(Phase::Restitution) {
             self.over_batches(&restitution::Track);
             if substep + 1 == self.input.budget.substeps {
                 self.over_batches(&restitution::Apply { h: self.input.h });
@@ -259,7 +261,7 @@ impl<'a> Passes<'a> {
             }
             self.clock.lap(Phase::Restitution);
         }
-        if self.input.record_impulses && !self.clock.skips(Phase::Store) {
+        if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
                 let width = batches.width();
@@ -280,7 +282,7 @@ impl<'a> Passes<'a> {
 
     /// Writes accumulated impulses back to the contacts; returns what was done.
     pub fn finish(mut self) -> WorkCount {
-        if !self.clock.skips(Phase::Store) {
+        if self.input.phases.runs(Phase::Store) {
             if self.input.features.restitution {
                 self.over_batches(&restitution::Forget);
             }
@@ -300,7 +302,7 @@ impl<'a> Passes<'a> {
     }
 
     fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Workspace)) {
-        if !self.clock.skips(phase) {
+        if self.input.phases.runs(phase) {
             pass(self.work);
             self.clock.lap(phase);
         }
@@ -308,7 +310,7 @@ impl<'a> Passes<'a> {
 
     /// Coloured batches at the width of the step, then serial ones at one lane.
     fn over_batches(&mut self, pass: &dyn AnyPass) {
-        let width = PassWidth { width: self.width, counted: self.clock.counts() };
+        let width = PassWidth { width: self.width, counted: self.input.phases.counted };
         let serial = PassWidth { width: LaneWidth::W1, counted: false };
         let Workspace { rows, sums, motion, lanes, serial: one, lane_bounces, serial_bounces, .. } =
             &mut *self.work;

@@ -45,7 +45,7 @@ use state::BodyState;
 use violation::Violation;
 
 /// The errors of a run. All are finite, and zero where there is nothing to measure; absent is
-/// what was not asked for, or has no meaning.
+/// what was not requested, or has no meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Errors {
     /// Steps observed.

@@ -80,7 +80,7 @@ pub struct PhaseReport {
 }
 
 impl PhaseReport {
-    /// Bytes asked for per nanosecond (GB/s).
+    /// Requested bytes per nanosecond (GB/s).
     pub fn bytes_rate(&self) -> f64 {
         self.traffic.total() / self.pass_ns
     }

@@ -21,10 +21,12 @@ pub mod nnls;
 pub mod problem;
 pub mod rates;
 pub mod residual;
+mod scale;
 pub mod sparse;
 pub mod spectral;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
+mod validate;
 
 pub use problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};

@@ -31,12 +31,12 @@ impl Environment {
             cpu: cpu_model(),
             processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
             compiler: compiler(),
-            architecture: std::env::consts::ARCH.to_string(),
-            system: std::env::consts::OS.to_string(),
+            architecture: std::env::consts::ARCH.into(),
+            system: std::env::consts::OS.into(),
             target_features: target_features(),
             native_lanes: native_lanes(),
             debug_assertions: cfg!(debug_assertions),
-            version: env!("CARGO_PKG_VERSION").to_string(),
+            version: env!("CARGO_PKG_VERSION").into(),
         }
     }
 }
@@ -52,7 +52,7 @@ impl Environment {
             ("neon", "NEON"),
             ("simd128", "WebAssembly SIMD"),
         ];
-        let has = |feature: &str| self.target_features.iter().any(|f| f == feature);
+        let has = |feature: &str| self.target_features.iter().any(|own| own == feature);
         names.into_iter().find(|(feature, _)| has(feature)).map_or("no SIMD", |(_, name)| name)
     }
 }

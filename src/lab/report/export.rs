@@ -1,6 +1,5 @@
 //! The study as `study.csv` and `study.json`.
 
-use super::environment::Environment;
 use super::units::is_emulated;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
@@ -9,7 +8,6 @@ use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// One line of the table file; every number is finite, and what there is not is empty.
 #[derive(serde::Serialize)]
@@ -178,65 +176,13 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// `study.json`: the environment, every setting, and the records.
-pub fn json(environment: &Environment, plan: &StudyPlan, records: &[Record]) -> Result<Vec<u8>, Error> {
-    let failed = |e: serde_json::Error| Error::invalid("study.json", e.to_string());
-    let head = json!({
-        "format": FORMAT,
-        "version": VERSION,
-        "environment": environment,
-        "settings": settings(plan),
-    });
-    let head = serde_json::to_string_pretty(&head).map_err(failed)?;
-    let lines = records.iter().map(|r| serde_json::to_string(r).map_err(failed));
-    let lines = lines.collect::<Result<Vec<_>, _>>()?.join(",\n");
-    // A record a line, as one more member of the head.
-    let head = head.trim_end().trim_end_matches('}').trim_end();
-    Ok(format!("{head},\n  \"records\": [\n{lines}\n]\n}}\n").into_bytes())
-}
-
-/// What `study.json` says that it is.
-const FORMAT: &str = "simpulse-study";
-
-/// Changes when a reader would misunderstand the file.
-const VERSION: u32 = 1;
-
-/// A study as it was written.
-#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
-pub struct Study {
-    /// [`FORMAT`]
-    format: String,
-    /// [`VERSION`]
-    version: u32,
-    /// The machine that it ran on.
-    pub environment: Environment,
-    /// What was chosen.
-    pub settings: Value,
-    /// Scene by scene.
-    pub records: Vec<Record>,
-}
-
-/// Reads `study.json`; `path` only names the text in errors. Everything that tables and pictures are
-/// made from is in it.
-///
-/// Errors: text that is no study, or one of another version.
-pub fn read(text: &str, path: &Path) -> Result<Study, Error> {
-    let failed = |message: String| Error::Format { path: path.into(), message };
-    let study: Study = serde_json::from_str(text).map_err(|e| failed(e.to_string()))?;
-    if (study.format.as_str(), study.version) != (FORMAT, VERSION) {
-        let found = format!("'{}' version {}", study.format, study.version);
-        return Err(failed(format!("is {found}, must be '{FORMAT}' version {VERSION}")));
-    }
-    Ok(study)
-}
-
 /// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
 fn decimal(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// Everything that was chosen, by the caller or by a constant.
-fn settings(plan: &StudyPlan) -> Value {
+pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
     struct Solver {
         name: &'static str,
@@ -289,32 +235,7 @@ fn settings(plan: &StudyPlan) -> Value {
 mod tests {
     use super::*;
     use crate::lab::report::columns::STUDY;
-    use crate::lab::study::TruthError;
-    use crate::lab::study::record::tests::{failed, fell, record};
-
-    #[test]
-    fn a_study_comes_back_as_it_was() {
-        let mut timed = record(8, 1, 1.5, 0.25);
-        let lap = timed.lap.as_mut().unwrap();
-        lap.blocks_ns = vec![vec![1.0, 2.5], vec![3.0, 0.1]];
-        timed.truth = Some(TruthError { quantity: "height", unit: "m", expected: 0.1, error: Some(1e-300) });
-        let records = vec![timed, failed(1), fell(16, 3, 5.0, 0.1)];
-        let (plan, environment) = (StudyPlan::quick(), Environment::current());
-        let text = String::from_utf8(json(&environment, &plan, &records).unwrap()).unwrap();
-        let study = read(&text, Path::new("study.json")).unwrap();
-        assert_eq!((study.environment, &study.records), (environment, &records));
-        assert_eq!(study.settings["steps"], 60);
-        // A block that was not run is told apart from one that took no time.
-        let mut absent = records[0].clone();
-        absent.lap.as_mut().unwrap().blocks_ns = vec![vec![f64::NAN, 0.0]];
-        let bytes = json(&Environment::current(), &plan, &[absent]).unwrap();
-        let study = read(&String::from_utf8(bytes).unwrap(), Path::new("study.json")).unwrap();
-        let blocks = &study.records[0].lap.as_ref().unwrap().blocks_ns[0];
-        assert!(blocks[0].is_nan() && blocks[1] == 0.0);
-        let other = text.replace("\"version\": 1", "\"version\": 2");
-        let message = read(&other, Path::new("old.json")).unwrap_err().to_string();
-        assert!(message.starts_with("old.json: is 'simpulse-study' version 2"), "{message}");
-    }
+    use crate::lab::study::record::tests::record;
 
     #[test]
     fn every_column_is_documented() {

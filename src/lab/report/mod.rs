@@ -8,14 +8,15 @@ pub mod export;
 pub mod plot;
 pub mod profiles;
 pub mod savings;
+pub mod study_file;
 pub mod table;
 pub mod units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::study::{Record, StudyPlan};
-use environment::Environment;
+use crate::lab::study::Record;
 use std::path::{Path, PathBuf};
+use study_file::StudyFile;
 
 /// Everything that a study measured, as tables: per scene, in equal time and to equal error, and the
 /// performance profiles.
@@ -33,12 +34,12 @@ pub fn tables(records: &[Record]) -> String {
 /// `folder`; returns their paths.
 ///
 /// All are made before the first is written.
-pub fn write_study(folder: &Path, plan: &StudyPlan, records: &[Record]) -> Result<Vec<PathBuf>, Error> {
-    let environment = Environment::current();
+pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
+    let records = &study.records;
     let contents = [
         ("tables.txt", tables(records).into_bytes()),
         ("study.csv", export::csv(records)?),
-        ("study.json", export::json(&environment, plan, records)?),
+        ("study.json", study.to_json()?),
         ("speed_vs_error.svg", plot::svg(records)?.into_bytes()),
         ("profiles.svg", profiles::svg(records)?.into_bytes()),
     ];

@@ -5,7 +5,7 @@
 
 use super::format::Scene;
 use crate::engine::params::LINEAR_SLOP;
-use crate::lab::names::{Name, interned};
+use crate::lab::interned::{self, Name};
 
 /// The most that an error may be.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -13,7 +13,7 @@ pub struct Tolerance {
     /// In the unit of the error.
     pub value: f64,
     /// Why this much.
-    #[serde(deserialize_with = "interned")]
+    #[serde(deserialize_with = "interned::read")]
     pub reason: Name,
 }
 

@@ -6,7 +6,6 @@
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
 pub mod answer;
-mod blocks;
 pub mod budget;
 pub mod compare;
 pub mod curve;
@@ -226,10 +225,15 @@ pub struct Outcome {
     pub hash: u64,
 }
 
-/// Runs the plan; one record per scene, solver, budget, order and width, in that order.
+/// Runs the plan; one record per scene, solver, budget, order and width, in that order. `finished` is given the
+/// records of a scene as soon as they are complete.
 ///
 /// Errors: what [`StudyPlan::check`] refuses. A run that diverges is a record, not an error.
-pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Record>, Error> {
+pub fn run(
+    plan: &StudyPlan,
+    progress: &(dyn Fn(Progress) + Sync),
+    finished: &dyn Fn(&[Record]),
+) -> Result<Vec<Record>, Error> {
     plan.check()?;
     let scenes: Vec<(Scene, Tolerances)> = plan
         .scenes
@@ -252,11 +256,13 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
     for (i, (scene, tolerances)) in scenes.iter().enumerate() {
         let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene == i);
         let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
-        records.extend(timed_records(plan, scene, *tolerances, &rows, &tell)?);
-    }
-    mark_fronts(&mut records);
-    if plan.steps.is_some() {
-        leave_out_unseen_truths(&mut records);
+        let mut own = timed_records(plan, scene, *tolerances, &rows, &tell)?;
+        mark_fronts(&mut own);
+        if plan.steps.is_some() {
+            leave_out_unseen_truths(&mut own);
+        }
+        finished(&own);
+        records.extend(own);
     }
     Ok(records)
 }

@@ -5,14 +5,14 @@ use super::interleave::Sample;
 use super::pareto::{self, Point};
 use crate::engine::params::Budget;
 use crate::engine::world::{Divergence, Order};
+use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
-use crate::lab::names::{Name, interned};
 use crate::lab::scenes::Truth;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::Tolerances;
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Record {
     /// Name with size.
     pub scene: String,
@@ -21,7 +21,7 @@ pub struct Record {
     /// Step (s).
     pub dt: f64,
     /// Name of the solver.
-    #[serde(deserialize_with = "interned")]
+    #[serde(deserialize_with = "interned::read")]
     pub solver: Name,
     /// Constraint order.
     pub order: Order,
@@ -32,7 +32,6 @@ pub struct Record {
     /// The same, for tables.
     pub budget_text: String,
     /// Times and counts; none if the run failed.
-    #[serde(rename = "timing")]
     pub lap: Option<Sample>,
     /// Times faster than one coloured lane; none without that run.
     pub speed_up: Option<f64>,
@@ -88,10 +87,10 @@ impl Record {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TruthError {
     /// What is known.
-    #[serde(deserialize_with = "interned")]
+    #[serde(deserialize_with = "interned::read")]
     pub quantity: Name,
     /// Of both numbers.
-    #[serde(deserialize_with = "interned")]
+    #[serde(deserialize_with = "interned::read")]
     pub unit: Name,
     /// The truth.
     pub expected: f64,

@@ -263,9 +263,9 @@ pub(super) fn creep_of_ten(lab: &Lab) -> Result<Finding, Failure> {
     creep(lab, 10)
 }
 
-/// Velocities of five discs after a first step of `effort` times the standard sweeps, with the bodies
+/// Velocities of five discs after a first step of `factor` times the standard sweeps, with the bodies
 /// in 32 orders: the widest spread of any of them (m/s).
-fn order_spread(lab: &Lab, effort: u32) -> Result<f64, Failure> {
+fn order_spread(lab: &Lab, factor: u32) -> Result<f64, Failure> {
     let scene = lab.scene("disc_column:5")?;
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(22);
     let mut order: Vec<usize> = (0..5).collect();
@@ -281,7 +281,7 @@ fn order_spread(lab: &Lab, effort: u32) -> Result<f64, Failure> {
         for sweeps in
             [&mut budget.velocity_iterations, &mut budget.relax_iterations, &mut budget.position_iterations]
         {
-            *sweeps *= effort;
+            *sweeps *= factor;
         }
         world.step()?;
         for (place, &disc) in order.iter().enumerate() {

@@ -399,9 +399,9 @@ pub static CASES: &[Case] = &[
     ),
     case(
         "B10.statics",
-        "least friction under leaning cards by linear programming, relative",
+        "least friction under leaning cards by statics, relative",
         "1",
-        "1e-6: digits of the linear program",
+        "1e-6: six digits",
         paradox::cards_in_statics,
         Yes("statics, no solver involved"),
     ),
