@@ -3,8 +3,8 @@
 use super::output::print;
 use super::study;
 use crate::lab::error::Error;
-use crate::lab::report::html;
 use crate::lab::report;
+use crate::lab::report::html;
 use crate::lab::report::study_file::StudyFile;
 use clap::Args;
 use std::path::PathBuf;

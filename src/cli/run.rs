@@ -104,7 +104,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let sheets = [&args.state, &args.contacts].into_iter().flatten();
     if let Some(record) = args.record.iter().find(|record| sheets.clone().any(|s| same_file(s, record))) {
-        let message = format!("'{}' is the same file as --state or --contacts; give another name", record.display());
+        let message =
+            format!("'{}' is the same file as --state or --contacts; give another name", record.display());
         return Err(Error::invalid("--record", message));
     }
     if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
@@ -147,7 +148,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             drop(bar);
             return diverged(divergence.into());
         }
-        bar.show(step as usize, scene.steps as usize, "steps");
+        bar.step(step as usize, scene.steps as usize, "steps");
         times.add(&world.timings);
         if let Some((_, recorder)) = &mut recorder {
             recorder.add(&world)?;

@@ -4,16 +4,8 @@ use crate::engine::lanes::native_width;
 
 /// `value` of a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
 pub fn si(value: f64, unit: &str) -> String {
-    const PREFIXES: [(f64, &str); 8] = [
-        (1e9, "G"),
-        (1e6, "M"),
-        (1e3, "k"),
-        (1.0, ""),
-        (1e-3, "m"),
-        (1e-6, "µ"),
-        (1e-9, "n"),
-        (1e-12, "p"),
-    ];
+    const PREFIXES: [(f64, &str); 8] =
+        [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
     let size = value.abs();
     if size < 1e-12 {
         return format!("0 {unit}").trim_end().to_string();

@@ -359,14 +359,14 @@ fn commands_freeze_and_converge() {
     let (path, out) = (file.to_str().unwrap(), folder.path().join("out"));
     run(&["capture", "stack:3", "--step", "30", "-o", path, "--solver", "pgs"]).unwrap();
     assert!(Frozen::read(&file).unwrap().reference.is_some());
-    run(&["converge", path, "--out", out.to_str().unwrap(), "--rounds", "1", "--solvers", "pgs"]).unwrap();
+    run(&["converge", path, "--out", out.to_str().unwrap(), "--repeats", "1", "--solvers", "pgs"]).unwrap();
     for name in ["converge.csv", "converge.json", "converge.svg"] {
         assert!(std::fs::metadata(out.join(name)).unwrap().len() > 1000, "{name}");
     }
     let refusal = |words: &[&str]| run(words).unwrap_err();
-    assert!(refusal(&["converge", path, "--solvers", "pgd"]).contains("did you mean 'pgs'"));
+    assert!(refusal(&["converge", path, "--solvers", "pgd"]).contains("'pgs'"));
     assert!(refusal(&["converge", "no/such.frozen"]).contains("no/such.frozen"));
-    assert!(refusal(&["converge", path, "--width", "3"]).contains("is 3"));
+    assert!(refusal(&["converge", path, "--lanes", "3"]).contains("'3'"));
     assert!(refusal(&["capture", "stakc:3", "-o", path]).contains("did you mean 'stack'"));
     assert!(refusal(&["capture", "stack:3", "--step", "0", "-o", path]).contains('0'));
     assert!(refusal(&["capture", "free_fall", "--step", "2", "-o", path]).contains("no contacts"));

@@ -67,7 +67,8 @@ pub fn drive(browser: &Path, page: &Path, fragment: &str, script: &str) -> serde
     let text = format!("{}{after}{}", &text[..at], &text[at + 7..]);
     let copy = folder.path().join("page.html");
     std::fs::write(&copy, text).unwrap();
-    let output = browse(browser, folder.path(), &url(&copy, fragment), &["--window-size=1300,900", "--dump-dom"]);
+    let output =
+        browse(browser, folder.path(), &url(&copy, fragment), &["--window-size=1300,900", "--dump-dom"]);
     let dom = String::from_utf8(output.stdout).unwrap();
     let found = dom.split_once("<pre id=\"found\">").and_then(|(_, rest)| rest.split_once("</pre>"));
     let found = found.unwrap_or_else(|| panic!("nothing found in {} bytes", dom.len())).0;
@@ -79,7 +80,8 @@ pub fn drive(browser: &Path, page: &Path, fragment: &str, script: &str) -> serde
 pub fn screenshot(browser: &Path, page: &Path, fragment: &str, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("shot.png");
-    let (size, shot) = (format!("--window-size={width},{height}"), format!("--screenshot={}", file.display()));
+    let (size, shot) =
+        (format!("--window-size={width},{height}"), format!("--screenshot={}", file.display()));
     browse(browser, folder.path(), &url(page, fragment), &[&size, &shot]);
     let (found, pixels) = decode(&std::fs::read(&file).unwrap());
     assert_eq!(found, [width, height]);
@@ -110,8 +112,11 @@ pub fn decode(file: &[u8]) -> ([usize; 2], Vec<[u8; 3]>) {
     for row in rows.chunks(stride + 1) {
         let mut line = row[1..].to_vec();
         for i in 0..stride {
-            let [left, up, corner] =
-                [i.checked_sub(bytes).map_or(0, |k| line[k]), above[i], i.checked_sub(bytes).map_or(0, |k| above[k])];
+            let [left, up, corner] = [
+                i.checked_sub(bytes).map_or(0, |k| line[k]),
+                above[i],
+                i.checked_sub(bytes).map_or(0, |k| above[k]),
+            ];
             let predicted = match row[0] {
                 0 => 0,
                 1 => left,

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// A page with two recordings of two seconds.
 fn page(folder: &Path) -> PathBuf {
     for (solver, file) in [("pgs", "a.rec"), ("soft_step", "b.rec")] {
-        let args = ["run", "pyramid:8", "--steps", "120", "--record-contacts", "--solver", solver, "--record", file];
+        let args =
+            ["run", "pyramid:8", "--steps", "120", "--record-contacts", "--solver", solver, "--record", file];
         succeeds(folder, &args);
     }
     let text = succeeds(folder, &["replay", "a.rec", "b.rec", "-o", "r.html"]);
@@ -84,7 +85,10 @@ fn the_controls_do_what_they_say() {
         assert_eq!(found[name], true, "{name}: {found}");
     }
     assert_eq!(found["paused"], false, "{found}");
-    assert!(found["panned"][0].as_f64().unwrap() < 0.0 && found["panned"][1].as_f64().unwrap() > 0.0, "{found}");
+    assert!(
+        found["panned"][0].as_f64().unwrap() < 0.0 && found["panned"][1].as_f64().unwrap() > 0.0,
+        "{found}"
+    );
     // Every canvas has something on it.
     assert!(found["ink"].as_array().unwrap().iter().all(|n| n.as_u64().unwrap() > 1000), "{found}");
     assert!(found["text"].as_str().unwrap().contains("of 2.00 s"), "{found}");
@@ -117,7 +121,8 @@ fn a_damaged_page_says_so() {
     let path = page(folder.path());
     let text = std::fs::read_to_string(&path).unwrap();
     // Base64 of the magic begins "U0lNUFJFQx".
-    std::fs::write(&path, text.replacen("U0lNUFJFQx", "U0lNUFJFQy", 1).replacen("U0lNUF", "U0lNUE", 1)).unwrap();
+    std::fs::write(&path, text.replacen("U0lNUFJFQx", "U0lNUFJFQy", 1).replacen("U0lNUF", "U0lNUE", 1))
+        .unwrap();
     let found = drive(
         &browser,
         &path,

@@ -6,7 +6,8 @@ use std::path::Path;
 
 fn study(folder: &Path) {
     let scenes = "stack:3,card_house,incline_slip";
-    let args = ["study", "--scenes", scenes, "--lanes", "1,8", "--steps", "60", "--repeats", "1", "--out", "r"];
+    let args =
+        ["study", "--scenes", scenes, "--lanes", "1,8", "--steps", "60", "--repeats", "1", "--out", "r"];
     succeeds(folder, &args);
 }
 
@@ -65,7 +66,9 @@ fn the_page_is_whole_in_a_browser() {
         "#,
     );
     assert_eq!(found["errors"], serde_json::json!([]), "{found}");
-    for (name, value) in [("outside", serde_json::json!([])), ("empty", 0.into()), ("links", 0.into()), ("wide", 0.into())] {
+    for (name, value) in
+        [("outside", serde_json::json!([])), ("empty", 0.into()), ("links", 0.into()), ("wide", 0.into())]
+    {
         assert_eq!(found[name], value, "{name}: {found}");
     }
     // One over all, three or two by scene, three profiles, two of lanes, phases, two of iterations.
@@ -75,9 +78,11 @@ fn the_page_is_whole_in_a_browser() {
 
     let pixels = screenshot(&browser, &page, "", [1300, 2000]);
     // The shaded side within tolerance, the band of failures, and marks of pgs.
-    for (what, color, least) in
-        [("within", [0xea, 0xf5, 0xf0], 20_000), ("band", [0xf3, 0xe3, 0xdc], 3000), ("pgs", [0xd5, 0x5e, 0x00], 100)]
-    {
+    for (what, color, least) in [
+        ("within", [0xea, 0xf5, 0xf0], 20_000),
+        ("band", [0xf3, 0xe3, 0xdc], 3000),
+        ("pgs", [0xd5, 0x5e, 0x00], 100),
+    ] {
         let found = count(&pixels, color);
         assert!(found >= least, "{what}: {found} pixels");
     }

@@ -266,7 +266,13 @@ fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: 
     if impulse > 0.0 {
         arrow(picture, [x, bar_y], [x + pixels, bar_y], 1.8);
         let force = si(impulse / dt, "N");
-        text(picture, x, text_y, Anchor::Start, format!("{}, {force} over the step", si_short(impulse, "N·s")));
+        text(
+            picture,
+            x,
+            text_y,
+            Anchor::Start,
+            format!("{}, {force} over the step", si_short(impulse, "N·s")),
+        );
         text(picture, x, bar_y - 14.0, Anchor::Start, "impulse".into());
     } else {
         text(picture, x, bar_y + 4.0, Anchor::Start, "no impulses".into());
@@ -309,13 +315,20 @@ mod tests {
     #[test]
     fn every_body_point_and_arrow_is_drawn() {
         let picture = frame("stack:3", 120);
-        let polygons = picture.items.iter().filter(|i| matches!(i, Item::Polygon { title, .. } if title.starts_with("body")));
+        let polygons = picture
+            .items
+            .iter()
+            .filter(|i| matches!(i, Item::Polygon { title, .. } if title.starts_with("body")));
         assert_eq!(polygons.count(), 4);
-        let discs = picture.items.iter().filter(|i| matches!(i, Item::Disc { title, .. } if title.contains("impulse")));
+        let discs = picture
+            .items
+            .iter()
+            .filter(|i| matches!(i, Item::Disc { title, .. } if title.contains("impulse")));
         // Two for each of six points: a ring and its inside.
         assert_eq!(discs.count(), 12);
         let text = svg::svg(&picture);
-        for part in ["stack:3", "below", "penetration", "N·s", "over the step", "contact and normal", " mm<"] {
+        for part in ["stack:3", "below", "penetration", "N·s", "over the step", "contact and normal", " mm<"]
+        {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("NaN") && !text.contains("inf"));

@@ -78,12 +78,7 @@ fn element(item: &Item) -> String {
                     px(width)
                 )
             });
-            write!(
-                text,
-                "<polygon points=\"{}\" {fill}{stroke}{}",
-                points(corners),
-                close("polygon", title)
-            )
+            write!(text, "<polygon points=\"{}\" {fill}{stroke}{}", points(corners), close("polygon", title))
         }
         Item::Line { from, to, color: c, width } => write!(
             text,

@@ -84,8 +84,9 @@ fn check(header: &Header) -> Result<(), String> {
     let names = [&header.scene, &header.solver, &header.setting, &header.outcome].into_iter();
     let curve_names = header.curves.iter().flat_map(|c| [&c.name, &c.unit]);
     let positive = |x: f64| x > 0.0 && x.is_finite();
-    let finite =
-        |s: &super::ShapeRecord| s.radius >= 0.0 && s.points.iter().flatten().chain([&s.radius]).all(|x| x.is_finite());
+    let finite = |s: &super::ShapeRecord| {
+        s.radius >= 0.0 && s.points.iter().flatten().chain([&s.radius]).all(|x| x.is_finite())
+    };
     let problem = if names.chain(curve_names).any(|n| n.len() > LONGEST) {
         "a name that is too long"
     } else if !positive(header.dt) || !positive(header.quantum) || header.every == 0 {
@@ -181,9 +182,12 @@ mod tests {
 
     #[test]
     fn a_recording_is_what_happened_to_within_a_quantum() {
-        for (name, every, contacts) in
-            [("card_house", 1, true), ("circle_pile:30", 3, true), ("far_stack:4", 1, true), ("pyramid:6", 2, false)]
-        {
+        for (name, every, contacts) in [
+            ("card_house", 1, true),
+            ("circle_pile:30", 3, true),
+            ("far_stack:4", 1, true),
+            ("pyramid:6", 2, false),
+        ] {
             let (bytes, frames) = run(name, 40, every, contacts);
             let found = read(&bytes).unwrap();
             assert_eq!((found.frames.len(), found.header.outcome.as_str()), (frames.len(), "holds"));

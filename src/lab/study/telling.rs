@@ -29,11 +29,16 @@ pub fn telling(records: &[Record]) -> Vec<&Record> {
         let own = |solver: &'static str| colored().filter(move |r| r.solver == solver);
         let fails = |solver: &&'static str| own(solver).any(|r| !r.holds());
         let holds = |solver: &&'static str| own(solver).any(|r| r.holds());
-        let contrast = solvers.iter().filter(|s| fails(s)).count().min(solvers.iter().filter(|s| holds(s)).count());
+        let contrast =
+            solvers.iter().filter(|s| fails(s)).count().min(solvers.iter().filter(|s| holds(s)).count());
         let mut chosen: Vec<&Record> = Vec::new();
         let answer = Answer::of(scene);
         let first = answer.as_ref().and_then(|a| {
-            a.good.iter().copied().find(|r| r.order == Order::Colored).or(a.nearest.filter(|r| r.order == Order::Colored))
+            a.good
+                .iter()
+                .copied()
+                .find(|r| r.order == Order::Colored)
+                .or(a.nearest.filter(|r| r.order == Order::Colored))
         });
         chosen.extend(first);
         let mut broken: Vec<&Record> = colored().filter(|r| !r.holds() && r.failure.is_none()).collect();
@@ -99,7 +104,11 @@ mod tests {
 
     #[test]
     fn the_scene_with_the_most_contrast_is_told() {
-        let on = |scene: &str, solver: &'static str, record: Record| Record { scene: scene.into(), solver, ..record };
+        let on = |scene: &str, solver: &'static str, record: Record| Record {
+            scene: scene.into(),
+            solver,
+            ..record
+        };
         let records = [
             on("calm", "a", record(8, 1, 1.0, 0.0)),
             on("calm", "b", record(8, 1, 1.0, 0.0)),

@@ -90,10 +90,18 @@ pub fn matrix(matrix: &Matrix) -> String {
                     let title = match &o.reason {
                         Some(reason) => reason.clone(),
                         None => {
-                            format!("measured {}, truth {} ± {}", word(&o.measured), word(&o.truth), word(&o.tolerance))
+                            format!(
+                                "measured {}, truth {} ± {}",
+                                word(&o.measured),
+                                word(&o.truth),
+                                word(&o.tolerance)
+                            )
                         }
                     };
-                    format!("<td style=\"background:{color}{ink}\" title=\"{}\">{sign}{shown}", escaped(&title))
+                    format!(
+                        "<td style=\"background:{color}{ink}\" title=\"{}\">{sign}{shown}",
+                        escaped(&title)
+                    )
                 }
                 _ => "<td class=\"none\">n/a".into(),
             };

@@ -233,7 +233,9 @@ fn command(settings: &Value) -> String {
     // What a quick study shortens has no option of its own.
     let quick = settings["timing_steps"].as_u64().is_some_and(|n| n < 100);
     option("scenes", list(&settings["scenes"]));
-    let solvers = settings["solvers"].as_array().map_or_else(Vec::new, |a| a.iter().map(|s| plain(&s["name"])).collect());
+    let solvers = settings["solvers"]
+        .as_array()
+        .map_or_else(Vec::new, |a| a.iter().map(|s| plain(&s["name"])).collect());
     option("solvers", solvers);
     option("lanes", list(&settings["lanes"]));
     option("orders", list(&settings["orders"]));
@@ -361,7 +363,9 @@ mod tests {
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
             {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
         let text = matrix::matrix(&serde_json::from_str(json).unwrap());
-        assert!(text.contains("A1*") && text.contains(">0.50") && text.contains("✗ ∞") && text.contains("n/a"));
+        assert!(
+            text.contains("A1*") && text.contains(">0.50") && text.contains("✗ ∞") && text.contains("n/a")
+        );
         assert!(text.contains("background:#93c1dd"), "{text}");
     }
 

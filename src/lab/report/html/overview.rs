@@ -70,7 +70,8 @@ pub fn overview(records: &[Record]) -> String {
     panel.write([left + 10.0, top + 18.0], "note", "within tolerance");
     for dot in &dots {
         let e = dot.entry;
-        let title = format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.words(), number(dot.slower));
+        let title =
+            format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.words(), number(dot.slower));
         match wrong(e) {
             Some(x) => {
                 let title = format!("{title}, error {} tolerances", number(x));
@@ -115,7 +116,8 @@ pub fn overview(records: &[Record]) -> String {
         names.extend(line.pop().map(|(at, _, name)| (at, name)));
     }
     for (at, name) in names {
-        if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides()) {
+        if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides())
+        {
             panel.write(place, "dot-name", &name);
         }
     }

@@ -68,10 +68,15 @@ impl Panel {
             px(top)
         );
         for (v, label) in &x.ticks {
-            text += &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", across(*v), px(bottom + 15.0));
+            text +=
+                &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", across(*v), px(bottom + 15.0));
         }
         for (v, label) in &y.ticks {
-            text += &format!("<text class=\"y\" x=\"{}\" y=\"{}\" dy=\".35em\">{label}</text>", px(left - 5.0), up(*v));
+            text += &format!(
+                "<text class=\"y\" x=\"{}\" y=\"{}\" dy=\".35em\">{label}</text>",
+                px(left - 5.0),
+                up(*v)
+            );
         }
         let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
         text += &format!(
@@ -110,10 +115,8 @@ impl Panel {
     /// A broken line through pixels.
     pub fn line(&mut self, at: &[[f64; 2]], class: &str, color: &str) {
         if at.len() > 1 {
-            self.text += &format!(
-                "<polyline class=\"{class}\" points=\"{}\" stroke=\"{color}\"/>\n",
-                points(at)
-            );
+            self.text +=
+                &format!("<polyline class=\"{class}\" points=\"{}\" stroke=\"{color}\"/>\n", points(at));
         }
     }
 
@@ -144,7 +147,8 @@ impl Panel {
     /// From one y to another at x.
     pub fn bar(&mut self, x: f64, ys: [f64; 2], color: &str) {
         let [[a, b], [_, c]] = ys.map(|y| self.at(x, y));
-        self.text += &format!("<path class=\"bar\" stroke=\"{color}\" d=\"M{} {}V{}\"/>\n", px(a), px(b), px(c));
+        self.text +=
+            &format!("<path class=\"bar\" stroke=\"{color}\" d=\"M{} {}V{}\"/>\n", px(a), px(b), px(c));
     }
 
     /// A solver's marker, `r` pixels; hollow for natural order.
@@ -161,7 +165,8 @@ impl Panel {
 
     /// Text at pixels.
     pub fn write(&mut self, [x, y]: [f64; 2], class: &str, text: &str) {
-        self.text += &format!("<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n", px(x), px(y), escaped(text));
+        self.text +=
+            &format!("<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n", px(x), px(y), escaped(text));
     }
 
     /// The frame's sides (pixels): left, top, right, bottom.

@@ -80,10 +80,8 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     for entry in order {
         let Some(lap) = &entry.lap else { continue };
         let (time, color) = (1e-9 * lap.median_ns, Style::of(entry.solver).color);
-        let budgets: Vec<&&Record> = settings
-            .iter()
-            .filter(|e| e.solver == entry.solver && e.order == entry.order)
-            .collect();
+        let budgets: Vec<&&Record> =
+            settings.iter().filter(|e| e.solver == entry.solver && e.order == entry.order).collect();
         let size = budgets.iter().position(|e| e.budget == entry.budget).unwrap_or(0).min(4);
         let what = format!("{}, {}: {}", entry.solver, entry.words(), si(time, "s"));
         match (entry.broke(), axis.of(entry)) {
@@ -96,7 +94,9 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
                 let title = format!("{what} ({bars}), {}", shown(value, unit));
                 let at = panel.at(error(entry), time);
                 panel.marker(at, 3.2 + 0.9 * size as f64, entry.solver, entry.is_natural(), false, &title);
-                if let Some(place) = labels.place(at, 4.0, [4.3 * entry.label().chars().count() as f64, 8.0], panel.sides()) {
+                if let Some(place) =
+                    labels.place(at, 4.0, [4.3 * entry.label().chars().count() as f64, 8.0], panel.sides())
+                {
                     panel.write(place, "point", &entry.label());
                 }
             }

@@ -46,7 +46,11 @@ impl Scale {
         let enough = sets.iter().find(|t| t.len() >= 3).cloned();
         let ticks = enough.or_else(|| sets.into_iter().max_by_key(Vec::len)).unwrap_or_default();
         let stride = ticks.len().div_ceil(MOST).max(1);
-        let minor = if (high / low).log10() < 7.0 { within(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) } else { within(digits[0]) };
+        let minor = if (high / low).log10() < 7.0 {
+            within(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
+        } else {
+            within(digits[0])
+        };
         let ticks = ticks.into_iter().step_by(stride).map(|t| (t, label(t, unit))).collect();
         Scale { log: true, low, high, ticks, minor }
     }
@@ -156,6 +160,9 @@ mod tests {
             [label(2e4, "N"), label(1e-3, "m"), label(0.5, "%")].map(String::from),
             ["20 kN", "1 mm", "50 %"]
         );
-        assert_eq!([1e-6, 2e-7, 0.005, 0.05, 100.0, 2.5e4].map(number), ["10⁻⁶", "2·10⁻⁷", "0.005", "0.05", "100", "2.5·10⁴"]);
+        assert_eq!(
+            [1e-6, 2e-7, 0.005, 0.05, 100.0, 2.5e4].map(number),
+            ["10⁻⁶", "2·10⁻⁷", "0.005", "0.05", "100", "2.5·10⁴"]
+        );
     }
 }

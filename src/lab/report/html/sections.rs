@@ -25,9 +25,8 @@ pub fn profiles(records: &[Record]) -> String {
         x.ticks.retain(|t| t.0 >= 1.0);
         let mut panel = Panel::new(&frame, x, Scale::linear(1.0, "%"));
         for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
-            let rho = |f: f64| {
-                ratios.iter().filter(|&&r| r <= f).count() as f64 / profile.scenes.max(1) as f64
-            };
+            let rho =
+                |f: f64| ratios.iter().filter(|&&r| r <= f).count() as f64 / profile.scenes.max(1) as f64;
             // Lines that coincide stay visible beside each other.
             let shift = 1.6 * (i as f64 - 0.5 * profile.ratios.len() as f64);
             let at = |panel: &Panel, f: f64, y: f64| {
@@ -109,8 +108,8 @@ pub fn lanes(records: &[Record]) -> String {
 
 /// Colours of phases: muted, and unlike those of solvers by being areas in a fixed order.
 const PHASES: [&str; Phase::ALL.len()] = [
-    "#332288", "#88ccee", "#bbbbbb", "#44aa99", "#999933", "#cc6677", "#ddcc77", "#aa4499", "#661100", "#117733",
-    "#777777",
+    "#332288", "#88ccee", "#bbbbbb", "#44aa99", "#999933", "#cc6677", "#ddcc77", "#aa4499", "#661100",
+    "#117733", "#777777",
 ];
 
 /// Time per phase as stacked bars, a plot per scene with a bar per solver.
@@ -128,8 +127,11 @@ pub fn phases(records: &[Record]) -> String {
     }
     text += "</p>\n<div class=\"panels two\">\n";
     for scene in scenes(records) {
-        let rows: Vec<&Record> =
-            solvers_of(records).into_iter().filter_map(|s| standard(scene, s)).filter(|e| e.lap.is_some()).collect();
+        let rows: Vec<&Record> = solvers_of(records)
+            .into_iter()
+            .filter_map(|s| standard(scene, s))
+            .filter(|e| e.lap.is_some())
+            .collect();
         let total = |e: &Record| e.lap.as_ref().map_or(0.0, |l| l.phase_ns.iter().sum::<f64>());
         let scale = Scale::linear(1e-9 * rows.iter().map(|e| total(e)).fold(0.0, f64::max), "s");
         let (left, right, top, row) = (190.0, 610.0, 26.0, 22.0);
@@ -212,7 +214,8 @@ pub fn iterations(records: &[Record]) -> String {
                 panel.line(&line, "curve", Style::of(solver).color);
                 for (entry, sweeps, error) in own() {
                     let shown = super::precision::shown(*error, unit);
-                    let title = format!("{solver}, {}: {} sweeps, {shown}", entry.budget_text, number(*sweeps));
+                    let title =
+                        format!("{solver}, {}: {} sweeps, {shown}", entry.budget_text, number(*sweeps));
                     panel.marker(panel.at(*sweeps, *error), 3.6, solver, false, false, &title);
                 }
             }

@@ -26,7 +26,8 @@ fn named(solver: &str) -> String {
 pub fn answer(records: &[Record], steps: Option<u64>) -> String {
     let answers: Vec<Answer> = scenes(records).into_iter().filter_map(Answer::of).collect();
     let (scenes, ranking) = (answers.len(), ranking(records));
-    let cut = steps.map_or(String::new(), |n| format!(" Runs end after {n} steps: what fails later is not seen."));
+    let cut =
+        steps.map_or(String::new(), |n| format!(" Runs end after {n} steps: what fails later is not seen."));
     let mut text = format!(
         "<p class=\"lead\">{}{cut}</p>\n<table class=\"numbers\"><caption>Over all scenes</caption><thead><tr><th>solver\
          <th>score<th>holds on<th>good enough on<th>fastest or tied<th>within {CLOSE}×</tr></thead><tbody>\n",
@@ -71,7 +72,13 @@ fn sentences(ranking: &[Standing], answers: &[Answer]) -> String {
     match none[..] {
         [] => text += "Every scene has a setting that is good enough.",
         [one] => text += &format!("Nothing that ran is good enough on {}.", escaped(one)),
-        _ => text += &format!("Nothing that ran is good enough on {} scenes: {}.", none.len(), escaped(&none.join(", "))),
+        _ => {
+            text += &format!(
+                "Nothing that ran is good enough on {} scenes: {}.",
+                none.len(),
+                escaped(&none.join(", "))
+            )
+        }
     }
     text
 }
@@ -92,7 +99,8 @@ fn row(answer: &Answer) -> String {
         _ if !tied.is_empty() => format!("<td>tied with {}", escaped(&tied.join(", "))),
         (_, None) => "<td>no other solver".into(),
         (Some(best), Some(next)) => {
-            let ratio = next.lap.as_ref().zip(best.lap.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
+            let ratio =
+                next.lap.as_ref().zip(best.lap.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
             let slower = ratio.map_or(String::new(), |r| format!(": {:.2}×", r.median));
             format!("<td>{}, {}{slower}", escaped(next.solver), escaped(&next.words()))
         }
