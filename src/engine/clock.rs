@@ -85,6 +85,16 @@ impl Timings {
     }
 }
 
+/// What the passes of one phase asked for, where that is counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
+    /// rows written.
+    pub contacts: [[f64; 4]; 3],
+    /// Bytes read and written besides: of bodies, of vectors.
+    pub bytes: [f64; 2],
+}
+
 /// Adds the time since the last lap to a phase; costs nothing while it is off.
 ///
 /// It can also be set to a single phase: then the passes of all others are skipped, so that one
@@ -96,6 +106,7 @@ pub struct Clock {
     /// The only phase that runs, and how often each lapped: others must not.
     only: Option<(Phase, [u32; Phase::ALL.len()])>,
     counts: bool,
+    asked: Asked,
     /// Time that the thread had waited at the last lap, where that is taken out.
     waited: Option<Duration>,
 }
@@ -107,7 +118,14 @@ impl Clock {
             let now = Instant::now();
             (now, now)
         });
-        Clock { timings: Timings::default(), start, only: None, counts: false, waited: None }
+        Clock {
+            timings: Timings::default(),
+            start,
+            only: None,
+            counts: false,
+            asked: Asked::default(),
+            waited: None,
+        }
     }
 
     /// Starts a step from whose times the pauses are taken out in which the thread waited for a
@@ -121,7 +139,14 @@ impl Clock {
     /// [`crate::engine::lanes::Counted`]. What the phase works on must have been prepared by a whole step.
     pub(crate) fn only(phase: Phase, counts: bool) -> Self {
         let only = Some((phase, [0; Phase::ALL.len()]));
-        Clock { timings: Timings::default(), start: None, only, counts, waited: None }
+        Clock {
+            timings: Timings::default(),
+            start: None,
+            only,
+            counts,
+            asked: Asked::default(),
+            waited: None,
+        }
     }
 
     /// Whether passes of `phase` are to be left out.
@@ -134,6 +159,23 @@ impl Clock {
     #[inline]
     pub fn counts(&self) -> bool {
         self.counts
+    }
+
+    /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
+    pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
+        for (sum, each) in self.asked.contacts[opposite].iter_mut().zip(per_contact) {
+            *sum += contacts as f64 * each as f64;
+        }
+    }
+
+    /// Books bytes read and written.
+    pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
+        self.asked.bytes = [0, 1].map(|k| self.asked.bytes[k] + bytes[k]);
+    }
+
+    /// What has been booked.
+    pub(crate) fn asked(&self) -> Asked {
+        self.asked
     }
 
     /// Laps of each phase, where one phase runs alone; indexed by `Phase as usize`.

@@ -179,7 +179,8 @@ impl Motion {
         }
     }
 
-    fn advance(&mut self, rows: &mut [BodyRow]) {
+    /// Δx ← Δx + h v and Δθ ← Δθ + h ω, whatever the integrator.
+    pub fn advance(&mut self, rows: &mut [BodyRow]) {
         let h = f32x4::from([self.h, self.h, self.h, 0.0]);
         match self.rotation {
             RotationUpdate::Exact => {

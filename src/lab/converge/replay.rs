@@ -200,7 +200,7 @@ impl<'a> Replay<'a> {
         };
         let row = |(i, c): (usize, &ProblemContact)| {
             let contact = &self.scratch[self.places[i].0];
-            let against_static = opposite(self.problem, contact) != OppositeKind::Dynamic;
+            let against_static = opposite(self.problem, contact.body_a) != OppositeKind::Dynamic;
             match rule.law(against_static, moved(c) as f32, 1.0 / diagonal[i][0]) {
                 Some(law) => OwnRow { bias: law.bias, compliance: law.compliance },
                 None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
@@ -214,7 +214,7 @@ impl<'a> Replay<'a> {
     fn assign_lanes(&mut self, sequence: Sequence) {
         let problem = self.problem;
         let sides =
-            Sides { bodies: problem.bodies.len(), opposite: |contact: &Contact| opposite(problem, contact) };
+            Sides { bodies: problem.bodies.len(), opposite: |body| opposite(problem, body), levels: None };
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let mut assignment = Assignment::default();
         if sequence == Sequence::Colored {
@@ -227,8 +227,8 @@ impl<'a> Replay<'a> {
 }
 
 /// What stands opposite the dynamic body of a contact.
-fn opposite(problem: &ContactProblem, contact: &Contact) -> OppositeKind {
-    match problem.bodies.get(contact.body_a as usize) {
+fn opposite(problem: &ContactProblem, body_a: u32) -> OppositeKind {
+    match problem.bodies.get(body_a as usize) {
         None => OppositeKind::Static,
         Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
         Some(_) => OppositeKind::Dynamic,
