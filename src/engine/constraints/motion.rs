@@ -198,6 +198,11 @@ impl Motion {
                 }
             }
         }
+        self.hide_turns(rows);
+    }
+
+    /// Takes the turns of round bodies out of their rows, until [`Self::finish`].
+    pub(super) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
         // A contact's anchor turns with its body, as a corner does. The contact point of a disc
         // does not: it stays on the line of centres however the disc rolls. So sweeps are
         // not shown the turn of a round body; it is kept here for its pose. Without this a disc

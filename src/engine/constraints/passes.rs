@@ -3,6 +3,7 @@
 use super::batches::Batches;
 use super::block::BlockSweep;
 use super::bounces::Bounces;
+use super::descent::Blocks;
 use super::features::{Features, Layout};
 use super::graph::Graph;
 use super::jacobi::{self, JacobiRule};
@@ -13,9 +14,11 @@ use super::observe::ObservedRule;
 use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
 use super::position::PositionSweep;
+use super::positional::{AfterDisplacing, Displace};
 use super::prepare::{Prepare, Store};
 use super::restitution;
 use super::rules::{NormalRule, Rule};
+use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
 use super::types::{Joined, TypeInput};
@@ -277,6 +280,81 @@ impl<'a> Passes<'a> {
         let row = size_of::<BodyRow>() as f64;
         self.book_rows([2.0 * row, 2.0 * row]);
         self.clock.lap(phase);
+    }
+
+    /// Body pass: marks where bodies are, for [`Self::displacing_sweep`] to displace them from there.
+    pub fn begin_displacing(&mut self) {
+        self.over_bodies(Phase::Integrate, |work| work.sums.clone_from(&work.rows));
+    }
+
+    /// Constraint pass: displaces bodies that overlap or slip, see [`super::positional`]; `first` in each
+    /// substep, and overlap removed at `push_speed` (m/s) at most.
+    pub fn displacing_sweep(&mut self, push_speed: f32, first: bool) {
+        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, first }) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Body pass: v ← v + (x − x_marked)/h.
+    pub fn velocities_from_displacements(&mut self) {
+        let inv_h = 1.0 / self.input.h;
+        self.over_bodies(Phase::Integrate, |work| {
+            for (row, marked) in work.rows.iter_mut().zip(&work.sums) {
+                for k in 0..3 {
+                    row.velocity[k] = (row.delta[k] - marked.delta[k]).mul_add(inv_h, row.velocity[k]);
+                }
+            }
+        });
+    }
+
+    /// Constraint pass: takes the normal velocity of points that were displaced, and kinetic friction.
+    pub fn displaced_velocity_sweep(&mut self) {
+        if self.run(Phase::Solve, &AfterDisplacing) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Constraint pass: a sweep whose friction holds places, see [`super::sticky`]: removes `fraction` of an
+    /// overlap and `stick` of a drift per substep, overlap at `push_speed` (m/s) at most, drift of points
+    /// within `reach` (m).
+    pub fn sticky_sweep(&mut self, phase: Phase, fraction: f32, push_speed: f32, stick: f32, reach: f32) {
+        if self.run(phase, &StickySweep { h: self.input.h, fraction, push_speed, stick, reach }) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Constraint pass: books how far points have drifted in this step, at its end.
+    pub fn book_drift(&mut self, reach: f32) {
+        if self.input.features.friction {
+            self.run(Phase::Store, &BookDrift { reach });
+        }
+    }
+
+    /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
+    pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
+        if self.clock.skips(phase) {
+            return;
+        }
+        let Workspace { rows, graph, kept, motion, .. } = &mut *self.work;
+        work(&mut Blocks {
+            rows,
+            graph,
+            kept,
+            contacts: self.contacts,
+            increments: motion.velocity_increments(),
+            rotation: self.input.features.rotation,
+            friction: self.input.features.friction,
+        });
+        // Each contact point is looked at from both of its bodies, and its numbers are kept.
+        let (points, size) = (2.0 * self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
+        self.clock.book_bytes([points * (2.0 * (32.0 + 32.0) + 2.0 * size), points * size]);
+        self.book_rows([32.0, 16.0]);
+        self.clock.lap(phase);
+    }
+
+    /// Body pass: takes the turns of round bodies out of their rows, as moving them by velocities does.
+    pub fn hide_turns(&mut self) {
+        self.over_bodies(Phase::Integrate, |work| work.motion.hide_turns(&mut work.rows));
     }
 
     /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.

@@ -16,10 +16,13 @@ use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::{Budget, MAX_PARAMETERS, Parameter, Parameters};
 
+pub mod anderson;
+pub mod apgd;
 pub mod box2d;
 pub mod jacobi;
 pub mod local_gs;
 pub mod mass_splitting;
+pub mod nncg;
 pub mod pgs;
 pub mod pgs_ngs;
 pub mod pgs_ngs_block;
@@ -34,9 +37,11 @@ pub mod split_impulse;
 pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
+pub mod tgs_sticky;
+pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 18] = [
+pub static VARIANTS: [&Variant; 23] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -46,12 +51,17 @@ pub static VARIANTS: [&Variant; 18] = [
     &sor::SOLVER,
     &random_order::SOLVER,
     &local_gs::SOLVER,
+    &nncg::SOLVER,
+    &anderson::SOLVER,
+    &apgd::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,
     &mass_splitting::SOLVER,
     &tgs_ngs::SOLVER,
     &tgs_soft::SOLVER,
+    &tgs_sticky::SOLVER,
+    &xpbd::SOLVER,
     &soft_step::SOLVER,
     &box2d::SOLVER,
     &rapier::SOLVER,

@@ -21,6 +21,7 @@ use super::World;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, Timings};
+use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::{Features, OppositeKind, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
@@ -43,6 +44,7 @@ struct Saved {
     proxies: Vec<Proxy>,
     fat_boxes: FatBoxes,
     counts: StepCounts,
+    kept: Kept,
 }
 
 /// What a step does in one phase.
@@ -74,6 +76,7 @@ impl World {
             proxies: self.proxies.clone(),
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
+            kept: self.work.kept.clone(),
         };
         let timings = self.timings;
         self.frozen_step();
@@ -262,5 +265,6 @@ impl Drop for HeldWorld<'_> {
         self.world.fat_boxes.clone_from(&self.before.fat_boxes);
         self.world.pairs_are_stale = true;
         self.world.counts = self.before.counts;
+        self.world.work.kept.clone_from(&self.before.kept);
     }
 }

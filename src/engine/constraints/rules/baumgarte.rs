@@ -36,6 +36,11 @@ impl Baumgarte {
         Baumgarte { inv_h, rate: fraction * inv_h, slop, push_speed }
     }
 
+    /// b (m/s) at a separation (m).
+    pub fn bias(&self, separation: f32) -> f32 {
+        -self.line::<f32>(false, separation, 1.0, 0.0)[0]
+    }
+
     /// As [`Self::rule`], with the factor `relaxation` on what each row asks for.
     pub fn relaxed(fraction: f32, slop: f32, push_speed: f32, h: f32, relaxation: f32) -> Rule {
         let rule = Self::new(fraction, slop, push_speed, h);
