@@ -28,7 +28,10 @@ mod tests {
                     let normal = 0.05 * i as f32;
                     for part in [-1.0, -0.5, 0.0, 0.5, 1.0] {
                         let other = [normal, part * friction * normal];
-                        assert!(distance(nearest) <= distance(other) + 1e-6, "{point:?} {friction} {other:?}");
+                        assert!(
+                            distance(nearest) <= distance(other) + 1e-6,
+                            "{point:?} {friction} {other:?}"
+                        );
                     }
                 }
             }

@@ -166,6 +166,11 @@ impl Motion {
         }
     }
 
+    /// Time for which bodies move with the velocities of a substep's end (s).
+    pub(super) fn after_velocities(&self) -> f32 {
+        if self.integrator == Integrator::SemiImplicitEuler { self.h } else { 0.0 }
+    }
+
     fn explicit_positions(&mut self, rows: &mut [BodyRow]) {
         if self.integrator == Integrator::ExplicitEuler {
             self.advance(rows);

@@ -167,6 +167,17 @@ impl<'a> Passes<'a> {
         self.input.parameters[index]
     }
 
+    /// Points of all contacts.
+    pub fn points(&self) -> usize {
+        self.input.points
+    }
+
+    /// How long a body moves with the velocity of [`Self::integrate_velocities`] (s): h, or 0 where it has
+    /// moved before (explicit Euler).
+    pub fn motion_after_velocities(&self) -> f32 {
+        self.work.motion.after_velocities()
+    }
+
     /// Body pass: v ← damped v + h a.
     pub fn integrate_velocities(&mut self) {
         self.over_bodies(Phase::Integrate, |work| work.motion.integrate_velocities(&mut work.rows));
@@ -349,6 +360,23 @@ impl<'a> Passes<'a> {
         let (points, size) = (2.0 * self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
         self.clock.book_bytes([points * (2.0 * (32.0 + 32.0) + 2.0 * size), points * size]);
         self.book_rows([32.0, 16.0]);
+        self.clock.lap(phase);
+    }
+
+    /// Writes impulses (N·s) that `of` reads from what is kept per point into the records, for who asks
+    /// what the contacts bore.
+    pub fn keep_impulses(&mut self, phase: Phase, of: impl Fn(&[f32]) -> Pair) {
+        if self.clock.skips(phase) {
+            return;
+        }
+        let mut impulses = self.vector();
+        for (contact, c) in self.contacts.iter().enumerate() {
+            for p in 0..c.manifold.count as usize {
+                impulses[2 * contact + p] = of(self.work.kept.point(contact, p));
+            }
+        }
+        self.system().set_impulses(&impulses);
+        self.give_back([impulses]);
         self.clock.lap(phase);
     }
 

@@ -111,12 +111,14 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let frame = |at: usize, a: &[L; 8], b: &[L; 8]| to_frame::<L, O>([a[at], a[at + 1]], [b[at], b[at + 1]], n);
+        let frame =
+            |at: usize, a: &[L; 8], b: &[L; 8]| to_frame::<L, O>([a[at], a[at + 1]], [b[at], b[at + 1]], n);
         let [mut moved, along_t] = frame(DX, &a, &b);
         // Slide of the centres since the substep began.
         let mut slide = h.mul_add(frame(VX, &a, &b)[1], along_t - frame(DX, &before.a, &before.b)[1]);
         let mut angle = [a[TURN], b[TURN]];
-        let turn_of = |k: usize, row: &[L; 8], old: &[L; 8], angle: [L; 2]| h.mul_add(row[W], angle[k] - old[TURN]);
+        let turn_of =
+            |k: usize, row: &[L; 8], old: &[L; 8], angle: [L; 2]| h.mul_add(row[W], angle[k] - old[TURN]);
         let mut sum = [zero; 2];
         for p in 0..N::POINTS {
             let (arm_n, arm_t) =

@@ -38,16 +38,14 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     uses: Uses { velocity: true, relax: false, position: false },
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
-    parameters: &[
-        Parameter {
-            name: "baumgarte",
-            unit: "",
-            default: BAUMGARTE,
-            range: [0.0, 1.0],
-            meaning: "share of the overlap that is removed per step",
-            trials: &[],
-        },
-    ],
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
     softness: None,
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
@@ -114,7 +112,9 @@ fn step(passes: &mut Passes<'_>) {
                 let theta_next = 0.5 * ((square * square + 4.0 * square).sqrt() - square);
                 let mut beta = (theta * (1.0 - theta) / (square + theta_next)) as f32;
                 theta = theta_next;
-                step.iter_mut().zip(next.iter().zip(&now)).for_each(|(s, (a, b))| *s = [a[0] - b[0], a[1] - b[1]]);
+                step.iter_mut()
+                    .zip(next.iter().zip(&now))
+                    .for_each(|(s, (a, b))| *s = [a[0] - b[0], a[1] - b[1]]);
                 if System::dot(&g_y, &step) > 0.0 {
                     (beta, theta) = (0.0, 1.0);
                 }

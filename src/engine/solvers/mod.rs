@@ -16,9 +16,12 @@ use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::{Budget, MAX_PARAMETERS, Parameter, Parameters};
 
+pub mod admm;
 pub mod anderson;
 pub mod apgd;
+pub mod avbd;
 pub mod box2d;
+pub mod direct;
 pub mod jacobi;
 pub mod local_gs;
 pub mod mass_splitting;
@@ -41,7 +44,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 23] = [
+pub static VARIANTS: [&Variant; 26] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -54,6 +57,8 @@ pub static VARIANTS: [&Variant; 23] = [
     &nncg::SOLVER,
     &anderson::SOLVER,
     &apgd::SOLVER,
+    &admm::SOLVER,
+    &direct::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,
@@ -62,6 +67,7 @@ pub static VARIANTS: [&Variant; 23] = [
     &tgs_soft::SOLVER,
     &tgs_sticky::SOLVER,
     &xpbd::SOLVER,
+    &avbd::SOLVER,
     &soft_step::SOLVER,
     &box2d::SOLVER,
     &rapier::SOLVER,
