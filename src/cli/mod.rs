@@ -153,7 +153,7 @@ fn scenes() -> String {
 fn solvers() -> String {
     let line = |v: &&Variant| {
         let standard = budget::brief(&v.budget, v);
-        format!("{:<12}{} [{}; standard {standard}]\n", v.name, v.summary, v.source)
+        format!("{:<16}{} [{}; standard {standard}]\n", v.name, v.summary, v.source)
     };
     VARIANTS.iter().map(line).collect()
 }

@@ -363,8 +363,8 @@ impl<'a> Passes<'a> {
         self.clock.lap(phase);
     }
 
-    /// Writes impulses (N·s) that `of` reads from what is kept per point into the records, for who asks
-    /// what the contacts bore.
+    /// Writes impulses (N·s) that `of` reads from what is kept per point into the records, rounded into
+    /// their cones, for who asks what the contacts bore.
     pub fn keep_impulses(&mut self, phase: Phase, of: impl Fn(&[f32]) -> Pair) {
         if self.clock.skips(phase) {
             return;
@@ -372,7 +372,9 @@ impl<'a> Passes<'a> {
         let mut impulses = self.vector();
         for (contact, c) in self.contacts.iter().enumerate() {
             for p in 0..c.manifold.count as usize {
-                impulses[2 * contact + p] = of(self.work.kept.point(contact, p));
+                let [normal, tangent] = of(self.work.kept.point(contact, p));
+                let bound = c.friction * normal;
+                impulses[2 * contact + p] = [normal, tangent.min(bound).max(-bound)];
             }
         }
         self.system().set_impulses(&impulses);

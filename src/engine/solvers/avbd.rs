@@ -206,10 +206,9 @@ fn descend(blocks: &mut Blocks<'_>, h: f32, alpha: f32) {
                 let rows = rows(blocks, contact as usize, p, alpha);
                 let kept = blocks.kept.point(contact as usize, p);
                 let penalties = [kept[NORMAL_PENALTY], kept[TANGENT_PENALTY]];
-                for axis in 0..2 {
-                    if rows.force[axis] == 0.0 {
-                        continue;
-                    }
+                // A row at its bound keeps its stiffness: without it a body would go past where the row
+                // takes hold again, and back, for ever.
+                for axis in 0..if blocks.friction { 2 } else { 1 } {
                     let mut jacobian = rows.jacobian[side][axis].map(f64::from);
                     if inv_inertia <= 0.0 {
                         jacobian[2] = 0.0;
