@@ -8,6 +8,7 @@
 use super::setup;
 use crate::engine::clock::Clock;
 use crate::engine::constraints::assign::{Assignment, Sides};
+use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
 use crate::engine::contacts::Contact;
@@ -146,7 +147,7 @@ impl<'a> Replay<'a> {
 
     /// One step of `variant` with `budget`, from the problem's start.
     pub fn run(&mut self, variant: &Variant, budget: Budget, start: Start) -> Outcome {
-        self.reset(start);
+        self.reset(variant, start);
         self.work.observe = true;
         self.work.last_rule = None;
         let input = StepInput { budget, ..self.input };
@@ -164,7 +165,7 @@ impl<'a> Replay<'a> {
 
     /// Time of one such step, its preparation included.
     pub fn time(&mut self, variant: &Variant, budget: Budget, start: Start) -> Duration {
-        self.reset(start);
+        self.reset(variant, start);
         self.work.observe = false;
         let input = StepInput { budget, ..self.input };
         let mut clock = Clock::start(false);
@@ -173,8 +174,10 @@ impl<'a> Replay<'a> {
         begin.elapsed()
     }
 
-    fn reset(&mut self, start: Start) {
+    fn reset(&mut self, variant: &Variant, start: Start) {
         self.work.rows.clone_from(&self.rows);
+        self.work.kept = Kept::default();
+        self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
         self.scratch.clone_from(&self.contacts);
         if start == Start::Cold {
             for point in self.scratch.iter_mut().flat_map(|c| &mut c.manifold.points) {
