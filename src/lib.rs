@@ -48,6 +48,9 @@
 //! made of. `lab::scenes` says what is simulated and what is known about it, `lab::metrics` how
 //! errors are measured.
 
+// Printing panics where a reader has left: what the program prints goes through `cli::output`.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 pub mod engine;
 
 #[cfg(feature = "lab")]

@@ -55,7 +55,7 @@ fn a_steady_step_allocates_nothing() {
                 continue;
             }
             let mut world = common::run(&common::scene(name), common::settings(variant), 120);
-            // Frozen steps find their pairs anew each time, moving ones only when bodies left
+            // Frozen steps search their pairs each time, moving ones only when bodies left
             // their bounds: both ways are to be free of allocations.
             world.frozen_step();
             let count = allocations(|| {

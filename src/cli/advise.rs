@@ -1,23 +1,20 @@
 //! `simpulse advise`: the cheapest setting that is good enough, with the evidence.
 
+use super::output::{print, print_json};
+use super::progress::Bar;
+use super::values::{self, Solvers, scene_help};
 use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::solvers::{VARIANTS, find};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::{Limits, quantity};
 use crate::lab::advise::{Advice, Plan, Setting, Trial, advise};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
 use crate::lab::overrides;
 use crate::lab::report::environment::Environment;
-use crate::lab::report::table::error_list;
+use crate::lab::report::table::{error_list, finish, table};
 use crate::lab::report::units::{self, digits, ratio, si, si_short};
 use crate::lab::study::open_scene;
 use clap::Args;
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use std::io::Write;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Find the cheapest setting within given tolerances on a scene
@@ -25,21 +22,22 @@ use std::process::ExitCode;
 /// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
 /// of doublings first, then values in between. What should only cost more than something known is
 /// left out. The best few are raced again side by side, and the fastest of those that keep every
-/// limit is printed with all its errors, and with those that come next.
+/// limit is printed with all its errors, with those that come next, and with the command that runs it.
 ///
 /// Exit code 0: there is one; 1: there is none, and the nearest is printed; 2: a request that
 /// cannot be met.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
-Lengths are in nm, um, mm, cm or m, times in ns, us, ms or s; a distance to the truth is in the
-unit of that truth (`simpulse scene SCENE` tells it).
+Lengths are in nm, um, mm, cm or m, times in ns, us, ms or s; a distance to the
+reference value is in the unit of that value (`simpulse scene SCENE` tells it).
 
 Examples:
   simpulse advise stack:20 --max-penetration 10mm
   simpulse advise arch --max-penetration 5mm --max-time 50us --max-residual 1e-3
-  simpulse advise incline_slip --max-truth 1mm --solvers soft_step,pgs --lanes 8 --json advice.json")]
+  simpulse advise incline_slip --max-reference 1mm --solvers soft_step,pgs --lanes 8 --json > advice.json")]
 pub struct AdviseArgs {
-    /// A scene of `simpulse scenes`, or a .json file
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// Deepest penetration allowed, such as 1mm
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
@@ -47,34 +45,34 @@ pub struct AdviseArgs {
     /// Median time of a step allowed, such as 500us
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub max_time: Option<String>,
-    /// Distance to the scene's known truth allowed
+    /// Distance to the scene's reference value allowed
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
-    pub max_truth: Option<String>,
+    pub max_reference: Option<String>,
     /// Contact-law residual allowed, root mean square in the mean weight of a body × step
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub max_residual: Option<String>,
-    /// Solvers [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "SOLVER,…")]
-    pub solvers: Vec<String>,
-    /// Lane widths: 1, 4, 8, 16; with 1 also natural order [default: the widest that this build has
-    /// instructions for]
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub lanes: Vec<usize>,
+    /// Solvers
+    #[command(flatten)]
+    pub solvers: Solvers,
+    /// Lanes per instruction; with 1 also natural order [default: the widest that this build has
+    /// instructions for; wider ones are emulated]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
+    pub lanes: Vec<LaneWidth>,
     /// Steps of the runs that measure errors [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
-    /// Timing runs of the final race
+    /// Timing runs of each setting of the last comparison
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub repeats: u32,
-    /// Begin no trial after this many seconds
+    /// Time limit of the search (s)
     #[arg(long, value_name = "S", default_value_t = 60.0)]
     pub seconds: f64,
     /// Random seed: of scenes that have one, and of the order of timing runs
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Write everything that was tried to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Print JSON instead of text: everything that was tried
+    #[arg(long)]
+    pub json: bool,
 }
 
 impl AdviseArgs {
@@ -88,36 +86,26 @@ impl AdviseArgs {
             penetration: read("max-penetration", &self.max_penetration, "m")?,
             time_ns: read("max-time", &self.max_time, "s")?.map(|s| 1e9 * s),
             residual: read("max-residual", &self.max_residual, "")?,
-            truth: match (&self.max_truth, &loaded.truth) {
+            truth: match (&self.max_reference, &loaded.truth) {
                 (Some(text), None) => {
-                    let message = format!("{text}, but no truth is known about '{}'", self.scene);
-                    return Err(Error::invalid("max-truth", message));
+                    let message = format!("{text}, but no reference value of '{}' is known", self.scene);
+                    return Err(Error::invalid("max-reference", message));
                 }
-                (text, _) => read("max-truth", text, truth)?,
+                (text, _) => read("max-reference", text, truth)?,
             },
         };
         if (limits.penetration, limits.residual, limits.truth) == (None, None, None) {
-            let message = "no error is limited: give --max-penetration, --max-residual or --max-truth";
+            let message = "no error is limited: give --max-penetration, --max-residual or --max-reference";
             return Err(Error::invalid("advise", message));
         }
         if !(self.seconds > 0.0 && self.seconds.is_finite()) {
             return Err(Error::invalid("seconds", format!("{} is not a positive number", self.seconds)));
         }
-        let width = |&n: &usize| {
-            let refused = || Error::invalid("lanes", format!("{n} is none of 1, 4, 8, 16"));
-            LaneWidth::from_lanes(n).ok_or_else(refused)
-        };
-        let mut widths = self.lanes.iter().map(width).collect::<Result<Vec<_>, _>>()?;
-        widths.sort();
-        widths.dedup();
         Ok(Plan {
             scene: self.scene.clone(),
             limits,
-            solvers: match self.solvers.is_empty() {
-                true => VARIANTS.to_vec(),
-                false => self.solvers.iter().map(|name| find(name)).collect::<Result<_, _>>()?,
-            },
-            widths: if widths.is_empty() { vec![native_width()] } else { widths },
+            solvers: self.solvers.chosen(),
+            widths: values::widths(&self.lanes, vec![native_width()]),
             steps: self.steps,
             repeats: self.repeats,
             seed: self.seed,
@@ -129,26 +117,46 @@ impl AdviseArgs {
 /// Runs the command.
 pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
     let plan = args.plan()?;
-    // Before the long wait, not after it.
-    let file = args.json.as_deref().map(Pending::new).transpose()?;
-    let bar = ProgressBar::new(1);
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let advice = advise(&plan, &|progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(progress.what);
-    });
-    bar.finish_and_clear();
-    let advice = advice?;
-    if let (Some(mut file), Some(path)) = (file, &args.json) {
-        let text = format!("{:#}\n", json(&plan, &advice));
-        file.write_all(text.as_bytes()).map_err(Error::io(path))?;
-        file.commit()?;
+    let bar = Bar::new();
+    let advice = advise(&plan, &|p| bar.show(p.done, p.total, p.what))?;
+    drop(bar);
+    match args.json {
+        true => print_json(&json(&plan, &advice))?,
+        false => print(&(text(&plan, &advice) + &values::left_out(&plan.solvers) + &repeat(&plan, &advice)))?,
+    };
+    Ok(if advice.best().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The command that runs what was chosen.
+fn repeat(plan: &Plan, advice: &Advice) -> String {
+    let Some(chosen) = advice.best().or(advice.nearest()) else { return String::new() };
+    let Setting { solver, order, budget, parameters } = &chosen.setting;
+    let mut words = vec!["simpulse run".to_string(), quoted(&plan.scene)];
+    words.push(format!("--solver {}", solver.name));
+    match order {
+        Order::Natural => words.push("--order natural".to_string()),
+        Order::Colored => words.push(format!("--lanes {}", chosen.time.map_or(1, |t| t.lanes))),
     }
-    match std::io::stdout().lock().write_all(text(&plan, &advice).as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
-        _ => Ok(if advice.best().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE }),
+    words.push(format!("--substeps {}", budget.substeps));
+    let fields = [
+        ("velocity", budget.velocity_iterations, solver.uses.velocity),
+        ("relax", budget.relax_iterations, solver.uses.relax),
+        ("position", budget.position_iterations, solver.uses.position),
+    ];
+    words.extend(fields.iter().filter(|f| f.2).map(|(name, n, _)| format!("--{name}-iterations {n}")));
+    let changed = solver.parameters.iter().zip(parameters).filter(|(p, value)| p.default != **value);
+    words.extend(changed.map(|(p, value)| format!("--set {}={value}", p.name)));
+    words.extend(plan.steps.map(|n| format!("--steps {n}")));
+    words.push(format!("--seed {}", plan.seed));
+    format!("\nto run it: {}\n", words.join(" "))
+}
+
+/// A word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
+    match word.chars().all(is_plain) && !word.is_empty() {
+        true => word.to_string(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
     }
 }
 
@@ -158,7 +166,7 @@ fn limits(plan: &Plan, unit: &str) -> String {
     let parts = [
         l.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
         l.residual.map(|r| format!("residual ≤ {}", ratio(r))),
-        l.truth.map(|t| format!("distance to truth ≤ {}", si_short(t, unit))),
+        l.truth.map(|t| format!("distance to reference value ≤ {}", si_short(t, unit))),
         l.time_ns.map(|t| format!("time ≤ {}", si_short(1e-9 * t, "s"))),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
@@ -172,7 +180,7 @@ fn text(plan: &Plan, advice: &Advice) -> String {
             text += &format!("cheapest: {}\n{}", name(best), evidence(best, advice));
             text += &match advice.runner_up() {
                 Some(next) => format!("\nrunner-up: {}, {}\n", name(next), loses(next, best)),
-                None => "\nnothing else that was raced keeps the limits\n".to_string(),
+                None => "\nnothing else that was compared keeps the limits\n".to_string(),
             };
         }
         (None, Some(nearest)) => {
@@ -182,7 +190,7 @@ fn text(plan: &Plan, advice: &Advice) -> String {
                 true => format!("it is over its worst limit by a factor of {}", digits(nearest.excess)),
                 false => match nearest.broken {
                     Some(broken) => format!("it {broken}"),
-                    None => "it failed, or never came to its truth".to_string(),
+                    None => "it failed, or never came to its reference value".to_string(),
                 },
             };
             text += &format!("{over}\n");
@@ -239,24 +247,22 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
     if let Some(truth) = &trial.truth {
         let error = truth.error.map_or("not reached".to_string(), |e| si(e, truth.unit));
         let known = format!("{} = {}", truth.quantity, si(truth.expected, truth.unit));
-        text += &format!("  {:<36}{error:>12} ({known})\n", "distance to truth");
+        text += &format!("  {:<36}{error:>12} ({known})\n", "distance to reference value");
     }
     text
 }
 
 /// Everything that was raced, a line each.
 fn finalists(advice: &Advice) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header([
-        "raced",
+    let mut rows = table(&[
+        "compared",
         "lanes",
         "µs/step",
         "±",
         "slower",
         "penetration",
         "residual",
-        "truth",
+        "reference",
         "limits",
     ]);
     let first = advice.finalists.first();
@@ -267,21 +273,22 @@ fn finalists(advice: &Advice) -> String {
         let slower = |f: &Trial| Some((f.ties(trial), trial.time?.median_ns / f.time?.median_ns - 1.0));
         let slower = first.filter(|f| !std::ptr::eq(*f, trial)).and_then(slower);
         let error = |of: &dyn Fn(&crate::lab::metrics::Errors) -> String| {
-            trial.errors.as_ref().map_or(String::new(), of)
+            trial.errors.as_ref().map_or("–".to_string(), of)
         };
-        table.add_row([
+        rows.add_row([
             trial.setting.text(),
             lanes(trial),
             time(|t| t.median_ns),
             time(|t| t.spread_ns),
-            slower.map_or(String::new(), |(tied, by)| {
-                format!("{}{:.1} %", if tied { "= " } else { "" }, 100.0 * by)
+            slower.map_or("–".to_string(), |(tied, by)| match tied {
+                true => "tie".to_string(),
+                false => format!("{:.1} %", 100.0 * by),
             }),
             error(&|e| si(e.penetration_max, "m")),
             error(&|e| ratio(e.law_rms_body)),
             trial
                 .truth
-                .map_or("—".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
+                .map_or("–".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
             match trial.broken {
                 Some(broken) => broken.mark.word(),
                 None if trial.is_good() => "kept",
@@ -290,13 +297,7 @@ fn finalists(advice: &Advice) -> String {
             .to_string(),
         ]);
     }
-    for (i, column) in table.column_iter_mut().enumerate() {
-        column.set_padding((0, 2));
-        if i >= 2 {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    table.to_string().lines().map(|line| line.trim_end().to_string() + "\n").collect()
+    finish(rows, 2)
 }
 
 fn json(plan: &Plan, advice: &Advice) -> Value {

@@ -1,13 +1,21 @@
 //! The command line: what can be asked for.
 
-use crate::cli::advise::AdviseArgs;
-use crate::cli::capture::CaptureArgs;
-use crate::cli::converge::ConvergeArgs;
-use crate::cli::growth::GrowthArgs;
-use crate::cli::profile::ProfileArgs;
-use crate::cli::verify::VerifyArgs;
-use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::solvers::{VARIANTS, Variant, find};
+use super::advise::AdviseArgs;
+use super::capture::CaptureArgs;
+use super::compare::CompareArgs;
+use super::converge::ConvergeArgs;
+use super::growth::GrowthArgs;
+use super::merge::MergeArgs;
+use super::profile::ProfileArgs;
+use super::replay::ReplayArgs;
+use super::report::ReportArgs;
+use super::run::RunArgs;
+use super::savings::SavingsArgs;
+use super::snapshot::SnapshotArgs;
+use super::study::Shard;
+use super::values::{self, Solvers};
+use super::verify::VerifyArgs;
+use crate::engine::lanes::LaneWidth;
 use crate::engine::world::Order;
 use crate::lab::advise::limits::quantity;
 use crate::lab::error::Error;
@@ -16,6 +24,7 @@ use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::budget::BudgetGrid;
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -27,21 +36,28 @@ Examples:
   simpulse scene arch --json > my.json           a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
 
+const COMPLETION_EXAMPLES: &str = "\
+Examples:
+  simpulse completions bash > ~/.local/share/bash-completion/completions/simpulse
+  simpulse completions zsh > ~/.zfunc/_simpulse
+  simpulse completions fish > ~/.config/fish/completions/simpulse.fish";
+
 const STUDY_EXAMPLES: &str = "\
 Without any budget option, each solver runs at half its standard budget, at that budget,
 and at its double. With some, every combination runs; what a solver ignores is left out.
 
 Examples:
   simpulse study --quick
+  simpulse study --solvers all --out results/all
   simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
 
 /// A laboratory for 2D contact solvers: how fast are they, and how wrong?
 ///
-/// Without a command, runs the default study: every solver on scenes whose truth is known
-/// or that are hard, at lane widths 1, 4, 8 and 16 and three budgets each. It prints a table
-/// per scene and writes study.csv, study.json, speed_vs_error.svg and
-/// profiles.svg.
+/// Without a command, runs the default study: a solver of every family on scenes that are hard or
+/// whose reference value is known, at lane widths 1, 4, 8 and 16 and three budgets each. It prints
+/// the cheapest setting that is good enough on each scene and a ranking, and writes report.html,
+/// tables.txt, study.csv, study.json, speed_vs_error.svg and profiles.svg.
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -59,50 +75,70 @@ pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
-    /// Run one scene; print the time of each phase and the errors
+    Compare(CompareArgs),
+    Merge(MergeArgs),
     Run(RunArgs),
-    /// Find the cheapest setting within given tolerances on a scene
+    Snapshot(SnapshotArgs),
+    Replay(ReplayArgs),
+    Report(ReportArgs),
     Advise(AdviseArgs),
-    /// Freeze the contact problem of one step in a file
     Capture(CaptureArgs),
-    /// Count the iterations every solver needs on one frozen problem
     Converge(ConvergeArgs),
-    /// Run the hard cases whose truth is known
     Verify(VerifyArgs),
-    /// Repeat one phase of a step and compare it with the roofline
     Profile(ProfileArgs),
-    /// Measure the cost of a contact from a thousand contacts to a million
     Growth(GrowthArgs),
+    Savings(SavingsArgs),
     /// List the scenes
-    Scenes,
+    Scenes(ListArgs),
     /// List the solvers
-    Solvers,
+    Solvers(ListArgs),
     /// Describe a scene, or print it as a file to edit
     Scene(SceneArgs),
+    /// Describe the columns of every CSV file
+    Columns(ListArgs),
+    /// Print completions for a shell
+    #[command(after_help = COMPLETION_EXAMPLES)]
+    Completions(CompletionArgs),
+}
+
+/// What lists have in common.
+#[derive(Args, Debug)]
+pub struct ListArgs {
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A shell.
+#[derive(Args, Debug)]
+pub struct CompletionArgs {
+    /// Which one
+    pub shell: Shell,
 }
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
-    /// Scenes (`simpulse scenes` lists them), with a size after a colon, or .json files
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…")]
+    /// Scenes
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", help = values::scenes_help())]
     pub scenes: Vec<String>,
-    /// Solvers (`simpulse solvers` lists them)
-    #[arg(long, value_delimiter = ',', value_name = "SOLVER,…")]
-    pub solvers: Vec<String>,
-    /// Lane widths: 1, 4, 8, 16 [default: 1, 4, 8, and 16 where this build has instructions for it]
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub lanes: Vec<usize>,
-    /// Constraint orders: natural, colored
-    #[arg(long, value_delimiter = ',', value_name = "ORDER,…")]
-    pub orders: Vec<String>,
+    /// Solvers
+    #[command(flatten)]
+    pub solvers: Solvers,
+    /// Lanes per instruction [default: 1, 4, 8, and 16 where this build has instructions for it;
+    /// wider ones are emulated]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
+    pub lanes: Vec<LaneWidth>,
+    /// Constraint orders [default: both]
+    #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
+    pub orders: Vec<Order>,
     /// Substeps to try
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub substeps: Vec<u32>,
     /// Velocity sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub velocity_iterations: Vec<u32>,
-    /// Relaxing sweeps to try, per substep
+    /// Relaxation sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub relax_iterations: Vec<u32>,
     /// Position sweeps to try, per substep
@@ -111,8 +147,8 @@ pub struct StudyArgs {
     /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
-    /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,truth=0.1
-    /// (`simpulse scene NAME` lists them; a truth in its own unit)
+    /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,reference=0.1
+    /// (`simpulse scene NAME` lists them; the reference value's in its own unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…")]
     pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]
@@ -127,72 +163,30 @@ pub struct StudyArgs {
     /// Short runs, nothing repeated: a look at everything in seconds
     #[arg(long)]
     pub quick: bool,
+    /// Print the tables of every scene after the answer
+    #[arg(long)]
+    pub verbose: bool,
+    /// Print JSON instead of text: what study.json holds
+    #[arg(long)]
+    pub json: bool,
+    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
     /// Folder for the results
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,
 }
 
-/// A run of one scene with one solver.
-#[derive(Args, Debug)]
-#[command(after_help = "\
-Examples:
-  simpulse run stack:20
-  simpulse run arch --solver pgs --velocity-iterations 32
-  simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
-pub struct RunArgs {
-    /// A scene of `simpulse scenes`, or a .json file
-    pub scene: String,
-    /// A solver of `simpulse solvers`
-    #[arg(long, default_value = crate::engine::solvers::DEFAULT)]
-    pub solver: String,
-    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for, in natural
-    /// order 1]
-    #[arg(long, value_name = "N")]
-    pub lanes: Option<usize>,
-    /// Constraint order: natural or colored
-    #[arg(long, default_value = "colored")]
-    pub order: String,
-    /// Substeps [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub substeps: Option<u32>,
-    /// Velocity sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub velocity_iterations: Option<u32>,
-    /// Relaxing sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub relax_iterations: Option<u32>,
-    /// Position sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub position_iterations: Option<u32>,
-    /// Steps [default: those of the scene]
-    #[arg(long, value_name = "N")]
-    pub steps: Option<u32>,
-    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
-    pub set: Vec<Override>,
-    /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    pub dt: Option<f64>,
-    /// Random seed of scenes that have one
-    #[arg(long)]
-    pub seed: Option<u64>,
-    /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
-    #[arg(long, value_name = "FILE.csv")]
-    pub state: Option<PathBuf>,
-    /// Write contact points with their impulses (N·s over the step)
-    #[arg(long, value_name = "FILE.csv")]
-    pub contacts: Option<PathBuf>,
-    /// Write every K-th step [default: the last step only]
-    #[arg(long, value_name = "K")]
-    pub every: Option<u32>,
-}
-
 /// A scene to look at.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// A scene of `simpulse scenes`, or a .json file
-    pub name: String,
-    /// Print it in the file format
+    /// Scene
+    #[arg(value_name = "SCENE", help = values::scene_help(), required_unless_present = "schema")]
+    pub name: Option<String>,
+    /// Print the JSON schema of scene files
+    #[arg(long, exclusive = true)]
+    pub schema: bool,
+    /// Print JSON instead of text: the scene in the file format
     #[arg(long)]
     pub json: bool,
     /// Random seed of scenes that have one
@@ -205,14 +199,11 @@ impl StudyArgs {
     pub fn plan(&self) -> Result<StudyPlan, Error> {
         let base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
         let or = |given: &[String], own: Vec<String>| if given.is_empty() { own } else { unique(given) };
-        let names = or(&self.solvers, VARIANTS.iter().map(|v| v.name.to_string()).collect());
-        let orders = or(&self.orders, vec!["natural".into(), "colored".into()]);
-        let widths = if self.lanes.is_empty() { base.widths } else { widths(&self.lanes)? };
         Ok(StudyPlan {
             scenes: or(&self.scenes, base.scenes),
-            solvers: names.iter().map(|n| find(n)).collect::<Result<Vec<&'static Variant>, _>>()?,
-            widths,
-            orders: orders.iter().map(|o| order(o)).collect::<Result<_, _>>()?,
+            solvers: self.solvers.chosen(),
+            widths: values::widths(&self.lanes, base.widths),
+            orders: if self.orders.is_empty() { base.orders } else { unique(&self.orders) },
             budgets: BudgetGrid {
                 substeps: self.substeps.clone(),
                 velocity_iterations: self.velocity_iterations.clone(),
@@ -238,9 +229,9 @@ fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
         let (place, unit) = match name.trim() {
             "penetration" => (&mut tolerances.penetration, "m"),
             "residual" => (&mut tolerances.residual, ""),
-            "truth" => (&mut tolerances.truth, ""),
+            "reference" => (&mut tolerances.truth, ""),
             other => {
-                let known = ["penetration", "residual", "truth"].into_iter();
+                let known = ["penetration", "residual", "reference"].into_iter();
                 return Err(Error::unknown("tolerance", other, known));
             }
         };
@@ -258,31 +249,4 @@ fn unique<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
         }
     }
     kept
-}
-
-fn widths(lanes: &[usize]) -> Result<Vec<LaneWidth>, Error> {
-    let mut widths = lanes.iter().map(|&n| width(n)).collect::<Result<Vec<_>, _>>()?;
-    widths.sort();
-    widths.dedup();
-    Ok(widths)
-}
-
-/// The width of `lanes` lanes.
-pub fn width(lanes: usize) -> Result<LaneWidth, Error> {
-    let refused = || Error::invalid("lanes", format!("{lanes} is none of 1, 4, 8, 16"));
-    LaneWidth::from_lanes(lanes).ok_or_else(refused)
-}
-
-/// The width of `lanes` lanes; where none are given, the widest that this build has instructions for.
-pub fn width_or_native(lanes: Option<usize>) -> Result<LaneWidth, Error> {
-    lanes.map_or(Ok(native_width()), width)
-}
-
-/// The constraint order of that name.
-pub fn order(name: &str) -> Result<Order, Error> {
-    match name {
-        "natural" => Ok(Order::Natural),
-        "colored" | "coloured" => Ok(Order::Colored),
-        _ => Err(Error::unknown("order", name, ["natural", "colored"].into_iter())),
-    }
 }

@@ -1,7 +1,8 @@
 //! `simpulse capture`: freezes the contact problem of one step.
 
-use crate::engine::params::Budget;
-use crate::engine::solvers::{self, DEFAULT};
+use super::output::{print_beside, print_json, value};
+use super::progress::Bar;
+use super::values::{SettingArgs, scene_help};
 use crate::engine::world::{Settings, World};
 use crate::lab::capture::capture;
 use crate::lab::error::Error;
@@ -9,6 +10,7 @@ use crate::lab::reference::certify::reference;
 use crate::lab::reference::frozen::Frozen;
 use crate::lab::study::open_scene;
 use clap::Args;
+use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -28,83 +30,41 @@ Examples:
   simpulse capture my_scene.json --step 30 -o impact.frozen --solver pgs --velocity-iterations 50
       The same, but with the steps before it solved more accurately.")]
 pub struct CaptureArgs {
-    /// Scene of the catalogue, with its size after a colon (`pyramid:10`), or a JSON file
-    #[arg(value_name = "SCENE")]
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// Step whose problem to freeze, from 1; the steps before it are run
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
     pub step: u64,
     /// File to write
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub out: PathBuf,
     /// How the steps before are solved
     #[command(flatten)]
-    pub run: RunArgs,
+    pub setting: SettingArgs,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
 }
-
-/// How the steps before the captured one are solved.
-#[derive(Args, Clone, Debug)]
-pub struct RunArgs {
-    /// Solver of the steps before
-    #[arg(long, value_name = "NAME", default_value = DEFAULT)]
-    pub solver: String,
-    /// Substeps per step, instead of the solver's standard
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
-    pub substeps: Option<u32>,
-    /// Velocity sweeps per substep, instead of the solver's standard
-    #[arg(long, value_name = "K")]
-    pub velocity_iterations: Option<u32>,
-    /// Relaxing sweeps per substep, instead of the solver's standard
-    #[arg(long, value_name = "K")]
-    pub relax_iterations: Option<u32>,
-    /// Position sweeps per substep, instead of the solver's standard
-    #[arg(long, value_name = "K")]
-    pub position_iterations: Option<u32>,
-}
-
-impl Default for RunArgs {
-    fn default() -> Self {
-        RunArgs {
-            solver: DEFAULT.into(),
-            substeps: None,
-            velocity_iterations: None,
-            relax_iterations: None,
-            position_iterations: None,
-        }
-    }
-}
-
-impl RunArgs {
-    fn settings(&self) -> Result<Settings, Error> {
-        let solver = solvers::find(&self.solver)?;
-        let standard = solver.budget;
-        let budget = Budget {
-            substeps: self.substeps.unwrap_or(standard.substeps),
-            velocity_iterations: self.velocity_iterations.unwrap_or(standard.velocity_iterations),
-            relax_iterations: self.relax_iterations.unwrap_or(standard.relax_iterations),
-            position_iterations: self.position_iterations.unwrap_or(standard.position_iterations),
-        };
-        Ok(Settings { budget, ..Settings::new(solver) })
-    }
-}
-
-/// Contact points from which on a reference may take seconds.
-const PATIENCE: usize = 300;
 
 /// The problem of step `step` of a scene, with its reference if there is one, and if not, why.
 ///
 /// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
 /// the step, a step without contacts.
-pub fn freeze(name: &str, step: u64, run: &RunArgs) -> Result<(Frozen, Option<String>), Error> {
-    let mut world = open_scene(name, None, None, None)?.scene.build(run.settings()?)?;
-    advance(&mut world, step)?;
+pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, Option<String>), Error> {
+    let settings = Settings {
+        budget: setting.budget()?,
+        parameters: setting.parameters()?,
+        ..Settings::new(setting.solver)
+    };
+    let mut world = open_scene(name, None, None, None)?.scene.build(settings)?;
+    let bar = Bar::new();
+    advance(&mut world, step, &bar)?;
     let problem = capture(&mut world, format!("{name}, step {step}"));
     if problem.contacts.is_empty() {
         return Err(Error::invalid("--step", format!("step {step} of '{name}' has no contacts")));
     }
-    if problem.contacts.len() > PATIENCE {
-        eprintln!("looking for a reference of {} contact points", problem.contacts.len());
-    }
+    bar.show(0, 1, format!("looking for a reference of {} contact points", problem.contacts.len()));
     Ok(match reference(&problem) {
         Ok(reference) => (Frozen { problem, reference: Some(reference) }, None),
         Err(why) => (Frozen { problem, reference: None }, Some(why.to_string())),
@@ -112,11 +72,12 @@ pub fn freeze(name: &str, step: u64, run: &RunArgs) -> Result<(Frozen, Option<St
 }
 
 /// Runs the steps before `step`.
-fn advance(world: &mut World, step: u64) -> Result<(), Error> {
+fn advance(world: &mut World, step: u64, bar: &Bar) -> Result<(), Error> {
     if step == 0 {
         return Err(Error::invalid("--step", "steps are counted from 1, is 0"));
     }
-    for _ in 1..step {
+    for done in 1..step {
+        bar.show(done as usize, step as usize, "steps before");
         world.step().map_err(|divergence| Error::invalid("--step", divergence.to_string()))?;
     }
     Ok(())
@@ -124,23 +85,34 @@ fn advance(world: &mut World, step: u64) -> Result<(), Error> {
 
 /// Runs the command.
 pub fn run(args: &CaptureArgs) -> Result<ExitCode, Error> {
-    let (frozen, why_not) = freeze(&args.scene, args.step, &args.run)?;
-    frozen.write(&args.output)?;
+    let (frozen, why_not) = freeze(&args.scene, args.step, &args.setting)?;
+    frozen.write(&args.out)?;
     let Frozen { problem, reference } = &frozen;
-    println!(
-        "{}: {} bodies, {} contact points, written to {}",
+    if args.json {
+        let certificate = reference.as_ref().map(|r| value(&r.certificate)).transpose()?;
+        return print_json(&json!({
+            "problem": problem.name,
+            "bodies": problem.bodies.len(),
+            "contact_points": problem.contacts.len(),
+            "file": args.out.display().to_string(),
+            "certificate": certificate,
+            "no_reference_because": why_not,
+        }));
+    }
+    let mut text = format!(
+        "{}: {} bodies, {} contact points, written to {}\n",
         problem.name,
         problem.bodies.len(),
         problem.contacts.len(),
-        args.output.display()
+        args.out.display()
     );
-    match (reference, why_not) {
+    text += &match (reference, why_not) {
         (Some(reference), _) => {
             let c = &reference.certificate;
-            println!("reference: {}, natural-map residual {:.1e}", c.method, c.natural_map);
+            format!("reference: {}, natural-map residual {:.1e}\n", c.method, c.natural_map)
         }
-        (None, Some(why)) => println!("written without a reference: {why}"),
-        (None, None) => {}
-    }
-    Ok(ExitCode::SUCCESS)
+        (None, Some(why)) => format!("written without a reference: {why}\n"),
+        (None, None) => String::new(),
+    };
+    print_beside([args.out.as_path()], &text)
 }

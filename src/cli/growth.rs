@@ -1,13 +1,16 @@
 //! `simpulse growth`: the cost of a contact from a thousand contacts to a million.
 
+use super::output::{print, print_json};
+use super::progress::Bar;
 use super::settled;
-use crate::engine::solvers::{DEFAULT, find};
+use super::values::{Lanes, SettingArgs};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::profile::growth::{Entry, Measurement, measure, size_for, verdicts};
 use crate::lab::profile::growth_report;
 use crate::lab::profile::islands::islands;
+use crate::lab::profile::records::growth_json;
 use crate::lab::profile::waiting;
 use crate::lab::report::units::lanes;
 use crate::lab::scenes::{CATALOG, MAX_BODIES, Scene, Size};
@@ -22,8 +25,8 @@ use std::process::ExitCode;
 /// steps of all of them in turn. A scene that has a size is grown by it; a scene with a given size, or
 /// without one, is copied side by side, so that there are many small islands. Prints time per
 /// contact by phase with the errors beside, memory per contact and per body, and whether each phase
-/// stays flat, steps where its data leave a cache, or grows faster than n log n. Writes growth.csv
-/// and growth.svg.
+/// stays flat (latency- or compute-bound), steps where its data leave a cache (bandwidth-bound), or
+/// grows faster than n log n. Writes growth.csv and growth.svg.
 ///
 /// From one size to the next, the cost per contact may grow by as much as memory of the phase's
 /// working set is read more slowly (measured), and by ln n₂/ln n₁; 15 % and twice the spread are
@@ -42,21 +45,24 @@ pub struct GrowthArgs {
     /// Contacts to aim at
     #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "1e3,3e3,1e4,3e4,1e5,3e5,1e6")]
     pub contacts: Vec<String>,
-    /// A solver of `simpulse solvers`
-    #[arg(long, default_value = DEFAULT)]
-    pub solver: String,
-    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for]
-    #[arg(long, value_name = "N")]
-    pub lanes: Option<usize>,
+    /// Solver, budget and parameters
+    #[command(flatten)]
+    pub setting: SettingArgs,
+    /// Lanes
+    #[command(flatten)]
+    pub lanes: Lanes,
     /// Steps before a scene is held still
     #[arg(long, default_value_t = 8, value_name = "STEPS")]
     pub settle: u32,
-    /// Rounds in which every size is timed once
-    #[arg(long, default_value_t = 7, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Timing runs of each size
+    #[arg(long, default_value_t = 7, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: u32,
     /// Folder for growth.csv and growth.svg
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Steps at the end of settling whose errors are printed.
@@ -156,9 +162,13 @@ fn free_memory() -> Option<f64> {
 
 /// Runs the command.
 pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
-    let solver = find(&args.solver)?;
-    let width = super::args::width_or_native(args.lanes)?;
-    let settings = Settings { width, ..Settings::new(solver) };
+    let (solver, width) = (args.setting.solver, args.lanes.or_native());
+    let settings = Settings {
+        width,
+        budget: args.setting.budget()?,
+        parameters: args.setting.parameters()?,
+        ..Settings::new(solver)
+    };
     let targets = targets(&args.contacts)?;
     // Unknown names first; a path is read when it is opened.
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
@@ -168,7 +178,10 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     files::prepare_folder(&args.out)?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut notes = String::new();
-    for target in targets {
+    let bar = Bar::new();
+    let parts = targets.len() + args.repeats as usize;
+    for (done, target) in targets.into_iter().enumerate() {
+        bar.show(done, parts, format!("settling {target} contacts"));
         let Some(scene) = family.scene(target)? else {
             notes += &format!("left out: {target} contacts, more or less than {} can have\n", args.scene);
             continue;
@@ -183,7 +196,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
             );
             continue;
         }
-        eprintln!("settling {}: {} bodies, {} steps", scene.name, scene.bodies.len(), args.settle);
+        let what = format!("settling {}: {} bodies, {} steps", scene.name, scene.bodies.len(), args.settle);
+        bar.show(done, parts, what);
         let mut world: World = scene.build(settings.clone())?;
         match settled(&mut world, args.settle, OBSERVED_STEPS) {
             Ok(errors) => entries.push(Entry { scene: scene.name, world, errors }),
@@ -191,11 +205,13 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         }
     }
     let Measurement { rows, memory, waiting } = measure(&mut entries, args.repeats, &|round| {
-        eprintln!("round {} of {}: whole steps on held states", round + 1, args.repeats);
+        bar.show(parts - (args.repeats - round) as usize, parts, "whole steps on held states");
     });
+    drop(bar);
     drop(entries);
     let title = format!("{} · {}, {}: cost of a contact", args.scene, solver.name, lanes(width.lanes()));
-    let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts(&rows, &memory)));
+    let verdicts = verdicts(&rows, &memory);
+    let mut out = format!("{title}\n\n{}", growth_report::text(&rows, &verdicts));
     out += &notes;
     out += &waiting::note(waiting);
     let contents = [
@@ -207,7 +223,10 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         files::write(&path, &bytes)?;
         out += &format!("wrote {}\n", path.display());
     }
-    super::print(&out)
+    match args.json {
+        true => print_json(&growth_json(&rows, &verdicts)),
+        false => print(&out),
+    }
 }
 
 /// A scene by name or file, as it is.

@@ -1,33 +1,47 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged, 2 a request that cannot be met.
+//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
+//! that cannot be met, 130 a signal.
 
 pub mod advise;
 pub mod args;
 pub mod capture;
+pub mod compare;
 pub mod converge;
 pub mod growth;
+pub mod interrupt;
+pub mod merge;
+pub mod output;
 pub mod profile;
+pub mod progress;
+pub mod replay;
+pub mod report;
 pub mod run;
+pub mod savings;
+pub mod snapshot;
+pub mod study;
+pub mod values;
 pub mod verify;
 
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
-use crate::lab::report;
-use crate::lab::scenes::CATALOG;
+use crate::lab::overrides;
+use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::study::{self, Progress, ablation, budget, open_scene};
-use args::{Cli, Command, SceneArgs, StudyArgs};
-use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, Write};
+use crate::lab::scenes::{CATALOG, SCHEMA};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
+use clap::{CommandFactory, Parser};
+use output::{note, print, print_json};
+use serde_json::{Value, json};
+use std::io::ErrorKind;
 use std::process::ExitCode;
-use std::sync::Mutex;
 
 /// Parses the command line, runs the command, reports; see the [module](self) for exit codes.
 pub fn main() -> ExitCode {
+    interrupt::install();
     let result = match Cli::try_parse() {
         Ok(cli) => execute(cli),
         // Help and version are answers; clap's advice on the rest goes on one line.
@@ -36,14 +50,16 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             return ExitCode::from(2);
         }
     };
     match result {
         Ok(code) => code,
+        // A reader that has left has seen what it wanted.
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error.to_string()));
+            note(&format!("error: {}\n", one_line(&error.to_string())));
             ExitCode::from(2)
         }
     }
@@ -51,32 +67,26 @@ pub fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => study(&cli.study),
-        Some(Command::Study(args)) => study(&args),
-        Some(Command::Run(args)) => match run::run(&args)? {
-            run::Ending::Finished(text) => print(&text),
-            run::Ending::Diverged(failure) => {
-                eprintln!("failed: {} {failure}; nothing written", args.scene);
-                Ok(ExitCode::FAILURE)
-            }
-        },
+        None => study::run(&cli.study),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Snapshot(args)) => snapshot::run(&args),
+        Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),
-        Some(Command::Scenes) => print(&scenes()),
-        Some(Command::Solvers) => print(&solvers()),
+        Some(Command::Savings(args)) => savings::run(&args),
+        Some(Command::Scenes(args)) => scenes(&args),
+        Some(Command::Solvers(args)) => solvers(&args),
         Some(Command::Scene(args)) => print(&scene(&args)?),
-    }
-}
-
-/// To standard output; a reader that has left is not an error.
-fn print(text: &str) -> Result<ExitCode, Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
-        _ => Ok(ExitCode::SUCCESS),
+        Some(Command::Columns(args)) => columns(&args),
+        Some(Command::Completions(args)) => completions(&args),
     }
 }
 
@@ -88,78 +98,79 @@ fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn study(args: &StudyArgs) -> Result<ExitCode, Error> {
-    let plan = args.plan()?;
-    plan.check()?;
-    // Before the long wait, not after it.
-    crate::lab::files::prepare_folder(&args.out)?;
-    let records = match std::io::stderr().is_terminal() {
-        true => with_bar(|tell| study::run(&plan, tell))?,
-        false => with_lines(&plan.scenes, |tell| study::run(&plan, tell))?,
-    };
-    let costs = ablation::ablation(&plan)?;
-    let paths = report::write_study(&args.out, &plan, &records, &costs)?;
-    let mut text = report::text(&records, &costs) + "\n";
-    for path in paths {
-        text += &format!("wrote {}\n", path.display());
+fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
+    if args.json {
+        let entry = |e: &crate::lab::scenes::Entry| {
+            json!({
+                "name": e.name, "summary": e.summary, "reference_value_known": e.truth.is_some(),
+                "size": e.size.map(|s| json!({
+                    "meaning": s.meaning, "default": s.default, "min": s.min, "max": s.max,
+                })),
+            })
+        };
+        return print_json(&CATALOG.iter().map(entry).collect());
     }
-    print(&text)
-}
-
-/// A bar that says what runs.
-fn with_bar<T>(work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
-    let bar = ProgressBar::new(1);
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let result = work(&|progress: Progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(progress.what);
-    });
-    bar.finish_and_clear();
-    result
-}
-
-/// Where there is no terminal, a line when the times of a scene are begun.
-fn with_lines<T>(scenes: &[String], work: impl FnOnce(&(dyn Fn(Progress) + Sync)) -> T) -> T {
-    eprintln!("measuring errors of {} scenes, then times", scenes.len());
-    let last = Mutex::new(String::new());
-    work(&|progress: Progress| {
-        let Progress { done, total, what } = progress;
-        let scene = what.strip_prefix("times ").and_then(|w| w.split(" · ").next());
-        if let (Some(scene), Ok(mut last)) = (scene, last.lock())
-            && *last != scene
-        {
-            *last = scene.to_string();
-            eprintln!("{done}/{total} times of {scene}");
-        }
-    })
-}
-
-fn scenes() -> String {
     let mut text = String::new();
     for entry in CATALOG {
         let name = match entry.size {
             Some(size) => format!("{}:{}", entry.name, size.default),
             None => entry.name.to_string(),
         };
-        let known = if entry.truth.is_some() { " [truth known]" } else { "" };
+        let known = if entry.truth.is_some() { " [reference value known]" } else { "" };
         let size = entry.size.map_or(String::new(), |s| format!(" ({} to {} {})", s.min, s.max, s.meaning));
         text += &format!("{name:<22}{}{size}{known}\n", entry.summary);
     }
-    text
+    print(&text)
 }
 
-fn solvers() -> String {
+fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
+    let is_default = |v: &Variant| DEFAULT_SOLVERS.contains(&v.name);
+    if args.json {
+        let entry = |v: &&'static Variant| {
+            json!({
+                "name": v.name, "summary": v.summary, "source": v.source, "standard_budget": v.budget,
+                "uses": v.uses, "parameters": overrides::by_name(v, &v.defaults()),
+                "in_default_study": is_default(v),
+            })
+        };
+        return print_json(&VARIANTS.iter().map(entry).collect::<Value>());
+    }
+    let width = VARIANTS.iter().map(|v| v.name.len()).max().unwrap_or(0);
     let line = |v: &&Variant| {
         let standard = budget::brief(&v.budget, v);
-        format!("{:<16}{} [{}; standard {standard}]\n", v.name, v.summary, v.source)
+        let star = if is_default(v) { "*" } else { " " };
+        format!("{star} {:<width$}  {} [{}; standard {standard}]\n", v.name, v.summary, v.source)
     };
-    VARIANTS.iter().map(line).collect()
+    let lines: String = VARIANTS.iter().map(line).collect();
+    print(&format!("* in the default study; --solvers all runs every solver\n{lines}"))
+}
+
+fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
+    let column = |c: &Column| json!({ "name": c.name, "unit": c.unit, "meaning": c.meaning });
+    let sheet = |s: &&Sheet| {
+        json!({
+            "file": s.file, "command": s.command, "line": s.line,
+            "columns": s.columns.iter().map(column).collect::<Vec<_>>(),
+        })
+    };
+    match args.json {
+        true => print_json(&SHEETS.iter().map(sheet).collect()),
+        false => print(&columns::text()),
+    }
+}
+
+fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "simpulse", &mut script);
+    print(&String::from_utf8_lossy(&script))
 }
 
 fn scene(args: &SceneArgs) -> Result<String, Error> {
-    let loaded = open_scene(&args.name, args.seed, None, None)?;
+    let name = match &args.name {
+        Some(name) if !args.schema => name,
+        _ => return Ok(SCHEMA.to_string()),
+    };
+    let loaded = open_scene(name, args.seed, None, None)?;
     let scene = loaded.scene;
     if args.json {
         return Ok(scene.to_json());
@@ -173,7 +184,7 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
         scene.dt
     );
     if let Some(truth) = &loaded.truth {
-        text += &format!("known: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
+        text += &format!("reference value: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
     }
     text += "holds if nothing blows up and no body passes through a static one";
     for demand in loaded.demands {
@@ -184,7 +195,7 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
     let lines = [
         ("penetration", Some((own.penetration, "m"))),
         ("residual", Some((own.residual, "body weights"))),
-        ("truth", own.truth.map(|t| (t, unit))),
+        ("reference", own.truth.map(|t| (t, unit))),
     ];
     for (name, line) in lines {
         let Some((Tolerance { value, reason }, unit)) = line else { continue };

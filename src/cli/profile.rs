@@ -1,32 +1,32 @@
 //! `simpulse profile`: one phase of a step, again and again.
 
+use super::output::{note, print, print_json};
 use super::settled;
+use super::values::{Lanes, SettingArgs, scene_help};
 use crate::engine::clock::Phase;
-use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
-use crate::lab::profile::{Options, profile, roofline, text};
+use crate::lab::profile::{Options, profile, records, roofline, text};
 use crate::lab::report::table::error_line;
-use crate::lab::study::budget;
 use crate::lab::study::open_scene;
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Repeat one phase of a step and compare it with the roofline
 ///
-/// Settles the scene, holds its state still and repeats one phase on it: pairs, collide, color,
-/// prepare, warm-start, solve, relax, position, restitution, integrate or store, or all that there
-/// are. Between repeats, it measures with the same clock how fast memory can be read and updated in a
-/// set of the same size, and how many multiply-adds a core does at this lane width.
+/// Settles the scene, holds its state still and repeats one phase on it, or every one in turn. Between
+/// repeats, it measures with the same clock how fast memory can be read and updated in a
+/// working set of the same size, and how many multiply-adds a core does at this lane width.
 ///
 /// Bytes are those that the code names: 4 per float of a record read and again per impulse written,
 /// 4 per index, 32 per body row gathered, 16 per body written back; for pairs, collide and color what
 /// goes in once and what comes out once. Operations are counted, by running the same
 /// kernel on a lane that counts: a multiply-add is two, a division or root one, minima, maxima and
-/// selections none. Counted is what the text does; the compiler leaves out what nobody reads, 2 % of a
+/// selections none. Counted is what the source does; the compiler leaves out what nobody reads, 2 % of a
 /// sweep. Of prepare and restitution only what is done in lanes is counted.
 ///
 /// Velocities and impulses that repeats change are brought back every 100 repeats, outside of the
@@ -45,23 +45,21 @@ With perf, which then sees the phase and nothing else; build with frame pointers
   perf stat -e cycles:u,instructions:u -- target/release/simpulse profile pyramid:30 --phase solve --no-ceilings
 The steps that settle the scene are in it too: --settle 5 and a long --seconds make them small.")]
 pub struct ProfileArgs {
-    /// A scene of `simpulse scenes`, with a size after a colon, or a .json file
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
     /// The phase to repeat, or `all` in turn
-    #[arg(long, default_value = "all", value_name = "PHASE")]
-    pub phase: String,
+    #[arg(long, default_value = "all", value_name = "PHASE", value_parser = phase())]
+    pub phase: Option<Phase>,
     /// Time of the measurement (s)
     #[arg(long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
     pub seconds: f64,
-    /// A solver of `simpulse solvers`
-    #[arg(long, default_value = DEFAULT)]
-    pub solver: String,
-    /// Lanes: 1, 4, 8 or 16 [default: the widest that this build has instructions for]
-    #[arg(long, value_name = "N")]
-    pub lanes: Option<usize>,
-    /// Substeps [default: the solver's]
-    #[arg(long, value_name = "N")]
-    pub substeps: Option<u32>,
+    /// Solver, budget and parameters
+    #[command(flatten)]
+    pub setting: SettingArgs,
+    /// Lanes
+    #[command(flatten)]
+    pub lanes: Lanes,
     /// Steps before the state is held still
     #[arg(long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
@@ -74,6 +72,9 @@ pub struct ProfileArgs {
     /// Draw operations per byte against operations per second
     #[arg(long, value_name = "FILE.svg")]
     pub roofline: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Steps at the end of settling whose errors are printed.
@@ -92,29 +93,26 @@ fn key(phase: Phase) -> String {
     phase.name().replace(' ', "-")
 }
 
-/// The phases that `name` asks for.
-fn parse(name: &str) -> Result<Vec<Phase>, Error> {
-    if name == "all" {
-        return Ok(Phase::ALL.to_vec());
-    }
-    let found = Phase::ALL.into_iter().find(|&p| key(p) == name.trim().replace([' ', '_'], "-"));
-    let refused =
-        || Error::invalid("phase", format!("'{name}' is none of {}", names(Phase::ALL.into_iter())));
-    found.map(|phase| vec![phase]).ok_or_else(refused)
+/// The parser of `--phase`; none is all of them.
+fn phase() -> impl TypedValueParser<Value = Option<Phase>> {
+    let names = Phase::ALL.into_iter().map(|p| PossibleValue::new(key(p)));
+    let all = [PossibleValue::new("all")];
+    PossibleValuesParser::new(names.chain(all)).map(|name| Phase::ALL.into_iter().find(|&p| key(p) == name))
 }
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
-    let solver = find(&args.solver)?;
-    let width = super::args::width_or_native(args.lanes)?;
-    let mut chosen = solver.budget;
-    chosen.substeps = args.substeps.unwrap_or(chosen.substeps);
-    budget::check(&chosen, solver)?;
-    Ok(Settings { width, budget: chosen, ..Settings::new(solver) })
+    let setting = &args.setting;
+    Ok(Settings {
+        width: args.lanes.or_native(),
+        budget: setting.budget()?,
+        parameters: setting.parameters()?,
+        ..Settings::new(setting.solver)
+    })
 }
 
 /// Runs the command.
 pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
-    let phases = parse(&args.phase)?;
+    let phases = args.phase.map_or(Phase::ALL.to_vec(), |phase| vec![phase]);
     if !(args.seconds > 0.0 && args.seconds <= MAX_SECONDS) {
         let message = format!("is {}, must be above 0 and at most {MAX_SECONDS}", args.seconds);
         return Err(Error::invalid("seconds", message));
@@ -126,7 +124,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     let scene = open_scene(&args.scene, args.seed, None, None)?.scene;
     // Before the long wait, not after it.
     let file = args.roofline.as_deref().map(Pending::new).transpose()?;
-    eprintln!("settling {}: {} steps", scene.name, args.settle);
+    note(&format!("settling {}: {} steps\n", scene.name, args.settle));
     let mut world = scene.build(settings)?;
     let errors = settled(&mut world, args.settle, OBSERVED_STEPS)?;
     let mut frozen = world.hold();
@@ -136,20 +134,28 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
         && missing(&phase)
     {
         let has = names(probes.iter().map(|p| p.phase));
-        let message =
-            format!("'{}' is none of what {} does on {}: {has}", key(*phase), args.solver, scene.name);
+        let message = format!(
+            "'{}' is none of what {} does on {}: {has}",
+            key(*phase),
+            args.setting.solver.name,
+            scene.name
+        );
         return Err(Error::invalid("phase", message));
     }
     let what = if let [phase] = phases.as_slice() { phase.name() } else { "every phase in turn" };
     let rest = if args.no_ceilings { "nothing else" } else { "the machine's ceilings between" };
-    eprintln!("repeating {what} for {} s, {rest} (process {})", args.seconds, std::process::id());
+    note(&format!("repeating {what} for {} s, {rest} (process {})\n", args.seconds, std::process::id()));
     let options = Options { phases, seconds: args.seconds, ceilings: !args.no_ceilings };
     let report = profile(&mut frozen, &probes, &scene.name, &options);
+    let json = args.json.then(|| records::json(&report, errors.as_ref()));
     let mut out = text::head(&report) + &error_line(errors.as_ref()) + "\n" + &text::text(&report);
     if let (Some(mut file), Some(path)) = (file, &args.roofline) {
         file.write_all(roofline::svg(&report)?.as_bytes()).map_err(Error::io(path))?;
         file.commit()?;
         out += &format!("\nwrote {}\n", path.display());
     }
-    super::print(&out)
+    match json {
+        Some(json) => print_json(&json),
+        None => print(&out),
+    }
 }

@@ -1,54 +1,143 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and what happened as CSV.
 
-use super::args::{RunArgs, order, width_or_native};
+use super::output::{note, print_beside, print_json, value};
+use super::progress::Bar;
+use super::values::{self, SettingArgs, scene_help};
 use crate::engine::clock::{Phase, Timings};
-use crate::engine::lanes::LaneWidth;
-use crate::engine::params::Budget;
-use crate::engine::solvers::find;
+use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
-use crate::lab::metrics::Observation;
+use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::state::Angles;
+use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
+use crate::lab::recording::record::{Caption, Recorder};
+use crate::lab::report::columns;
+use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{digits, lanes, si};
-use crate::lab::scenes::holds::Watch;
+use crate::lab::report::units::{digits, lanes, ratio, si};
+use crate::lab::scenes::Scene;
+use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
-use std::path::Path;
+use clap::Args;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
-/// How a run ended.
-pub enum Ending {
-    /// With this report.
-    Finished(String),
-    /// Before its time.
-    Diverged(Failure),
+/// Run one scene with one solver; print its time and its errors
+///
+/// Prints the figures to act on: the time of a step and of its longest phase, the greatest
+/// penetration, the contact-law residual, the distance to the scene's reference value, the speed that
+/// is left at rest, the change of energy, and whether the scene holds. `--all` prints everything that
+/// is measured.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  simpulse run stack:20
+  simpulse run arch --solver pgs --velocity-iterations 32 --all
+  simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
+pub struct RunArgs {
+    /// Scene
+    #[arg(value_name = "SCENE", help = scene_help())]
+    pub scene: String,
+    /// Solver, budget and parameters
+    #[command(flatten)]
+    pub setting: SettingArgs,
+    /// Lanes per instruction [default: the widest that this build has instructions for, in natural
+    /// order 1; wider ones are emulated]
+    #[arg(long, value_name = "N", value_parser = values::lanes())]
+    pub lanes: Option<LaneWidth>,
+    /// Constraint order
+    #[arg(long, default_value = "colored", value_name = "ORDER", value_parser = values::order())]
+    pub order: Order,
+    /// Steps [default: those of the scene]
+    #[arg(long, value_name = "N")]
+    pub steps: Option<u32>,
+    /// Step in seconds [default: that of the scene]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub dt: Option<f64>,
+    /// Random seed of scenes that have one
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
+    #[arg(long, value_name = "FILE.csv")]
+    pub state: Option<PathBuf>,
+    /// Write contact points with their impulses (N·s over the step)
+    #[arg(long, value_name = "FILE.csv")]
+    pub contacts: Option<PathBuf>,
+    /// Write a recording for `simpulse replay`
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Keep contact points and impulses in the recording, too
+    #[arg(long, requires = "record")]
+    pub record_contacts: bool,
+    /// Write every K-th step [default: of CSV files the last step only, of a recording all]
+    #[arg(long, value_name = "K")]
+    pub every: Option<u32>,
+    /// Print all phases, counts and errors
+    #[arg(long)]
+    pub all: bool,
+    /// Print JSON instead of text: everything
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What a run found.
+struct Found {
+    times: Times,
+    errors: Errors,
+    truth: Option<TruthError>,
+    broken: Option<Broken>,
 }
 
 /// Runs the scene that was asked for; writes its files once all of it has run.
-pub fn run(args: &RunArgs) -> Result<Ending, Error> {
-    let settings = settings(args)?;
+pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
+    let settings = settings(&args.setting, args.order, args.lanes)?;
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
-    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
-        return Err(Error::invalid("every", "needs --state or --contacts"));
+    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() && args.record.is_none() {
+        return Err(Error::invalid("every", "needs --state, --contacts or --record"));
     }
-    if args.state.is_some() && args.state == args.contacts {
-        return Err(Error::invalid("contacts", "is the same file as --state"));
+    let sheets = [&args.state, &args.contacts].into_iter().flatten();
+    if let Some(record) = args.record.iter().find(|record| sheets.clone().any(|s| same_file(s, record))) {
+        let message =
+            format!("'{}' is the same file as --state or --contacts; give another name", record.display());
+        return Err(Error::invalid("--record", message));
+    }
+    if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
+        && same_file(state, contacts)
+    {
+        let message = format!("'{}' is the same file as --state; give another name", contacts.display());
+        return Err(Error::invalid("--contacts", message));
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
     let mut world = scene.build(settings)?;
-    let mut state = args.state.as_deref().map(|path| Sheet::new(path, &STATE)).transpose()?;
-    let mut contacts = args.contacts.as_deref().map(|path| Sheet::new(path, &CONTACTS)).transpose()?;
+    let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
+    let mut contacts =
+        args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
 
+    let every = args.every.unwrap_or(1);
+    let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
+        let (scene, solver) = (scene.name.clone(), world.settings.solver.name.into());
+        let caption = Caption { scene, solver, setting: how(&world.settings) };
+        // Begun now, so that a file that cannot be written is refused before the run.
+        Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
+    });
+    let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
     let mut times = Times::default();
+    let bar = Bar::new();
+    let diverged = |failure: Failure| {
+        note(&format!("failed: {} {failure}; nothing written\n", args.scene));
+        Ok(ExitCode::FAILURE)
+    };
     for step in 1..=scene.steps {
         let due = args.every.map_or(step == scene.steps, |every| step % every == 0);
         let starts: Vec<_> = match (&contacts, due) {
@@ -56,14 +145,20 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
             _ => Vec::new(),
         };
         if let Err(divergence) = world.step() {
-            return Ok(Ending::Diverged(divergence.into()));
+            drop(bar);
+            return diverged(divergence.into());
         }
+        bar.show(step as usize, scene.steps as usize, "steps");
         times.add(&world.timings);
+        if let Some((_, recorder)) = &mut recorder {
+            recorder.add(&world)?;
+        }
         observation.observe(&world);
         watch.observe(&world);
         angles.add(&world);
         if let Some(blow_up) = observation.blown_up() {
-            return Ok(Ending::Diverged(blow_up.into()));
+            drop(bar);
+            return diverged(blow_up.into());
         }
         if let Some(truth) = &mut loaded.truth {
             truth.observer.observe(&world);
@@ -75,69 +170,145 @@ pub fn run(args: &RunArgs) -> Result<Ending, Error> {
             write_contacts(sheet, &world, &starts)?;
         }
     }
-    let mut text = head(&world, scene);
-    text += &times.table();
-    text += &counts(&world);
-    text += "\nerrors\n";
-    text += &error_list(&observation.errors());
-    if let Some(truth) = &loaded.truth {
-        text += &truth_line(&TruthError::of(truth));
+    drop(bar);
+    let truth = loaded.truth.as_ref().map(TruthError::of);
+    let found = Found { times, errors: observation.errors(), truth, broken: watch.broken() };
+    let mut written = String::new();
+    if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
+        let outcome = found.broken.map_or("holds".to_string(), |broken| broken.to_string());
+        file.write_all(&recorder.finish(&outcome)?).map_err(Error::io(path))?;
+        file.commit()?;
+        written += &format!("wrote {}\n", path.display());
     }
-    text += &match watch.broken() {
-        Some(broken) => format!("  does not hold: {broken}\n"),
-        None => "  holds\n".to_string(),
-    };
     for sheet in [state, contacts].into_iter().flatten() {
-        text += &format!("wrote {}\n", sheet.path.clone());
+        written += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;
     }
-    Ok(Ending::Finished(text))
+    if args.json {
+        return print_json(&json(&world, scene, &found)?);
+    }
+    let mut text = head(&world, scene);
+    text += &if args.all { everything(&world, &found) } else { found.figures() };
+    let files = [&args.state, &args.contacts, &args.record].into_iter().flatten();
+    print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
-fn settings(args: &RunArgs) -> Result<Settings, Error> {
-    let solver = find(&args.solver)?;
-    let order = order(&args.order)?;
-    let lanes = match (order, args.lanes) {
-        (Order::Natural, None) => LaneWidth::W1,
-        (Order::Natural, Some(lanes)) if lanes != 1 => {
-            return Err(Error::invalid("lanes", format!("{lanes}, but natural order has 1 lane")));
+/// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
+/// lanes.
+pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
+    let lanes = match (order, lanes) {
+        (Order::Natural, None | Some(LaneWidth::W1)) => LaneWidth::W1,
+        (Order::Natural, Some(width)) => {
+            let message = format!("{}, but natural order has 1 lane", width.lanes());
+            return Err(Error::invalid("lanes", message));
         }
-        (_, lanes) => width_or_native(lanes)?,
+        (Order::Colored, lanes) => lanes.unwrap_or(native_width()),
     };
-    let own = solver.budget;
-    let chosen = Budget {
-        substeps: args.substeps.unwrap_or(own.substeps),
-        velocity_iterations: args.velocity_iterations.unwrap_or(own.velocity_iterations),
-        relax_iterations: args.relax_iterations.unwrap_or(own.relax_iterations),
-        position_iterations: args.position_iterations.unwrap_or(own.position_iterations),
-    };
-    budget::check(&chosen, solver)?;
-    overrides::check(&[solver], &args.set)?;
     Ok(Settings {
         width: lanes,
         order,
-        budget: chosen,
-        parameters: overrides::values(solver, &args.set)?,
+        budget: setting.budget()?,
+        parameters: setting.parameters()?,
         record_impulses: true,
         timed: true,
-        ..Settings::new(solver)
+        ..Settings::new(setting.solver)
     })
 }
 
-fn head(world: &World, scene: &crate::lab::scenes::Scene) -> String {
+impl Found {
+    /// The eight figures that people act on, by what they say.
+    fn figures(&self) -> String {
+        let e = &self.errors;
+        let line = |name: &str, value: String, note: String| {
+            format!("  {:<34}{:>12}  {note}", name, value).trim_end().to_string() + "\n"
+        };
+        let (longest, share) = self.times.longest();
+        let reference = match &self.truth {
+            None => line("distance to reference value", "–".into(), "none is known".into()),
+            Some(t) => {
+                let known = format!("{} = {}", t.quantity, si(t.expected, t.unit));
+                let distance = t.error.map_or("not reached".into(), |e| si(e, t.unit));
+                line("distance to reference value", distance, known)
+            }
+        };
+        let holds = self.broken.map_or("yes".to_string(), |broken| broken.mark.word().to_string());
+        let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
+        [
+            "cost\n".to_string(),
+            line("time of a step, median", si(1e-9 * self.times.step_ns(), "s"), String::new()),
+            line("longest phase", longest.to_string(), format!("{:.0} % of the time", 100.0 * share)),
+            "error\n".to_string(),
+            line("greatest penetration", si(e.penetration_max, "m"), String::new()),
+            line("contact-law residual, rms", ratio(e.law_rms_body), "body weights × step".into()),
+            reference,
+            "behaviour\n".to_string(),
+            line("holds", holds, when),
+            line("residual speed, last second", si(e.rest_velocity, "m/s"), "rms".into()),
+            line("energy change", ratio(e.energy_change), "relative; positive is gained".into()),
+        ]
+        .concat()
+            + "--all prints every figure\n"
+    }
+}
+
+/// Every phase, count and error.
+fn everything(world: &World, found: &Found) -> String {
+    let mut text = found.times.table();
+    text += &counts(world);
+    text += "\nerrors\n";
+    text += &error_list(&found.errors);
+    if let Some(truth) = &found.truth {
+        text += &truth_line(truth);
+    }
+    text + &match found.broken {
+        Some(broken) => format!("  does not hold: {broken}\n"),
+        None => "  holds\n".to_string(),
+    }
+}
+
+/// Everything that a run measured, and what was run.
+fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
     let s = &world.settings;
+    let phases: serde_json::Map<String, Value> =
+        found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();
+    Ok(json!({
+        "environment": Environment::current(),
+        "scene": scene.name,
+        "bodies": scene.bodies.len(),
+        "steps": scene.steps,
+        "dt": scene.dt,
+        "solver": s.solver.name,
+        "budget": s.budget,
+        "parameters": overrides::by_name(s.solver, &s.parameters),
+        "order": s.order,
+        "lanes": s.width.lanes(),
+        "step_ns": found.times.step_ns(),
+        "phase_ns": phases,
+        "errors": value(&found.errors)?,
+        "reference": value(&found.truth)?,
+        "broken": value(&found.broken)?,
+    }))
+}
+
+/// Budget and order or lanes.
+fn how(s: &Settings) -> String {
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(s.width.lanes()),
     };
+    format!("{}, {order}", budget::brief(&s.budget, s.solver))
+}
+
+fn head(world: &World, scene: &Scene) -> String {
+    let s = &world.settings;
     format!(
-        "{}: {} bodies, {} steps of {} · {}, {}, {order}\n\n",
+        "{}: {} bodies, {} steps of {} · {}, {}\n\n",
         scene.name,
         scene.bodies.len(),
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,
-        budget::brief(&s.budget, s.solver),
+        how(s),
     )
 }
 
@@ -161,8 +332,8 @@ fn counts(world: &World) -> String {
 fn truth_line(truth: &TruthError) -> String {
     let known = format!("{} = {}", truth.quantity, si(truth.expected, truth.unit));
     match truth.error {
-        Some(error) => format!("  distance to truth: {} ({known})\n", si(error, truth.unit)),
-        None => format!("  distance to truth: not reached in this run ({known})\n"),
+        Some(error) => format!("  distance to reference value: {} ({known})\n", si(error, truth.unit)),
+        None => format!("  distance to reference value: not reached in this run ({known})\n"),
     }
 }
 
@@ -179,6 +350,25 @@ impl Times {
             times.push(ns as f64);
         }
         self.steps.push(timings.step_ns as f64);
+    }
+
+    /// Median time of a step (ns).
+    fn step_ns(&self) -> f64 {
+        interleave::median(&self.steps)
+    }
+
+    /// Median times (ns) of the phases that the solver has.
+    fn by_phase(&self) -> impl Iterator<Item = (String, f64)> {
+        let all = Phase::ALL.iter().zip(&self.phases).filter(|(_, times)| times.iter().any(|&t| t > 0.0));
+        all.map(|(phase, times)| (phase.name().to_string(), interleave::median(times)))
+    }
+
+    /// The phase that takes most of the time, and its share (1).
+    fn longest(&self) -> (&'static str, f64) {
+        let sum = |times: &[f64]| times.iter().sum::<f64>();
+        let all = Phase::ALL.iter().zip(&self.phases).map(|(phase, times)| (phase.name(), sum(times)));
+        let (name, time) = all.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(("none", 0.0));
+        (name, time / sum(&self.steps).max(1.0))
     }
 
     /// Mean and median per step; phases that the solver does not have are left out.
@@ -200,33 +390,18 @@ impl Times {
     }
 }
 
-const STATE: [&str; 9] = ["step", "time", "body", "x", "y", "angle", "vx", "vy", "omega"];
-const CONTACTS: [&str; 11] = [
-    "step",
-    "body_a",
-    "body_b",
-    "feature",
-    "px",
-    "py",
-    "nx",
-    "ny",
-    "separation",
-    "normal_impulse",
-    "tangent_impulse",
-];
-
 /// A CSV file that appears when it is whole.
-struct Sheet {
+struct CsvFile {
     writer: csv::Writer<Pending>,
     path: String,
 }
 
-impl Sheet {
-    fn new(path: &Path, header: &[&str]) -> Result<Self, Error> {
+impl CsvFile {
+    fn new(path: &Path, sheet: &columns::Sheet) -> Result<Self, Error> {
         let path_text = path.display().to_string();
-        let mut sheet = Sheet { writer: csv::Writer::from_writer(Pending::new(path)?), path: path_text };
-        sheet.row(header)?;
-        Ok(sheet)
+        let mut file = CsvFile { writer: csv::Writer::from_writer(Pending::new(path)?), path: path_text };
+        file.row(sheet.names())?;
+        Ok(file)
     }
 
     fn row(&mut self, row: impl serde::Serialize) -> Result<(), Error> {
@@ -234,14 +409,14 @@ impl Sheet {
     }
 
     fn commit(self) -> Result<(), Error> {
-        let Sheet { writer, path } = self;
+        let CsvFile { writer, path } = self;
         let pending = writer.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
         pending.commit()
     }
 }
 
 /// A line per body: origin, angle with all turns since the start, velocity of the centre of mass.
-fn write_state(sheet: &mut Sheet, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
+fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
@@ -254,7 +429,7 @@ fn write_state(sheet: &mut Sheet, world: &World, angles: &Angles, dt: f64) -> Re
 
 /// A line per contact point: geometry at the start of the step, where the centres of mass
 /// were at `starts`; impulses on body b over the step.
-fn write_contacts(sheet: &mut Sheet, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
+fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
     for contact in &world.contacts {
         let normal = contact.manifold.normal;
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {

@@ -1,41 +1,45 @@
 //! `simpulse verify`: hard cases with known truths, against every solver.
 
-use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
+use super::output::{self, finite, print_json};
+use super::progress::Bar;
+use super::values::{self, Solvers};
+use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
 use crate::lab::verify::{
-    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Progress, Required, Sweep, SweepRow,
+    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Required, Sweep, SweepRow,
 };
 use clap::Args;
 use comfy_table::{ContentArrangement, Table, presets};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use std::io::Write;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Judge every solver, at its standard budget, by cases whose truth is known on paper.
+/// Run the hard cases whose truth is known on paper
+///
+/// Every case runs with every solver at its standard budget and compares one number with its
+/// reference value. What fails is shown as failing, and where a bound or a required mark was ever
+/// relaxed, `--list` says so.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,
-so that up to 1 passes. '*' marks the cases that the default solver is required to pass; --list says why.
+so that up to 1 passes. '*' marks the cases that the default solver is required to pass, '†' those whose
+bound or mark was relaxed after a failure; --list says why and how.
 Exit code 0: it passed all of those that ran; 1: it did not; 2: a request that cannot be met.
 
 Examples:
   simpulse verify
-  simpulse verify --case A1,B4.heavy --solver pgs,soft_step
-  simpulse verify --solver soft_step --json verify.json
+  simpulse verify --cases A1,B4.heavy --solvers pgs,soft_step
+  simpulse verify --solvers all --json > verify.json
   simpulse verify --list")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long = "case", value_delimiter = ',', value_name = "ID,…")]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…")]
     pub cases: Vec<String>,
-    /// Solvers [default: all]
-    #[arg(long = "solver", value_delimiter = ',', value_name = "SOLVER,…")]
-    pub solvers: Vec<String>,
-    /// Write everything measured to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Solvers
+    #[command(flatten)]
+    pub solvers: Solvers,
+    /// Print JSON instead of text: everything that was measured
+    #[arg(long)]
+    pub json: bool,
     /// Only list the cases: tolerances, and what is required of the default solver
     #[arg(long)]
     pub list: bool,
@@ -48,27 +52,22 @@ pub struct VerifyArgs {
 pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let cases = verify::select(&args.cases)?;
     if args.list {
-        return print(&list(&cases), ExitCode::SUCCESS);
+        return match args.json {
+            true => print_json(&cases.iter().map(described).collect()),
+            false => print(&list(&cases), ExitCode::SUCCESS),
+        };
     }
-    let solvers: Vec<&Variant> = match args.solvers.is_empty() {
-        true => VARIANTS.to_vec(),
-        false => args.solvers.iter().map(|name| find(name.trim())).collect::<Result<_, _>>()?,
-    };
-    // Before the long wait, not after it.
-    let file = args.json.as_deref().map(Pending::new).transpose()?;
-    let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &|progress: Progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(progress.what);
-    });
-    bar.finish_and_clear();
-    if let (Some(file), Some(path)) = (file, &args.json) {
-        write(file, path, &json(&matrix))?;
+    let solvers = args.solvers.chosen();
+    let note = values::left_out(&solvers);
+    let bar = Bar::new();
+    let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
+    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &tell);
+    drop(bar);
+    if args.json {
+        print_json(&json(&matrix))?;
+        return Ok(exit_code(&matrix));
     }
-    print(&(text(&matrix) + &verdict(&matrix)), exit_code(&matrix))
+    print(&(text(&matrix) + &note + &verdict(&matrix)), exit_code(&matrix))
 }
 
 /// 1 if the default solver ran and broke a promise.
@@ -108,6 +107,9 @@ fn list(cases: &[&Case]) -> String {
         };
         text += &format!("{}  {} [{}]{law}\n", case.id, case.summary, case.unit);
         text += &format!("    tolerance: {}\n    {word} of {DEFAULT}: {why}\n", case.tolerance);
+        if let Some(how) = case.relaxed {
+            text += &format!("    relaxed after a failure: {how}\n");
+        }
     }
     text + &skipped()
 }
@@ -117,12 +119,19 @@ fn skipped() -> String {
     format!("skipped, needs joints: {}\n", list.join(", "))
 }
 
+const LEGEND: &str = "\
+A cell: pass or FAIL, the measured value, and in brackets the margin, error over tolerance: up to 1 passes.
+reference: what it should be.  n/a: the reference value is that of soft contacts.
+*: required of the default solver.  †: its bound or mark was relaxed after a failure; --list says how.
+";
+
 fn text(matrix: &Matrix) -> String {
     let mut table = plain();
     let names = matrix.solvers.iter().map(|s| s.name.to_string());
-    table.set_header(["case", "what", "truth", "tolerance"].map(String::from).into_iter().chain(names));
+    table.set_header(["case", "what", "reference", "tolerance"].map(String::from).into_iter().chain(names));
     for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
         let star = if case.required.is_required() { "*" } else { "" };
+        let star = format!("{star}{}", if case.relaxed.is_some() { "†" } else { "" });
         let (truth, tolerance) = (common(cells, |f| f.truth), common(cells, |f| f.tolerance));
         let own = truth.is_none() || tolerance.is_none();
         let shown = |value: Option<f64>| value.map_or("per solver".into(), number);
@@ -131,7 +140,7 @@ fn text(matrix: &Matrix) -> String {
         row.extend(cells.iter().map(|cell| cell_text(cell, own)));
         table.add_row(row);
     }
-    let mut text = format!("{table}\n");
+    let mut text = format!("{LEGEND}\n{table}\n");
     for (c, case) in matrix.cases.iter().enumerate() {
         text += &sweeps(matrix, c, case);
         for (solver, cell) in matrix.solvers.iter().zip(&matrix.cells[c]) {
@@ -146,11 +155,8 @@ fn text(matrix: &Matrix) -> String {
         }
     }
     let others = CASES.len() - matrix.cases.len();
-    let left = if others > 0 {
-        format!("not asked for: {others} of {} cases\n", CASES.len())
-    } else {
-        String::new()
-    };
+    let left =
+        if others > 0 { format!("left out: {others} of {} cases\n", CASES.len()) } else { String::new() };
     text + &skipped() + &left
 }
 
@@ -171,7 +177,7 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
         Cell::Found(f) => {
             let word = if f.passed() { "pass" } else { "FAIL" };
             let truth = if with_truth {
-                format!(", truth {} ± {}", number(f.truth), number(f.tolerance))
+                format!(", reference {} ± {}", number(f.truth), number(f.tolerance))
             } else {
                 String::new()
             };
@@ -232,8 +238,6 @@ fn number(value: f64) -> String {
 }
 
 fn json(matrix: &Matrix) -> Value {
-    // JSON has no infinities: they are words.
-    let finite = |x: f64| if x.is_finite() { json!(x) } else { json!(x.to_string()) };
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
             "case": case.id, "solver": solver.name, "budget": solver.budget, "unit": case.unit,
@@ -265,39 +269,37 @@ fn json(matrix: &Matrix) -> Value {
     let results: Vec<_> = (matrix.cases.iter().zip(&matrix.cells))
         .flat_map(|(case, cells)| matrix.solvers.iter().zip(cells).map(|(solver, c)| cell(case, solver, c)))
         .collect();
-    let of = |case: &&Case| {
-        let (required, why) = match case.required {
-            Required::Yes(why) => (true, why),
-            Required::No(why) => (false, why),
-        };
-        json!({ "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance, "required": required, "why": why })
-    };
     json!({
         "version": 1,
         "default_solver": DEFAULT,
         "broken_promises": matrix.broken_promises(DEFAULT),
-        "cases": matrix.cases.iter().map(of).collect::<Vec<_>>(),
+        "cases": matrix.cases.iter().map(described).collect::<Vec<_>>(),
         "results": results,
         "needs_joints": NEEDS_JOINTS.iter().map(|(id, what)| json!({ "case": id, "what": what })).collect::<Vec<_>>(),
     })
 }
 
-fn write(mut file: Pending, path: &Path, value: &Value) -> Result<(), Error> {
-    writeln!(file, "{value:#}").map_err(Error::io(path))?;
-    file.commit()
+/// A case: what it measures, and what is required.
+fn described(case: &&Case) -> Value {
+    let (required, why) = match case.required {
+        Required::Yes(why) => (true, why),
+        Required::No(why) => (false, why),
+    };
+    json!({
+        "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance,
+        "required": required, "why": why, "relaxed": case.relaxed,
+    })
 }
 
-/// To standard output; a reader that has left is not an error.
+/// To standard output, with this exit code.
 fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
-        _ => Ok(code),
-    }
+    output::print(text).map(|_| code)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::solvers::VARIANTS;
 
     #[test]
     fn numbers_have_four_digits() {
@@ -320,7 +322,7 @@ mod tests {
     fn a_cell_shows_verdict_value_and_margin() {
         let cell = Cell::Found(Finding::new(1.5, 1.0, 0.25));
         assert_eq!(cell_text(&cell, false), "FAIL 1.5 (2)");
-        assert_eq!(cell_text(&cell, true), "FAIL 1.5, truth 1 ± 0.25 (2)");
+        assert_eq!(cell_text(&cell, true), "FAIL 1.5, reference 1 ± 0.25 (2)");
         assert_eq!(cell_text(&Cell::Foreign, false), "n/a");
     }
 
@@ -334,16 +336,11 @@ mod tests {
     }
 
     #[test]
-    fn the_file_is_replaced_as_a_whole() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("verify.json");
+    fn json_holds_every_cell() {
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
         let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_| ());
-        write(Pending::new(&path).unwrap(), &path, &json(&matrix)).unwrap();
-        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-        assert_eq!(read["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
-        assert_eq!(read["broken_promises"], json!([]));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(Pending::new(&folder.path().join("missing/verify.json")).is_err());
+        let value = json(&matrix);
+        assert_eq!(value["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
+        assert_eq!(value["broken_promises"], json!([]));
     }
 }

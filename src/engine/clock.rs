@@ -95,18 +95,34 @@ pub struct Asked {
     pub bytes: [f64; 2],
 }
 
-/// Adds the time since the last lap to a phase; costs nothing while it is off.
-///
-/// It can also be set to a single phase: then the passes of all others are skipped, so that one
-/// phase can be run again and again on the records of a step that has been prepared.
+/// Which phases of a step run: all of them, or one alone, again and again, on the records of a
+/// step that was prepared before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PhaseFilter {
+    /// The only phase that runs; none: all do.
+    pub only: Option<Phase>,
+    /// Whether one lane is [`crate::engine::lanes::Counted`].
+    pub counted: bool,
+}
+
+impl PhaseFilter {
+    /// A whole step.
+    pub const ALL: PhaseFilter = PhaseFilter { only: None, counted: false };
+
+    /// Whether passes of `phase` run.
+    #[inline]
+    pub fn runs(&self, phase: Phase) -> bool {
+        self.only.is_none_or(|only| only == phase)
+    }
+}
+
+/// Adds the time since the last lap to a phase, and counts laps; reads no clock while it is off.
 #[derive(Debug)]
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
-    /// The only phase that runs, and how often each lapped: others must not.
-    only: Option<(Phase, [u32; Phase::ALL.len()])>,
-    counts: bool,
     asked: Asked,
+    laps: [u32; Phase::ALL.len()],
     /// Time that the thread had waited at the last lap, where that is taken out.
     waited: Option<Duration>,
 }
@@ -121,9 +137,8 @@ impl Clock {
         Clock {
             timings: Timings::default(),
             start,
-            only: None,
-            counts: false,
             asked: Asked::default(),
+            laps: [0; Phase::ALL.len()],
             waited: None,
         }
     }
@@ -133,32 +148,6 @@ impl Clock {
     /// booked; the time of the step is that of its phases.
     pub(crate) fn without_pauses() -> Self {
         Clock { waited: waited(), ..Clock::start(true) }
-    }
-
-    /// A clock that runs one phase and takes no times. With `counts`, one lane is
-    /// [`crate::engine::lanes::Counted`]. What the phase works on must have been prepared by a whole step.
-    pub(crate) fn only(phase: Phase, counts: bool) -> Self {
-        let only = Some((phase, [0; Phase::ALL.len()]));
-        Clock {
-            timings: Timings::default(),
-            start: None,
-            only,
-            counts,
-            asked: Asked::default(),
-            waited: None,
-        }
-    }
-
-    /// Whether passes of `phase` are to be left out.
-    #[inline]
-    pub fn skips(&self, phase: Phase) -> bool {
-        self.only.as_ref().is_some_and(|only| only.0 != phase)
-    }
-
-    /// Whether floating-point operations are counted.
-    #[inline]
-    pub fn counts(&self) -> bool {
-        self.counts
     }
 
     /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
@@ -178,9 +167,9 @@ impl Clock {
         self.asked
     }
 
-    /// Laps of each phase, where one phase runs alone; indexed by `Phase as usize`.
+    /// Laps of each phase; indexed by `Phase as usize`.
     pub(crate) fn laps(&self) -> [u32; Phase::ALL.len()] {
-        self.only.as_ref().map_or([0; Phase::ALL.len()], |only| only.1)
+        self.laps
     }
 
     /// Books the time since the last lap on `phase`.
@@ -198,9 +187,7 @@ impl Clock {
             }
             self.timings.phase_ns[phase as usize] += elapsed.as_nanos() as u64;
         }
-        if let Some((_, laps)) = &mut self.only {
-            laps[phase as usize] += 1;
-        }
+        self.laps[phase as usize] += 1;
     }
 
     /// Ends the step.
@@ -237,15 +224,18 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_for_one_phase_skips_the_others_and_counts_laps() {
-        let mut clock = Clock::only(Phase::Solve, false);
-        assert!(clock.skips(Phase::Relax) && !clock.skips(Phase::Solve) && !clock.counts());
+    fn a_clock_that_is_off_counts_laps_and_no_time() {
+        let mut clock = Clock::start(false);
         clock.lap(Phase::Solve);
         clock.lap(Phase::Solve);
         assert_eq!(clock.laps()[Phase::Solve as usize], 2);
         assert_eq!(clock.stop().step_ns, 0);
-        let mut all = Clock::start(false);
-        all.lap(Phase::Solve);
-        assert!(!all.skips(Phase::Relax) && all.laps() == [0; Phase::ALL.len()]);
+    }
+
+    #[test]
+    fn a_filter_lets_one_phase_through() {
+        assert!(Phase::ALL.into_iter().all(|phase| PhaseFilter::ALL.runs(phase)));
+        let one = PhaseFilter { only: Some(Phase::Solve), counted: false };
+        assert!(Phase::ALL.into_iter().all(|phase| one.runs(phase) == (phase == Phase::Solve)));
     }
 }

@@ -58,7 +58,7 @@ pub const DIVERGED_SPEED: f32 = 1.0e5;
 /// Each solver reads the fields that its schedule has and ignores the rest;
 /// its row in [`crate::engine::solvers::VARIANTS`] says which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget {
     /// Equal parts that a step is cut into (≥ 1).
     pub substeps: u32,

@@ -40,7 +40,7 @@ pub enum Error {
         message: String,
     },
     /// A name that is not in its table.
-    #[error("unknown {kind} '{}'{}", plain(name), suggestion(nearest))]
+    #[error("unknown {kind} '{}'{}{}", plain(name), suggestion(nearest), list(known))]
     UnknownName {
         /// `scene`, `solver`, …
         kind: &'static str,
@@ -48,6 +48,8 @@ pub enum Error {
         name: String,
         /// The nearest name there is.
         nearest: Option<String>,
+        /// All names there are.
+        known: Vec<String>,
     },
 }
 
@@ -56,6 +58,15 @@ fn suggestion(nearest: &Option<String>) -> String {
         Some(name) => format!("; did you mean '{name}'?"),
         None => String::new(),
     }
+}
+
+/// Longest list of names that a message repeats (characters).
+const LONGEST_LIST: usize = 450;
+
+/// All names, if they are few enough.
+fn list(known: &[String]) -> String {
+    let names = known.join(", ");
+    if names.is_empty() || names.len() > LONGEST_LIST { String::new() } else { format!(" [{names}]") }
 }
 
 /// The text with control characters as escapes, and without the middle of what is too long.
@@ -73,6 +84,18 @@ pub(in crate::lab) fn plain(text: &str) -> String {
     let at = |n: usize| plain.char_indices().nth(n).map_or(plain.len(), |(i, _)| i);
     let (head, left_out, tail) = (&plain[..at(head)], count - head - tail, &plain[at(count - tail)..]);
     format!("{head} … {left_out} characters … {tail}")
+}
+
+impl Error {
+    /// The same about a value inside `place`; other errors know where they are.
+    pub(in crate::lab) fn within(self, place: &str) -> Self {
+        match self {
+            Error::Invalid { place: inner, message } => {
+                Error::Invalid { place: format!("{place}.{inner}"), message }
+            }
+            other => other,
+        }
+    }
 }
 
 impl From<crate::engine::error::Error> for Error {
@@ -93,13 +116,16 @@ impl Error {
 
     /// An unknown `name`, with the nearest of `known` as the suggestion.
     pub fn unknown<'a>(kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Self {
+        // Of a long name all of the message is the name.
+        let known: Vec<&str> = known.filter(|_| name.len() <= LONGEST_MISSPELT).collect();
         let nearest = known
-            .filter(|_| name.len() <= LONGEST_MISSPELT)
-            .map(|k| (strsim::damerau_levenshtein(k, name), k))
+            .iter()
+            .map(|&k| (strsim::damerau_levenshtein(k, name), k))
             .min()
             .filter(|&(distance, k)| distance <= 2.max(k.len() / 2))
             .map(|(_, k)| k.to_string());
-        Error::UnknownName { kind, name: name.to_string(), nearest }
+        let known = known.into_iter().map(String::from).collect();
+        Error::UnknownName { kind, name: name.to_string(), nearest, known }
     }
 
     /// Wraps an I/O failure with the path it concerns.
@@ -129,6 +155,6 @@ mod tests {
             Error::unknown("scene", &"a".repeat(30_000_000), ["arch"].into_iter()).to_string().len() < 500
         );
         let message = Error::unknown("scene", "no\nsuch", ["arch"].into_iter()).to_string();
-        assert_eq!(message, "unknown scene 'no\\nsuch'");
+        assert_eq!(message, "unknown scene 'no\\nsuch' [arch]");
     }
 }

@@ -1,40 +1,57 @@
 //! Result files: all or nothing.
 //!
-//! A file is written under a temporary name in its own folder and renamed when it is whole,
-//! so that an interrupted run leaves no half file.
+//! A regular file is written under a temporary name in its own folder and renamed when it is whole,
+//! so that an interrupted run leaves no half file; a link is followed, and the file that it leads to is
+//! replaced. What is not a regular file (a device, a pipe, `/dev/stdout`) is written through, and
+//! `-` is standard output.
+//!
+//! Temporary names are kept in a list until they are gone, so that a signal can remove them
+//! ([`remove_temporaries`]).
 
 use crate::lab::error::Error;
-use std::io::Write;
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
+
+/// Links that are followed before it is a circle.
+const MOST_LINKS: usize = 40;
+
+static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A file that does not exist under its name until [`Pending::commit`].
 pub struct Pending {
-    file: std::io::BufWriter<NamedTempFile>,
+    file: BufWriter<Target>,
     path: PathBuf,
+}
+
+/// Where the bytes go.
+enum Target {
+    /// To a temporary file, which takes this name when it is whole.
+    Whole(Temporary, PathBuf),
+    /// Through, at once.
+    Through(File),
+    /// To standard output, at once.
+    StandardOutput,
 }
 
 impl Pending {
     /// Begins the file `path`, in a folder that exists.
     pub fn new(path: &Path) -> Result<Self, Error> {
-        if path.is_dir() {
-            let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-            return Err(Error::Io { path: path.into(), source });
-        }
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let file = temporary(folder).map_err(Error::io(path))?;
-        Ok(Pending { file: std::io::BufWriter::new(file), path: path.into() })
+        let target = Target::of(path).map_err(Error::io(path))?;
+        Ok(Pending { file: BufWriter::new(target), path: path.into() })
     }
 
     /// Gives the file its name.
     pub fn commit(self) -> Result<(), Error> {
         let Pending { file, path } = self;
-        let file = file.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
-        file.persist(&path).map_err(|e| Error::io(&path)(e.error))?;
-        Ok(())
+        let mut target = file.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
+        target.flush().map_err(Error::io(&path))?;
+        match target {
+            Target::Whole(temporary, place) => temporary.persist(&place).map_err(Error::io(&path)),
+            Target::Through(_) | Target::StandardOutput => Ok(()),
+        }
     }
 }
 
@@ -47,19 +64,142 @@ impl Write for Pending {
     }
 }
 
-/// A temporary file that others may read once it has its name, as the user's mask allows.
-fn temporary(folder: &Path) -> std::io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".simpulse-");
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
+impl Target {
+    fn of(path: &Path) -> std::io::Result<Self> {
+        if is_standard_output(path) {
+            return Ok(Target::StandardOutput);
+        }
+        let (place, own) = followed(path)?;
+        match std::fs::metadata(&place) {
+            Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
+            // A regular file that somebody holds open under a name of the system's is not replaced either.
+            Ok(found) if !found.is_file() || !own => {
+                Ok(Target::Through(OpenOptions::new().append(true).open(&place)?))
+            }
+            Ok(found) if found.permissions().readonly() => Err(ErrorKind::PermissionDenied.into()),
+            _ => Ok(Target::Whole(Temporary::in_folder(folder_of(&place))?, place)),
+        }
+    }
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Target::Whole(temporary, _) => temporary.file()?.write(bytes),
+            Target::Through(file) => file.write(bytes),
+            Target::StandardOutput => std::io::stdout().write(bytes),
+        }
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Target::Whole(temporary, _) => temporary.file()?.flush(),
+            Target::Through(file) => file.flush(),
+            Target::StandardOutput => std::io::stdout().flush(),
+        }
+    }
+}
+
+/// Whether `path` means standard output: then nothing else may be printed there.
+pub fn is_standard_output(path: &Path) -> bool {
+    ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
+}
+
+/// Whether two paths mean the same file.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| match followed(path) {
+        Ok((place, _)) => {
+            let folder = folder_of(&place).canonicalize().unwrap_or_else(|_| folder_of(&place).into());
+            folder.join(place.file_name().unwrap_or_default())
+        }
+        Err(_) => path.into(),
+    };
+    (is_standard_output(a) && is_standard_output(b)) || place(a) == place(b)
+}
+
+/// Where the links of `path` lead, there or not, and whether that is a place of the user's: not one of the
+/// system's, such as `/dev/fd/3`, whose links are not paths.
+fn followed(path: &Path) -> std::io::Result<(PathBuf, bool)> {
+    const OF_THE_SYSTEM: [&str; 5] = ["/proc", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"];
+    let of_the_system = |path: &Path| OF_THE_SYSTEM.iter().any(|folder| path.starts_with(folder));
+    let mut place = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        if of_the_system(&place) {
+            return Ok((place, false));
+        }
+        match std::fs::read_link(&place) {
+            Ok(next) => place = folder_of(&place).join(next),
+            Err(_) => return Ok((place, true)),
+        }
+    }
+    Err(std::io::Error::other("a circle of links"))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A file under a temporary name, which is in the list while the file is there.
+struct Temporary {
+    /// None once it has its own name.
+    file: Option<NamedTempFile>,
+    name: PathBuf,
+}
+
+impl Temporary {
+    /// One that others may read once it has its name, as the user's mask allows.
+    fn in_folder(folder: &Path) -> std::io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".simpulse-");
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        // Locked before the file exists: a signal finds it in the list or not at all.
+        let mut list = temporaries();
+        let file = builder.tempfile_in(folder)?;
+        let name = file.path().to_path_buf();
+        list.push(name.clone());
+        Ok(Temporary { file: Some(file), name })
+    }
+
+    fn file(&mut self) -> std::io::Result<&mut File> {
+        self.file.as_mut().map(NamedTempFile::as_file_mut).ok_or(ErrorKind::NotFound.into())
+    }
+
+    fn persist(mut self, place: &Path) -> std::io::Result<()> {
+        match self.file.take() {
+            Some(file) => file.persist(place).map(drop).map_err(|e| e.error),
+            None => Err(ErrorKind::NotFound.into()),
+        }
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // The file first, then its entry.
+        drop(self.file.take());
+        temporaries().retain(|name| *name != self.name);
+    }
+}
+
+fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is not whole, for a process that ends at once: no other file can be begun after it.
+pub fn remove_temporaries() {
+    let list = temporaries();
+    for path in list.iter() {
+        let _ = std::fs::remove_file(path);
+    }
+    std::mem::forget(list);
 }
 
 /// Makes the folder if need be, and makes sure that a file can be written there.
 pub fn prepare_folder(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    temporary(folder).map_err(Error::io(folder))?;
+    Temporary::in_folder(folder).map_err(Error::io(folder))?;
     Ok(())
 }
 
@@ -96,5 +236,33 @@ mod tests {
         write(&path, b"").unwrap();
         assert!(prepare_folder(&path).unwrap_err().to_string().contains("taken"));
         assert!(Pending::new(folder.path()).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_there_or_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::os::unix::fs::symlink("second", at("first")).unwrap();
+        std::os::unix::fs::symlink("file.csv", at("second")).unwrap();
+        for text in ["one", "two"] {
+            write(&at("first"), text.as_bytes()).unwrap();
+            assert_eq!(std::fs::read(at("file.csv")).unwrap(), text.as_bytes());
+            assert!(at("first").is_symlink() && at("second").is_symlink());
+        }
+        assert!(same_file(&at("first"), &at("file.csv")) && !same_file(&at("first"), &at("other")));
+        std::os::unix::fs::symlink("round", at("round")).unwrap();
+        assert!(Pending::new(&at("round")).is_err());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_through_and_stays_one() {
+        use std::os::unix::fs::FileTypeExt;
+        let full = Path::new("/dev/full");
+        assert_eq!(write(full, b"x").unwrap_err().to_string().split(':').next(), Some("/dev/full"));
+        assert!(std::fs::metadata(full).unwrap().file_type().is_char_device());
+        write(Path::new("/dev/null"), b"x").unwrap();
+        assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
     }
 }

@@ -101,7 +101,7 @@ fn capsule_on_box() {
         assert!((point.anchor_a.y - 0.495).abs() < 1e-6 && point.anchor_a.x.abs() == 1.0);
     }
     assert_ne!(m.points[0].feature_id >> 8, m.points[1].feature_id >> 8);
-    // On its end, past the slab's corner: the normal is that of corner and capsule end.
+    // On its end, past the plate's corner: the normal is that of corner and capsule end.
     let end = Pose { position: v(5.3, 0.5 + 1.0 + 0.4), rotation: v(0.0, 1.0) };
     let m = collide(&buffer, &at(0.0, 0.0), &capsule, &end, 1.0);
     assert_eq!(m.count, 1);
@@ -159,10 +159,10 @@ fn rounded_corners_meet_along_the_line_between_them() {
     assert!(m.points[0].separation.abs() < 1e-6);
     assert!((m.points[0].anchor_a - v(0.65, 0.7)).length() < 1e-6);
     // Stacked with gaps of the radii between the cores and trembling: always two points.
-    for tremble in [-1e-6, -1e-7, 0.0, 1e-7, 1e-6] {
-        let upper = Pose::new(v(tremble, 1.5), tremble);
+    for jitter in [-1e-6, -1e-7, 0.0, 1e-7, 1e-6] {
+        let upper = Pose::new(v(jitter, 1.5), jitter);
         assert_eq!(collide(&rounded, &at(0.0, 0.0), &rounded, &upper, 0.02).count, 2);
-        let upper = Pose::new(v(tremble, 1.5), -tremble);
+        let upper = Pose::new(v(jitter, 1.5), -jitter);
         assert_eq!(collide(&rounded, &at(0.0, 0.0), &rounded, &upper, 0.02).count, 2);
     }
 }
@@ -435,14 +435,14 @@ proptest! {
     #[test]
     fn resting_boxes_keep_their_ids(
         hx in 0.1f32..2.0, offset in coordinate(0.9), gap in -0.01f32..0.015, radius in rounding(),
-        tremble in prop::collection::vec((coordinate(1e-6), coordinate(1e-6), coordinate(1e-6)), 8),
+        jitter in prop::collection::vec((coordinate(1e-6), coordinate(1e-6), coordinate(1e-6)), 8),
     ) {
         let lower = Shape::rectangle("b", v(1.0, 0.5), Vec2::ZERO, 0.0, radius).expect("valid");
         let upper = Shape::rectangle("b", v(hx, 0.5), Vec2::ZERO, 0.0, radius).expect("valid");
         let height = 1.0 + 2.0 * radius + gap;
         let rest = collide(&lower, &at(0.0, 0.0), &upper, &at(offset, height), 0.02);
         prop_assert_eq!(rest.count, 2);
-        for (x, y, angle) in tremble {
+        for (x, y, angle) in jitter {
             let pose = Pose::new(v(offset + x, height + y), angle);
             let m = collide(&lower, &at(0.0, 0.0), &upper, &pose, 0.02);
             prop_assert_eq!(ids(&m), ids(&rest));

@@ -2,7 +2,7 @@
 //! arrays and batches that were never filled end in a panic that says what is wrong, before or
 //! without a read or write out of place. Run it under valgrind as well (README, Benches).
 
-use simpulse::engine::clock::Clock;
+use simpulse::engine::clock::{Clock, PhaseFilter};
 use simpulse::engine::constraints::bounces::Bounces;
 use simpulse::engine::constraints::position::position_sweep;
 use simpulse::engine::constraints::restitution;
@@ -409,6 +409,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
         h: 0.01,
         parameters: [0.0; 8],
+        phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
     };

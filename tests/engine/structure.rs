@@ -79,12 +79,13 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "overrides"],
+    &["files", "interned", "overrides", "units"],
     &["metrics", "reference"],
-    &["scenes", "capture"],
+    &["scenes", "capture", "picture"],
+    &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile"],
+    &["profile", "compare"],
 ];
 
 #[test]

@@ -242,7 +242,7 @@ pub fn payload(text: &[u8]) -> &[u8] {
 pub fn signed(payload: &[u8]) -> Vec<u8> {
     let payload = String::from_utf8_lossy(payload);
     let payload = payload.strip_suffix('\n').unwrap_or(&payload);
-    // FNV-1a, written anew.
+    // FNV-1a, written independently.
     let mut hash = 14_695_981_039_346_656_037_u64;
     for byte in payload.bytes() {
         hash = (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211);

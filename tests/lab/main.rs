@@ -10,6 +10,7 @@ mod impulses;
 mod metrics;
 mod profile;
 mod scenes;
+mod schema;
 mod solver_rules;
 mod truth;
 mod verify;

@@ -28,9 +28,9 @@ fn json(bodies: &str, gravity: f64) -> Scene {
 }
 
 #[test]
-fn a_scene_without_bodies_has_no_errors() {
+fn a_world_without_bodies_has_no_errors() {
     for variant in &VARIANTS {
-        let errors = observe(&mut build(&json("", -10.0), variant.name), 3);
+        let errors = observe(&mut World::new(Settings::new(variant)), 3);
         assert_eq!(errors, Errors { steps: 3, ..Errors::default() });
     }
 }
@@ -288,7 +288,7 @@ fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
     let mut world = build(&scenes::load("stack:10").unwrap().scene, "pgs");
     world.settings.budget.velocity_iterations = 1;
     assert!(observe(&mut world, 5).own_rms.unwrap() > 1e-3);
-    // Not asked for, and after bounces: none.
+    // Not requested, and after bounces: none.
     world.settings.observe_rule = false;
     assert_eq!(observe(&mut world, 5).own_rms, None);
     assert_eq!(observe(&mut build(&scenes::load("bounce").unwrap().scene, "pgs"), 90).own_rms, None);

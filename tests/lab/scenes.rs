@@ -365,7 +365,9 @@ fn bad_files_are_refused_with_place_and_value() {
         (r#""dt": 0.01"#, r#""dt": 0"#, "dt: ", "0.0"),
         (r#""dt": 0.01"#, r#""dt": -0.01"#, "dt: ", "-0.01"),
         (r#""dt": 0.01"#, r#""dt": 1e-60"#, "dt: ", "1e-60"),
-        (r#""steps": 10"#, r#""steps": 0"#, "steps: ", "0"),
+        (r#""dt": 0.01"#, r#""dt": 1e-30"#, "dt: ", "at least 1e-9 s, is 1e-30 s"),
+        (r#""steps": 10"#, r#""steps": 0"#, "steps: ", "is 0"),
+        (r#""steps": 10"#, r#""steps": 4000000000"#, "steps: ", "at most 10000000, is 4000000000"),
         (r#""steps": 10"#, r#""steps": -1"#, "steps: ", "-1"),
         (r#""steps": 10"#, r#""steps": 1.5"#, "steps: ", "1.5"),
         ("[0, -10]", "[0, 1e39]", "gravity[1]: ", "1e39"),
@@ -469,8 +471,13 @@ fn what_is_no_scene_at_all_is_refused() {
 }
 
 #[test]
-fn too_many_bodies_are_refused() {
+fn no_bodies_and_too_many_are_refused() {
     let mut crowd = scene("single_box");
+    let none = Scene { bodies: Vec::new(), ..crowd.clone() };
+    assert_eq!(
+        none.validate().unwrap_err().to_string(),
+        "bodies: there are none: a scene needs at least one"
+    );
     crowd.bodies = vec![crowd.bodies[0].clone(); MAX_BODIES + 1];
     let message = crowd.validate().err().map(|e| e.to_string()).unwrap_or_default();
     assert!(message.starts_with("bodies: 1000001 bodies"), "{message}");
@@ -556,8 +563,8 @@ proptest! {
         name in "[a-zé\"\\\\ ]{1,8}[a-z]",
         gravity in point(),
         dt in 1e-6..1.0,
-        steps in 1..u32::MAX,
-        bodies in prop::collection::vec(body(), 0..8),
+        steps in 1..=simpulse::lab::scenes::MAX_STEPS,
+        bodies in prop::collection::vec(body(), 1..8),
     ) {
         let scene = Scene { name, gravity, dt, steps, bodies };
         let text = scene.to_json();

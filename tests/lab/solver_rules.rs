@@ -87,7 +87,7 @@ fn projection_ends_on_the_surface_at_rest() {
     world.step().unwrap();
     assert!((world.bodies.position_y[1] - 0.5).abs() < 1e-6);
     assert!(world.bodies.velocity_y[1].abs() < 1e-6);
-    assert_eq!(world.bodies.velocity_x[1], 1.0, "nothing rubs");
+    assert_eq!(world.bodies.velocity_x[1], 1.0, "no friction");
 }
 
 /// No solver lets a fast disc through the gap that a step leaves: speculative contacts stop it

@@ -4,7 +4,7 @@ use super::Proxy;
 
 /// Writes every `[i, j]`, i < j, with `proxies[i].may_touch(&proxies[j])` to `out`, ascending.
 ///
-/// n(n − 1)/2 tests and no memory of its own.
+/// n(n − 1)/2 tests and nothing kept between calls.
 pub fn all_pairs(proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
     out.clear();
     for (i, a) in proxies.iter().enumerate() {

@@ -26,73 +26,17 @@
 //! tree is worn, Lauterbach et al. 2006 (`lauterbach2006`).
 
 use super::Proxy;
+use super::curve::{BITS, hilbert, sort_digit};
+use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::PairSort;
-use crate::engine::lanes::{Block, held};
+use crate::engine::lanes::held;
 use wide::f32x16;
-
-/// Children of a node.
-const FAN: usize = 1 << BITS_OF_FAN;
-const BITS_OF_FAN: usize = 4;
-
-/// Bits of a coordinate on the curve.
-const BITS: u32 = 10;
 
 /// The order is rebuilt when the leaves' perimeters have grown by this factor.
 const REBUILD_THRESHOLD: f32 = 1.15;
 
 /// Lists are merged if no more than one proxy in this many moved.
 const FEW: usize = 16;
-
-/// Sixteen boxes; lanes without one hold NaN, which meets nothing.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    /// min x, min y, max x, max y.
-    sides: [Block; 4],
-}
-
-impl Node {
-    const EMPTY: Node = Node { sides: [Block([f32::NAN; FAN]); 4] };
-
-    /// Sets a lane; a box with a NaN is none.
-    #[inline]
-    fn set(&mut self, lane: usize, sides: [f32; 4]) {
-        let sides = if sides.iter().any(|side| side.is_nan()) { [f32::NAN; 4] } else { sides };
-        for (side, value) in self.sides.iter_mut().zip(sides) {
-            side.0[lane] = value;
-        }
-    }
-
-    /// The lanes whose boxes share a point with the query's.
-    #[inline]
-    fn hits(&self, query: &[f32x16; 4]) -> u32 {
-        let [min_x, min_y, max_x, max_y] = self.sides.map(|side| f32x16::new(side.0));
-        let x = min_x.simd_le(query[2]) & query[0].simd_le(max_x);
-        let y = min_y.simd_le(query[3]) & query[1].simd_le(max_y);
-        (x & y).to_bitmask() & 0xFFFF
-    }
-
-    /// The box of a lane in all lanes.
-    #[inline]
-    fn query(&self, lane: usize) -> [f32x16; 4] {
-        [0, 1, 2, 3].map(|side: usize| f32x16::splat(self.sides[side].0[lane]))
-    }
-
-    /// Bounds of all lanes; the minimum of a number and a NaN is the number.
-    #[inline]
-    fn bounds(&self) -> [f32; 4] {
-        let fold = |side: &Block, pick: fn(f32, f32) -> f32| {
-            let mut v = side.0;
-            for half in [8, 4, 2, 1] {
-                for i in 0..half {
-                    v[i] = pick(v[i], v[i + half]);
-                }
-            }
-            v[0]
-        };
-        let [a, b, c, d] = &self.sides;
-        [fold(a, f32::min), fold(b, f32::min), fold(c, f32::max), fold(d, f32::max)]
-    }
-}
 
 /// Finds candidate pairs; remembers the last call.
 #[derive(Clone, Debug, Default)]
@@ -406,64 +350,11 @@ fn meet(
     *len += kept;
 }
 
-/// Distance along Hilbert's curve of a cell of the square of 2^[`BITS`] cells.
-///
-/// From the largest quadrants to the smallest: the curve passes the quadrants (0,0), (0,1),
-/// (1,1), (1,0), mirrored in the first and the last so that it joins its neighbours.
-fn hilbert(mut x: u32, mut y: u32) -> u32 {
-    let mut along = 0;
-    for bit in (0..BITS).rev() {
-        let (right, top) = (x >> bit & 1, y >> bit & 1);
-        along = along << 2 | ((3 * right) ^ top);
-        if top == 0 {
-            if right == 1 {
-                (x, y) = (!x, !y);
-            }
-            (x, y) = (y, x);
-        }
-    }
-    along
-}
-
-/// Stable counting sort by [`BITS`] + 1 bits of the first number from bit `shift` on.
-fn sort_digit(from: &[[u32; 2]], to: &mut Vec<[u32; 2]>, shift: u32) {
-    let digit = |pair: &[u32; 2]| (pair[0] >> shift) as usize & ((2 << BITS) - 1);
-    let mut next = [0u32; (2 << BITS) + 1];
-    for pair in from {
-        next[digit(pair) + 1] += 1;
-    }
-    for i in 1..next.len() {
-        next[i] += next[i - 1];
-    }
-    to.clear();
-    to.resize(from.len(), [0; 2]);
-    for pair in from {
-        let next = &mut next[digit(pair)];
-        to[*next as usize] = *pair;
-        *next += 1;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::engine::shapes::Aabb;
     use glam::Vec2;
-
-    /// Neighbours on the curve are neighbours in the square, and every cell is passed once.
-    #[test]
-    fn the_curve_is_hilberts() {
-        let side = 1u32 << BITS;
-        let mut cells = vec![[0, 0]; (side * side) as usize];
-        for x in 0..side {
-            for y in 0..side {
-                cells[hilbert(x, y) as usize] = [x, y];
-            }
-        }
-        for step in cells.windows(2) {
-            assert_eq!(step[0][0].abs_diff(step[1][0]) + step[0][1].abs_diff(step[1][1]), 1, "{step:?}");
-        }
-    }
 
     /// A lattice of boxes that shears, frame by frame, and shrinks and grows in number.
     fn scene(frame: usize, count: usize) -> Vec<Proxy> {
@@ -530,16 +421,16 @@ mod tests {
     }
 
     #[test]
-    fn a_worn_order_is_made_anew() {
+    fn a_degraded_order_is_rebuilt() {
         let mut tree = Tree::new();
         let mut out = Vec::new();
         for frame in 0..200 {
             let proxies = scene(frame, 400);
             tree.pairs(&proxies, &mut out);
             let cost = tree.cost();
-            let mut anew = Tree::new();
-            anew.pairs(&proxies, &mut out);
-            assert!(cost <= 1.3 * anew.cost(), "frame {frame}: {cost} against {}", anew.cost());
+            let mut fresh = Tree::new();
+            fresh.pairs(&proxies, &mut out);
+            assert!(cost <= 1.3 * fresh.cost(), "frame {frame}: {cost} against {}", fresh.cost());
         }
     }
 }

@@ -22,7 +22,7 @@ use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
 use super::types::{Joined, TypeInput};
-use crate::engine::clock::{Clock, Phase};
+use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, held};
 use crate::engine::params::{Budget, Parameters};
@@ -101,6 +101,8 @@ pub struct StepInput {
     pub h: f32,
     /// The solver's own parameters.
     pub parameters: Parameters,
+    /// Which phases run.
+    pub phases: PhaseFilter,
     /// Sum impulses into [`Contact::step_impulse`].
     pub record_impulses: bool,
     /// Points of all contacts, to count rows by.
@@ -139,7 +141,7 @@ impl<'a> Passes<'a> {
         let mut passes = Passes { work, contacts, clock, input, width, count, iterations: 0, order };
         passes.set_order(SweepOrder::Forward);
         // A phase that is repeated finds the records, and the check, of the step before it.
-        if !passes.clock.skips(Phase::Prepare) {
+        if passes.input.phases.runs(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
                 batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
@@ -196,7 +198,7 @@ impl<'a> Passes<'a> {
 
     /// Sets all accumulated impulses to zero, for solvers without warm starting.
     pub fn forget_impulses(&mut self) {
-        if self.clock.skips(Phase::Prepare) {
+        if !self.input.phases.runs(Phase::Prepare) {
             return;
         }
         for batches in [&mut self.work.lanes, &mut self.work.serial] {
@@ -246,7 +248,7 @@ impl<'a> Passes<'a> {
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
     pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
@@ -270,7 +272,7 @@ impl<'a> Passes<'a> {
     /// Puts velocities and impulses aside, lets `solve` find others that begin at zero, moves bodies by
     /// them for one substep and brings back those that were put aside. Booked on `phase`.
     pub fn with_pseudo_velocities(&mut self, phase: Phase, solve: impl FnOnce(&mut Self)) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         let (mut impulses, zero) = (self.vector(), self.vector());
@@ -343,7 +345,7 @@ impl<'a> Passes<'a> {
 
     /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
     pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         let Workspace { rows, graph, kept, motion, .. } = &mut *self.work;
@@ -366,7 +368,7 @@ impl<'a> Passes<'a> {
     /// Writes impulses (N·s) that `of` reads from what is kept per point into the records, rounded into
     /// their cones, for who asks what the contacts bore.
     pub fn keep_impulses(&mut self, phase: Phase, of: impl Fn(&[f32]) -> Pair) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         let mut impulses = self.vector();
@@ -398,7 +400,7 @@ impl<'a> Passes<'a> {
     /// does not while another phase is repeated alone. What solves rows is counted by
     /// [`Self::count_sweep`].
     pub fn run(&mut self, phase: Phase, pass: &dyn AnyPass) -> bool {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return false;
         }
         self.over_batches(phase, pass);
@@ -419,7 +421,7 @@ impl<'a> Passes<'a> {
     /// any, and lets the effective masses of the contacts follow that the order has. Until
     /// [`Self::restore_masses`] a Jacobi sweep takes a factor n for n copies of a body.
     pub fn scale_masses(&mut self, phase: Phase, factor: impl Fn(usize, &Graph) -> f32) {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return;
         }
         let Workspace { rows, masses, graph, .. } = &mut *self.work;
@@ -439,7 +441,7 @@ impl<'a> Passes<'a> {
     /// Ends what [`Self::scale_masses`] began.
     pub fn restore_masses(&mut self, phase: Phase) {
         self.scale_masses(phase, |_, _| 1.0);
-        if !self.clock.skips(phase) {
+        if self.input.phases.runs(phase) {
             self.work.masses.clear();
         }
     }
@@ -483,7 +485,7 @@ impl<'a> Passes<'a> {
 
     /// Work on vectors, booked on `phase`; not done while another phase is repeated alone.
     pub fn with_system<T: Default>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
-        if self.clock.skips(phase) {
+        if !self.input.phases.runs(phase) {
             return T::default();
         }
         let result = work(&mut self.system());
@@ -519,7 +521,7 @@ impl<'a> Passes<'a> {
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
-        if self.input.features.restitution && !self.clock.skips(Phase::Restitution) {
+        if self.input.features.restitution && self.input.phases.runs(Phase::Restitution) {
             self.over_contacts(&restitution::Track);
             if substep + 1 == self.input.budget.substeps {
                 self.over_contacts(&restitution::Apply { h: self.input.h });
@@ -527,7 +529,7 @@ impl<'a> Passes<'a> {
             }
             self.clock.lap(Phase::Restitution);
         }
-        if self.input.record_impulses && !self.clock.skips(Phase::Store) {
+        if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
                 let width = batches.width();
@@ -549,7 +551,7 @@ impl<'a> Passes<'a> {
     /// Writes accumulated impulses back to the contacts; returns what was done.
     pub fn finish(mut self) -> WorkCount {
         self.set_order(SweepOrder::Forward);
-        if !self.clock.skips(Phase::Store) {
+        if self.input.phases.runs(Phase::Store) {
             if self.input.features.restitution {
                 self.over_contacts(&restitution::Forget);
             }
@@ -569,7 +571,7 @@ impl<'a> Passes<'a> {
     }
 
     fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Workspace)) {
-        if !self.clock.skips(phase) {
+        if self.input.phases.runs(phase) {
             pass(self.work);
             self.clock.lap(phase);
         }
@@ -626,7 +628,7 @@ impl<'a> Passes<'a> {
             Part::Lanes => (lanes, lane_bounces),
             Part::Serial => (serial, serial_bounces),
         };
-        if self.clock.counts() {
+        if self.input.phases.counted {
             for segment in batches.visits() {
                 let layout = Layout::for_features(&self.input.features, segment.opposite);
                 let PerLane { floats_read, floats_written, rows, halves } =
@@ -656,7 +658,7 @@ impl<'a> Passes<'a> {
 
     fn width_of(&self, part: Part) -> PassWidth {
         match part {
-            Part::Lanes => PassWidth { width: self.width, counted: self.clock.counts() },
+            Part::Lanes => PassWidth { width: self.width, counted: self.input.phases.counted },
             Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
         }
     }

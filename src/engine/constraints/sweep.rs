@@ -491,7 +491,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     });
 }
 
-/// How many batches ahead a record is asked for. Without, 150 000 contacts cost 2 to 5 times as
+/// Prefetch distance of records, in batches. Without, 150 000 contacts cost 2 to 5 times as
 /// much, as their records come from memory; with two batches 5 %, with eight nothing more.
 const PREFETCH_BATCHES: usize = 4;
 

@@ -7,7 +7,10 @@
 //! tangential part of a motion (3 of some 140 operations against a dynamic body), and against a
 //! static one also the sine and versine of its turn (10 of some 100).
 
-use super::{BodyRow, LaneIndex, Lanes, Quad};
+use super::index::LaneIndex;
+use super::quads::Quad;
+use super::rows::BodyRow;
+use super::vector::Lanes;
 use bytemuck::{Pod, Zeroable};
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};

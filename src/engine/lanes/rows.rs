@@ -45,11 +45,14 @@ pub use self::{load_each as load_at_16, store_each as store_at_16};
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 pub use avx512::{gather_16, load_at_16, store_at_16};
 
-/// Without instructions for 16 lanes, by halves.
+/// Without instructions for 16 lanes, by halves of rows.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
 #[inline(always)]
 pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [wide::f32x16; 8] {
-    super::gather_halves(rows, index)
+    let quads = bytemuck::cast_slice(rows);
+    let (v, d) =
+        (super::quads::gather_16::<2, 0>(quads, index), super::quads::gather_16::<2, 1>(quads, index));
+    [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]

@@ -1,7 +1,9 @@
 //! Where sweeps keep the rows of bodies: packed, as solvers do, or in columns, to compare.
 
-use super::index::assert_fits;
-use super::{BodyRow, IndexList, LaneIndex, LaneVec, Lanes};
+use super::aligned::LaneVec;
+use super::index::{IndexList, LaneIndex, assert_fits};
+use super::rows::BodyRow;
+use super::vector::Lanes;
 
 /// Rows of bodies that a sweep gathers from and scatters to.
 pub trait RowStore {

@@ -263,7 +263,7 @@ fn run_kernel<L: Lanes>(
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
-        // Contacts lie farther away than poses and shapes: those of the next batch are asked for now.
+        // Contacts lie farther away than poses and shapes: those of the next batch are prefetched.
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);

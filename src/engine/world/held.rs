@@ -20,7 +20,7 @@
 use super::World;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
-use crate::engine::clock::{Clock, Phase, Timings};
+use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::{Features, OppositeKind, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
@@ -94,7 +94,9 @@ impl World {
         self.narrow.relink(&mut self.contacts);
     }
 
-    fn run_phase(&mut self, clock: &mut Clock, phase: Phase) -> WorkCount {
+    /// `phase` alone; with `counted`, one lane counts its operations.
+    fn run_phase(&mut self, clock: &mut Clock, phase: Phase, counted: bool) -> WorkCount {
+        let phases = PhaseFilter { only: Some(phase), counted };
         match phase {
             Phase::Pairs => {
                 self.pairs_are_stale = true;
@@ -108,14 +110,14 @@ impl World {
             }
             Phase::Prepare => {
                 self.load_rows();
-                return self.run_solver(clock);
+                return self.run_solver(clock, phases);
             }
             Phase::Store => {
-                let count = self.run_solver(clock);
+                let count = self.run_solver(clock, phases);
                 self.store();
                 return count;
             }
-            _ => return self.run_solver(clock),
+            _ => return self.run_solver(clock, phases),
         }
         WorkCount::default()
     }
@@ -135,7 +137,7 @@ impl HeldWorld<'_> {
     /// Runs everything that a step does in `phase`, `times` times.
     pub fn repeat(&mut self, phase: Phase, times: u32) {
         for _ in 0..times {
-            self.world.run_phase(&mut Clock::only(phase, false), phase);
+            self.world.run_phase(&mut Clock::start(false), phase, false);
         }
     }
 
@@ -178,7 +180,7 @@ impl HeldWorld<'_> {
     /// have are not in it. Every phase is run once, at one lane that counts its operations.
     ///
     /// # Panics
-    /// If a phase runs a pass of another, which then did not ask [`Clock::skips`].
+    /// If a phase runs a pass of another, whatever the filter says.
     pub fn probes(&mut self) -> Vec<Probe> {
         // The same contacts in the same colours, one to a batch.
         let (width, order) = (self.world.settings.width, self.world.settings.order);
@@ -193,9 +195,9 @@ impl HeldWorld<'_> {
     }
 
     fn probe(&mut self, phase: Phase) -> Option<Probe> {
-        let mut clock = Clock::only(phase, true);
+        let mut clock = Clock::start(false);
         Counted::take();
-        let count = self.world.run_phase(&mut clock, phase);
+        let count = self.world.run_phase(&mut clock, phase, true);
         let operations = Counted::take();
         let laps = clock.laps();
         for other in Phase::ALL {

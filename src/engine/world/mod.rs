@@ -6,7 +6,7 @@
 
 use crate::engine::bodies::{Bodies, BodyDef, BodyKind};
 use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
-use crate::engine::clock::{Clock, Phase, Timings};
+use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::assign::Assignment;
 use crate::engine::constraints::motion::{self, MotionInput};
 use crate::engine::constraints::observe::ObservedRule;
@@ -210,7 +210,7 @@ impl World {
         clock.lap(Phase::Color);
         self.load_rows();
         clock.lap(Phase::Prepare);
-        let count = self.run_solver(clock);
+        let count = self.run_solver(clock, PhaseFilter::ALL);
         (self.counts.sweeps, self.counts.row_updates) = (count.sweeps, count.row_updates);
     }
 
@@ -228,13 +228,14 @@ impl World {
     }
 
     /// The solver's stages, on rows and lanes that are ready.
-    fn run_solver(&mut self, clock: &mut Clock) -> WorkCount {
+    fn run_solver(&mut self, clock: &mut Clock, phases: PhaseFilter) -> WorkCount {
         let s = &self.settings;
         let input = StepInput {
             features: self.kernel_features(),
             budget: s.budget,
             h: s.h(),
             parameters: s.parameters,
+            phases,
             record_impulses: s.record_impulses,
             points: self.counts.points,
         };

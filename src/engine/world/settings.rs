@@ -9,7 +9,7 @@ use crate::engine::solvers::Variant;
 
 /// The order in which constraints are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Order {
     /// One after the other, sorted by shape pair (width 1 only).

@@ -177,7 +177,7 @@ impl Advice {
 
 /// Searches and races.
 ///
-/// Errors: a scene that there is not, a truth asked for where none is known.
+/// Errors: an unknown scene; a bound on the reference error of a scene that has none.
 pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
     for (name, missing) in [("solvers", plan.solvers.is_empty()), ("lanes", plan.widths.is_empty())] {
         if missing {

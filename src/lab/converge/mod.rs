@@ -24,6 +24,7 @@ pub mod plot;
 pub mod replay;
 mod scalar;
 mod setup;
+pub mod summary;
 pub mod table;
 mod timing;
 
@@ -36,6 +37,7 @@ use crate::lab::reference::ContactProblem;
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::rates;
 use crate::lab::reference::residual::{Summary, Target, contact_residuals, natural_map};
+use crate::lab::reference::spectral::gauss_seidel_rate;
 use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
@@ -106,6 +108,8 @@ pub struct Reached {
 pub struct Curve {
     /// Name of the solver, with its stage where that is not all of it.
     pub solver: String,
+    /// Whether that is not its whole schedule.
+    pub is_part: bool,
     /// `f32` for the simulation's code, `f64` for methods to compare with.
     pub arithmetic: &'static str,
     /// Order of the contacts.
@@ -141,6 +145,9 @@ pub struct Report {
     pub has_warm_start: bool,
     /// Lanes in coloured order.
     pub lanes: usize,
+    /// Exact factor per sweep of Gauss–Seidel near its solution; none where it does not come to one, or
+    /// no error outlives a sweep.
+    pub gauss_seidel_rate: Option<f64>,
     /// See [`TOLERANCES`].
     pub tolerances: [f64; TOLERANCES.len()],
     /// Curves, solver by solver.
@@ -177,6 +184,16 @@ pub fn converge(
     reference: Option<&Reference>,
     options: &Options,
 ) -> Result<Report, Error> {
+    converge_watched(problem, reference, options, &|_, _, _| ())
+}
+
+/// The same; tells how many of how many parts are done, and which is next.
+pub fn converge_watched(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    options: &Options,
+    tell: &dyn Fn(usize, usize, &str),
+) -> Result<Report, Error> {
     problem.validate()?;
     if problem.contacts.is_empty() {
         return Err(Error::invalid("contacts", format!("'{}' has none", problem.name)));
@@ -189,8 +206,11 @@ pub fn converge(
     let schedules: Vec<Schedule> = options.solvers.iter().flat_map(|v| Schedule::of(v)).collect();
     let mut curves = Vec::new();
     let mut timers = Vec::new();
+    // Every order of every schedule, then times, then methods in f64.
+    let parts = schedules.len() * orders.len() + 2;
     for schedule in &schedules {
         for order in orders {
+            tell(timers.len(), parts, &schedule.name);
             let parameters = overrides::values(schedule.variant, &options.overrides)?;
             let mut replay = Replay::new(problem, order, options.width, parameters)?;
             let first = curves.len();
@@ -202,12 +222,14 @@ pub fn converge(
         }
     }
     if options.rounds > 0 {
+        tell(parts - 2, parts, "times");
         let mut cases: Vec<_> = timers.iter_mut().map(|(schedule, replay, _)| (*schedule, replay)).collect();
         let times = timing::time(&mut cases, options.rounds);
         for (ns, (_, _, range)) in times.into_iter().zip(&timers) {
             curves[range.clone()].iter_mut().for_each(|curve| curve.ns_per_iteration = Some(ns));
         }
     }
+    tell(parts - 1, parts, "methods in f64");
     curves.extend(scalar::curves(problem, reference, has_warm_start, options));
     Ok(Report {
         problem: problem.name.clone(),
@@ -217,6 +239,7 @@ pub fn converge(
         certificate: reference.map(|r| r.certificate),
         has_warm_start,
         lanes: options.width.lanes(),
+        gauss_seidel_rate: gauss_seidel_rate(problem),
         tolerances: TOLERANCES,
         curves,
     })
@@ -315,6 +338,7 @@ fn curve(
     let [rigid, own] = LAWS.map(|law| reached(&points, law, floor.get()));
     Curve {
         solver: schedule.name.clone(),
+        is_part: schedule.variant.uses.relax && !schedule.relaxes,
         arithmetic: "f32",
         order,
         start,

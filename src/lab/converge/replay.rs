@@ -6,7 +6,7 @@
 //! solved differ from the frozen ones by a few roundings, as everything in `f32` does.
 
 use super::setup;
-use crate::engine::clock::Clock;
+use crate::engine::clock::{Clock, PhaseFilter};
 use crate::engine::constraints::assign::{Assignment, Sides};
 use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
@@ -127,7 +127,8 @@ impl<'a> Replay<'a> {
         let budget =
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
-        let input = StepInput { features, budget, h, parameters, record_impulses: false, points };
+        let phases = PhaseFilter::ALL;
+        let input = StepInput { features, budget, h, parameters, phases, record_impulses: false, points };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],
@@ -151,14 +152,14 @@ impl<'a> Replay<'a> {
         self.work.observe = true;
         self.work.last_rule = None;
         let input = StepInput { budget, ..self.input };
-        let effort =
+        let count =
             variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
         let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
         let bodies = self.problem.bodies.len();
         Outcome {
             velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
             impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
-            sweeps: effort.sweeps,
+            sweeps: count.sweeps,
             own: self.own_law(),
         }
     }

@@ -59,6 +59,7 @@ pub(super) fn curves(
             let [rigid, own] = LAWS.map(|law| reached(&points, law, 0.0));
             curves.push(Curve {
                 solver: name.into(),
+                is_part: false,
                 arithmetic: "f64",
                 order,
                 start,

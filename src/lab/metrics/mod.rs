@@ -45,8 +45,8 @@ use state::BodyState;
 use violation::Violation;
 
 /// The errors of a run. All are finite, and zero where there is nothing to measure; absent is
-/// what was not asked for, or has no meaning.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+/// what was not requested, or has no meaning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Errors {
     /// Steps observed.
     pub steps: u64,

@@ -21,7 +21,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
     let phases = phases(rows);
     let mut header = vec!["scene", "bodies", "contacts", "step", "±"];
     header.extend(phases.iter().map(|p| p.name()));
-    header.extend(["pen.max", "law", "per body"]);
+    header.extend(["penetration", "residual, scene", "residual, body"]);
     let mut times = table(&header);
     for row in rows {
         let mut cells = vec![row.scene.clone(), row.bodies.to_string(), row.counts.contacts.to_string()];
@@ -34,14 +34,16 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         times.add_row(cells);
     }
     let mut text = format!(
-        "ns per contact; a step searches all pairs and recomputes colours; pauses in which the thread waited for a processor are left out\n{}\n",
+        "Time per contact (ns), of a step and of its phases; a step searches all pairs and recomputes colours; pauses in\n\
+         which the thread waited for a processor are left out.  ±: median deviation of a step.  penetration: greatest.\n\
+         residual: rms of the contact law in weights of the scene, and of a body, × step\n{}\n",
         finish(times, 1)
     );
     let names: Vec<&str> =
         rows.first().map_or(Vec::new(), |r| r.memory.components.iter().map(|c| c.name).collect());
     let mut header = vec!["scene"];
     header.extend(&names);
-    header.extend(["all", "in use", "B/body"]);
+    header.extend(["all", "in use", "per body"]);
     let mut memory = table(&header);
     for row in rows {
         let per = |bytes: usize, count: usize| format!("{:.0}", bytes as f64 / count.max(1) as f64);
@@ -53,7 +55,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         memory.add_row(cells);
     }
     text += &format!(
-        "bytes held per contact (capacities), of that in use, and per body\n{}\n",
+        "Memory per contact (bytes, as allocated), what of all that is in use, and all per body\n{}\n",
         finish(memory, 1)
     );
     text += &verdicts.iter().map(sentence).collect::<String>();
@@ -61,18 +63,22 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
 }
 
 /// One phase in words.
-fn sentence(verdict: &Verdict) -> String {
+pub(super) fn sentence(verdict: &Verdict) -> String {
     let name = verdict.phase.map_or("whole step", Phase::name);
     let range = verdict.range.map(digits);
     let whole = &verdict.whole;
     let meaning = match whole.change {
-        Change::Flat => "flat".to_string(),
-        Change::Cache => {
-            format!("no more than its memory, which streams {} times slower", digits(whole.memory))
-        }
-        Change::Logarithm => "within n log n".to_string(),
+        Change::Flat => "latency- or compute-bound at every size: its cost is flat".to_string(),
+        Change::Cache => format!(
+            "bandwidth-bound at the large sizes: it grows no more than memory, which streams {} times slower",
+            digits(whole.memory)
+        ),
+        Change::Logarithm => "latency- or compute-bound, within n log n".to_string(),
         Change::Faster => {
-            format!("grows faster than n log n and bandwidth, which explain {}", digits(whole.memory))
+            format!(
+                "grows faster than n log n and bandwidth explain, which account for {}",
+                digits(whole.memory)
+            )
         }
     };
     let mut text = format!(
@@ -101,7 +107,7 @@ fn sentence(verdict: &Verdict) -> String {
         parts.push(format!("within n log n: {}", logarithms.join(", ")));
     }
     let faster: Vec<String> = of(Change::Faster)
-        .map(|s| format!("{}, where streams account for {}", place(s), digits(s.memory)))
+        .map(|s| format!("{}, where n log n and bandwidth account for {}", place(s), digits(s.memory)))
         .collect();
     if !faster.is_empty() {
         parts.push(format!("grows faster than n log n and bandwidth explain: {}", faster.join("; ")));

@@ -15,6 +15,8 @@ pub mod ceilings;
 pub mod growth;
 pub mod growth_report;
 pub mod islands;
+pub mod limit;
+pub mod records;
 pub mod roofline;
 pub mod text;
 pub mod traffic;
@@ -78,7 +80,7 @@ pub struct PhaseReport {
 }
 
 impl PhaseReport {
-    /// Bytes asked for per nanosecond (GB/s).
+    /// Requested bytes per nanosecond (GB/s).
     pub fn bytes_rate(&self) -> f64 {
         self.traffic.total() / self.pass_ns
     }

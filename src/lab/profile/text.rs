@@ -1,5 +1,6 @@
 //! What `simpulse profile` prints.
 
+use super::limit::Limit;
 use super::{PhaseReport, Report, waiting};
 use crate::engine::clock::Phase;
 use crate::lab::report::table::{finish, table};
@@ -110,6 +111,13 @@ fn at_least(phase: Phase, number: &str) -> String {
     format!("{}{number}", if is_partly_scalar(phase) { "≥ " } else { "" })
 }
 
+const LEGEND: &str = "\
+passes: per step.  ±: median deviation of a pass.  working set: bytes that a pass touches.  GB/s: bytes that
+the source names over time; % of peak: of what memory that holds the working set, or multiply-adds at this
+width, reached in the same run.  limit: bandwidth- or compute-bound from half of the lower ceiling on, else
+latency-bound (dependent operations, gathers, branches).  – not counted or not measured.
+";
+
 fn several(report: &Report, phases: &[PhaseReport]) -> String {
     let mut rows = table(&[
         "phase",
@@ -121,17 +129,20 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
         "ns/contact",
         "ns/body",
         "B/contact",
-        "set",
+        "working set",
         "GB/s",
-        "of",
+        "% of peak",
         "flop/contact",
         "GFLOP/s",
+        "% of peak",
         "flop/B",
+        "limit",
     ]);
     let (contacts, mut sum) = (report.counts.contacts, 0.0);
     for phase in phases {
         let (probe, ns) = (&phase.probe, phase.pass_ns);
         let optional = |value: Option<f64>| value.map_or("–".to_string(), digits);
+        let share = |of: Option<f64>| of.map_or("–".to_string(), |s| format!("{:.0}", 100.0 * s));
         let ceiling = phase.bandwidth.map(|b| b.of_mix(&phase.traffic));
         sum += ns * f64::from(probe.passes);
         rows.add_row([
@@ -146,13 +157,15 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
             per(phase.traffic.total(), contacts),
             bytes(phase.traffic.working_set),
             digits(phase.bytes_rate()),
-            optional(ceiling),
+            share(ceiling.map(|peak| phase.bytes_rate() / peak)),
             phase.flops.map_or("–".to_string(), |f| at_least(probe.phase, &per(f, contacts))),
             optional(phase.flops_rate()),
+            share(phase.flops_rate().zip(report.multiply_adds).map(|(rate, peak)| rate / peak)),
             optional(phase.intensity()),
+            Limit::of(phase, report.multiply_adds).map_or("–", Limit::word).to_string(),
         ]);
     }
-    let mut text = finish(rows, 1);
+    let mut text = format!("{LEGEND}\n{}", finish(rows, 1));
     text += &format!(
         "  all phases: {} µs a step, pairs searched again; {:.1} % of the time went into bringing the state back\n",
         digits(1e-3 * sum),
@@ -163,7 +176,7 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
 
 /// What this machine reached in the same run.
 fn ceilings(report: &Report, multiply_adds: f64) -> String {
-    let mut rows = table(&["level", "set", "read GB/s", "update GB/s"]);
+    let mut rows = table(&["level", "working set", "read GB/s", "update GB/s"]);
     for (level, bandwidth) in &report.levels {
         rows.add_row([
             format!("  {}", level.name),
@@ -193,33 +206,26 @@ fn reading(report: &Report, phase: &PhaseReport) -> String {
         return format!("{name}: nothing to do\n");
     }
     let share = 100.0 * memory_ns / phase.pass_ns;
+    let limit = Limit::of(phase, report.multiply_adds).map_or("not limited", Limit::word);
     let memory = format!(
-        "{} of {} GB/s that a set of {set} ({}) allows, {share:.0} %",
+        "{share:.0} % of peak bandwidth ({} of {} GB/s, working set {set} in {})",
         digits(phase.bytes_rate()),
         digits(bandwidth),
         level_of(report, phase.traffic.working_set),
     );
     let Some((flops, rate)) = phase.flops.zip(phase.flops_rate()) else {
-        return format!("{name}: {memory}; operations are not counted here\n");
+        return format!("{name} is {limit}: {memory}; operations are not counted here\n");
     };
     let arithmetic_ns = flops / peak;
-    let bound = memory_ns.max(arithmetic_ns);
-    let binds = if memory_ns >= arithmetic_ns { "bandwidth" } else { "arithmetic" };
-    let times = phase.pass_ns / bound;
-    let rest = match times {
-        t if t < 1.1 => "it is at its ceiling".to_string(),
-        t if t < 2.0 => format!("a pass takes {} times what that allows", digits(t)),
-        t => format!(
-            "a pass takes {} times what that allows: latency-bound: chains of operations and gathers",
-            digits(t)
-        ),
-    };
+    let times = phase.pass_ns / memory_ns.max(arithmetic_ns);
     format!(
-        "{name}: {memory}; {} of {} GFLOP/s, {:.0} %; intensity {} flop/B, so {binds} is the lower ceiling; {rest}\n",
+        "{name} is {limit}: {memory}, {:.0} % of peak arithmetic ({} of {} GFLOP/s), {} flop/B; a pass takes {} \
+         times what the lower ceiling allows\n",
+        100.0 * arithmetic_ns / phase.pass_ns,
         digits(rate),
         digits(peak),
-        100.0 * arithmetic_ns / phase.pass_ns,
         digits(phase.intensity().unwrap_or(0.0)),
+        digits(times),
     )
 }
 

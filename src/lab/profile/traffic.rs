@@ -67,7 +67,7 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
         // Both bodies of each contact.
         Phase::Color => in_and_out(8.0 * contacts, 12.0 * world.counts.lane_slots as f64),
         Phase::Prepare => {
-            // Velocities, masses, forces, gravity: nine floats and two flags; then row and kick.
+            // Velocities, masses, forces, gravity: nine floats and two flags; then row and velocity increment.
             let load = in_and_out(bodies * 38.0, rows * (ROW + HALF + damping));
             let records = constraints(frozen, probe);
             Traffic {
@@ -77,7 +77,7 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
             }
         }
         Phase::Integrate => {
-            // A substep has a velocity pass (velocity, kick, free velocity) and a position pass
+            // A substep has a velocity pass (velocity, velocity increment, free velocity) and a position pass
             // (velocity, motion): the mean of both.
             let read = (HALF + HALF + damping) + (HALF + HALF);
             let written = (HALF + HALF) + HALF;

@@ -5,7 +5,7 @@
 //! the unknowns stays in registers while the rows that it depends on pass by; then once more for what
 //! R − A X leaves, which takes the error of every column to rounding of its own residual.
 //!
-//! **Source**: Golub & Van Loan, *Matrix Computations*, §3.4 (pivoting), §3.5.3 (refinement).
+//! **Source**: Golub and Van Loan 2013 (`golub2013`), §3.4 (pivoting), §3.5.3 (refinement).
 //! **Cost**: 2n³/3 for the factors and 6n² for a column of R, less where entries are zero: multipliers
 //! of zero are skipped, so that unit columns, if they come first, cost next to nothing.
 //!

@@ -5,7 +5,8 @@
 //! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
 //! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
 //! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by
-//! hand, [`rates`] measures convergence in iterations and in the step size.
+//! hand, [`rates`] measures convergence in iterations and in the step size, and [`spectral`] computes that
+//! of Gauss–Seidel.
 //!
 //! Nothing here knows the simulation's own solvers, so that it can judge them.
 
@@ -20,9 +21,12 @@ pub mod nnls;
 pub mod problem;
 pub mod rates;
 pub mod residual;
+mod scale;
 pub mod sparse;
+pub mod spectral;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
+mod validate;
 
 pub use problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};

@@ -6,10 +6,10 @@
 //! least squares over them are solved without a sign; and where that would make weights negative, z
 //! goes towards it only until the first of them vanishes, and that edge is dropped.
 //!
-//! **Source**: Lawson & Hanson 1974, *Solving Least Squares Problems*, chapter 23. Every round shortens
+//! **Source**: Lawson and Hanson 1974 (`lawson1974`), chapter 23. Every round shortens
 //! r, so none can come back, however many ways there are to write p: degenerate cones, on which the
 //! simplex method may cycle, need no care.
-//! **Departures**: least squares by Gram–Schmidt, each column twice (Giraud & Langou 2002: enough for
+//! **Departures**: least squares by Gram–Schmidt, each column twice (`giraud2002`: enough for
 //! orthogonality to rounding), from scratch every time; a column that depends on those in use to
 //! `DEPENDENT` is passed over.
 //! **Cost**: 4 m k² a round, k ≤ m edges in use, and some k rounds; meant for a few hundred rows.

@@ -18,7 +18,6 @@
 //! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
 
 use super::dense::Matrix;
-use crate::lab::error::Error;
 use serde::{Deserialize, Serialize};
 
 /// Velocity of a body: (m/s, m/s, rad/s).
@@ -124,57 +123,6 @@ pub struct ContactProblem {
 }
 
 impl ContactProblem {
-    /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
-    /// that every contact has a side that answers to impulses.
-    pub fn validate(&self) -> Result<(), Error> {
-        // Names go into tables.
-        require(!self.name.chars().any(char::is_control), "name", || {
-            format!("must not have control characters, is {:?}", self.name)
-        })?;
-        let h = [self.h];
-        finite("h", &h)?;
-        require(self.h > 0.0, "h", || format!("the step is {} s, must be > 0", self.h))?;
-        for (i, b) in self.bodies.iter().enumerate() {
-            let place = || format!("bodies[{i}]");
-            finite(place(), &[b.inv_mass, b.inv_inertia])?;
-            finite(place(), &b.velocity)?;
-            finite(place(), &b.free_velocity)?;
-            require(b.inv_mass >= 0.0, place(), || format!("inv_mass is {}, must be ≥ 0", b.inv_mass))?;
-            require(b.inv_inertia >= 0.0, place(), || {
-                format!("inv_inertia is {}, must be ≥ 0", b.inv_inertia)
-            })?;
-        }
-        for (i, c) in self.contacts.iter().enumerate() {
-            let place = || format!("contacts[{i}]");
-            for pair in [c.normal, c.arm_a, c.arm_b, [c.gap, c.friction], c.warm_impulse] {
-                finite(place(), &pair)?;
-            }
-            finite(place(), &[c.rebound])?;
-            for body in [c.body_a, c.body_b].into_iter().flatten() {
-                require((body as usize) < self.bodies.len(), place(), || {
-                    format!("names body {body} of {}", self.bodies.len())
-                })?;
-            }
-            require(c.body_a != c.body_b, place(), || format!("both sides are {:?}", c.body_a))?;
-            let length = c.normal[0].hypot(c.normal[1]);
-            // Normals that come from f32 are unit only to their own precision.
-            require((length - 1.0).abs() < 1e-5, place(), || {
-                format!("the normal has length {length}, must be 1")
-            })?;
-            require(c.friction >= 0.0, place(), || format!("friction is {}, must be ≥ 0", c.friction))?;
-            require(c.rebound >= 0.0, place(), || format!("rebound is {}, must be ≥ 0", c.rebound))?;
-            let g = self.delassus_block(c);
-            require(g[0] > 0.0 && g[1] > 0.0, place(), || "no side answers to impulses".to_string())?;
-            let starts = i == 0 || self.contacts[i - 1].manifold != c.manifold;
-            let p = &self.contacts[i.saturating_sub(1)];
-            let same = p.normal == c.normal && p.body_a == c.body_a && p.body_b == c.body_b;
-            require(starts || same, place(), || {
-                format!("manifold {} has points of different bodies or normals", c.manifold)
-            })?;
-        }
-        Ok(())
-    }
-
     /// Adds M⁻¹ Jᵀ of one contact times `impulse` to the velocities.
     pub fn apply(&self, contact: &ProblemContact, impulse: Pair, velocities: &mut [Velocity]) {
         for (body, [n, t]) in contact.sides() {
@@ -244,7 +192,7 @@ impl ContactProblem {
     }
 
     /// (G_nn, G_tt) of one contact (1/kg).
-    fn delassus_block(&self, contact: &ProblemContact) -> Pair {
+    pub(super) fn delassus_block(&self, contact: &ProblemContact) -> Pair {
         let mut g = [0.0; 2];
         for (body, block) in contact.sides() {
             let b = &self.bodies[body];
@@ -258,72 +206,6 @@ impl ContactProblem {
     /// Diagonal of G, a (normal, tangential) pair per contact (1/kg).
     pub fn delassus_diagonal(&self) -> Vec<Pair> {
         self.contacts.iter().map(|c| self.delassus_block(c)).collect()
-    }
-
-    /// M (v* − v): what forces give each body during the step (N·s, N·s, N·m·s); zero for
-    /// components of infinite mass.
-    pub fn loads(&self) -> Vec<Velocity> {
-        let change = |b: &ProblemBody| {
-            let m = masses(b);
-            [0, 1, 2].map(|k| m[k] * (b.free_velocity[k] - b.velocity[k]))
-        };
-        self.bodies.iter().map(change).collect()
-    }
-
-    /// h times the sum of weights (N·s): ∑ |m (v* − v)|. Zero without forces.
-    pub fn total_load(&self) -> f64 {
-        self.loads().iter().map(|p| p[0].hypot(p[1])).sum()
-    }
-
-    /// The impulse by which residuals are made dimensionless (N·s): h m g of the heaviest body,
-    /// max |m (v* − v)|; without forces max |m v*|; 1 if nothing moves.
-    pub fn impulse_unit(&self) -> f64 {
-        let largest = |p: Vec<Velocity>| p.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max);
-        let momenta = self.bodies.iter().map(|b| {
-            let m = masses(b);
-            [0, 1, 2].map(|k| m[k] * b.free_velocity[k])
-        });
-        [largest(self.loads()), largest(momenta.collect())].into_iter().find(|&u| u > 0.0).unwrap_or(1.0)
-    }
-
-    /// √(vᵀ M v) over components of finite mass (√J·√2).
-    pub fn mass_norm(&self, velocities: &[Velocity]) -> f64 {
-        let square = |(b, v): (&ProblemBody, &Velocity)| {
-            let m = masses(b);
-            m[0] * v[0] * v[0] + m[1] * v[1] * v[1] + m[2] * v[2] * v[2]
-        };
-        self.bodies.iter().zip(velocities).map(square).sum::<f64>().sqrt()
-    }
-
-    /// ‖v − w‖ in the mass norm, relative to max(‖w‖, ‖v* − v_start‖): the second stands in for
-    /// √m g h, so that a reference at rest does not make every error infinite.
-    pub fn velocity_error(&self, velocities: &[Velocity], reference: &[Velocity]) -> f64 {
-        let minus = |a: &[Velocity], b: &[Velocity]| -> Vec<Velocity> {
-            a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect()
-        };
-        let free: Vec<Velocity> = self.bodies.iter().map(|b| b.free_velocity).collect();
-        let start: Vec<Velocity> = self.bodies.iter().map(|b| b.velocity).collect();
-        let scale = self.mass_norm(reference).max(self.mass_norm(&minus(&free, &start)));
-        let error = self.mass_norm(&minus(velocities, reference));
-        if error == 0.0 { 0.0 } else { error / scale }
-    }
-}
-
-/// Finite masses of a body, zero where infinite: those components cannot change.
-fn masses(b: &ProblemBody) -> Velocity {
-    // The reciprocal of the smallest numbers is infinite, too.
-    let inverse = |x: f64| if x > 0.0 && x.recip().is_finite() { x.recip() } else { 0.0 };
-    [inverse(b.inv_mass), inverse(b.inv_mass), inverse(b.inv_inertia)]
-}
-
-fn require(ok: bool, place: impl Into<String>, message: impl FnOnce() -> String) -> Result<(), Error> {
-    if ok { Ok(()) } else { Err(Error::invalid(place, message())) }
-}
-
-fn finite(place: impl Into<String>, values: &[f64]) -> Result<(), Error> {
-    match values.iter().find(|x| !x.is_finite()) {
-        Some(x) => Err(Error::invalid(place, format!("{x} is not a finite number"))),
-        None => Ok(()),
     }
 }
 

@@ -5,7 +5,7 @@
 //! `DIAGONAL` times the largest: that keeps the order and so the fill. What this loses in accuracy,
 //! a step of refinement returns, its remainder summed to twice the working precision.
 //!
-//! **Source**: Davis, *Direct Methods for Sparse Linear Systems*, §6.2 (left-looking LU) and §7.1
+//! **Source**: Davis 2006 (`davis2006`), §6.2 (left-looking LU) and §7.1
 //! (ordering), in the Rust of the crate `rsparse`.
 
 use rsparse::data::Sprs;
@@ -44,7 +44,7 @@ pub fn solve(entries: Vec<Entry>, right: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// right − A x to twice the working precision: beside every sum stands what its roundings lost, those
-/// of products found by a fused multiplication (Ogita, Rump & Oishi 2005).
+/// of products found by a fused multiplication (Ogita, Rump and Oishi 2005, `ogita2005`).
 fn remainder(matrix: &Sprs<f64>, x: &[f64], right: &[f64]) -> Vec<f64> {
     let mut sums: Vec<(f64, f64)> = right.iter().map(|&r| (r, 0.0)).collect();
     for (column, range) in matrix.p.windows(2).enumerate() {

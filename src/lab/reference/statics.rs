@@ -17,8 +17,8 @@
 //!
 //! Moments are divided by the longest arm and loads by their length, so that tolerances have a meaning.
 //!
-//! **Source**: the static and the kinematic theorem of limit analysis, in Livesley 1978, *Limit analysis
-//! of structures formed from rigid blocks*, there as a linear program and its dual.
+//! **Source**: the static and the kinematic theorem of limit analysis, in Livesley 1978
+//! (`livesley1978`), there as a linear program and its dual.
 
 use super::nnls::{dot, norm, remainder};
 use super::problem::{ContactProblem, Velocity};
@@ -107,7 +107,7 @@ impl<'a> Cone<'a> {
                     loads[body] = [0, 1, 2].map(|k| n[k] + slope * t[k]);
                 }
                 let edge = cone.in_rows(&loads);
-                // A side that answers to some impulses may be held against this one.
+                // A side that answers to some impulses may be pressed against this one.
                 let length = norm(&edge);
                 if length > 0.0 {
                     cone.edges.push(edge.into_iter().map(|x| x / length).collect());

@@ -1,7 +1,7 @@
 //! Which machine and which compiler a result belongs to.
 
 /// Written beside every result.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Environment {
     /// Model name of the processor.
     pub cpu: String,
@@ -10,18 +10,18 @@ pub struct Environment {
     /// Version of the compiler that built the program.
     pub compiler: String,
     /// `x86_64`, …
-    pub architecture: &'static str,
+    pub architecture: String,
     /// `linux`, …
-    pub system: &'static str,
+    pub system: String,
     /// Instruction sets that the compiler was allowed to use: these, not the processor's,
     /// decide what a lane width becomes.
-    pub target_features: Vec<&'static str>,
+    pub target_features: Vec<String>,
     /// Widest lanes that one instruction of these sets processes.
     pub native_lanes: usize,
     /// Whether the program was built with optimisation checks on.
     pub debug_assertions: bool,
     /// Version of this crate.
-    pub version: &'static str,
+    pub version: String,
 }
 
 impl Environment {
@@ -31,13 +31,29 @@ impl Environment {
             cpu: cpu_model(),
             processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
             compiler: compiler(),
-            architecture: std::env::consts::ARCH,
-            system: std::env::consts::OS,
+            architecture: std::env::consts::ARCH.into(),
+            system: std::env::consts::OS.into(),
             target_features: target_features(),
             native_lanes: native_lanes(),
             debug_assertions: cfg!(debug_assertions),
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").into(),
         }
+    }
+}
+
+impl Environment {
+    /// The widest instructions that the compiler was allowed to use, in the usual spelling.
+    pub fn instructions(&self) -> &'static str {
+        let names = [
+            ("avx512f", "AVX-512"),
+            ("avx2", "AVX2"),
+            ("avx", "AVX"),
+            ("sse2", "SSE2"),
+            ("neon", "NEON"),
+            ("simd128", "WebAssembly SIMD"),
+        ];
+        let has = |feature: &str| self.target_features.iter().any(|own| own == feature);
+        names.into_iter().find(|(feature, _)| has(feature)).map_or("no SIMD", |(_, name)| name)
     }
 }
 
@@ -47,14 +63,14 @@ fn cpu_model() -> String {
     model.map_or("unknown".to_string(), |(_, name)| name.trim().to_string())
 }
 
-fn target_features() -> Vec<&'static str> {
+fn target_features() -> Vec<String> {
     macro_rules! enabled {
         ($($name:literal),*) => { [$(($name, cfg!(target_feature = $name))),*] };
     }
     let all = enabled!(
         "sse2", "sse4.1", "avx", "avx2", "fma", "avx512f", "avx512vl", "avx512dq", "neon", "simd128"
     );
-    all.into_iter().filter(|f| f.1).map(|f| f.0).collect()
+    all.into_iter().filter(|f| f.1).map(|f| f.0.to_string()).collect()
 }
 
 fn native_lanes() -> usize {

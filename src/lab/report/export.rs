@@ -1,13 +1,11 @@
 //! The study as `study.csv` and `study.json`.
 
-use super::environment::Environment;
 use super::units::is_emulated;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
-use crate::lab::study::ablation::NeedCost;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
 
@@ -178,29 +176,13 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// `study.json`: the environment, every setting, the records, and the ablation.
-pub fn json(
-    environment: &Environment,
-    plan: &StudyPlan,
-    records: &[Record],
-    ablation: &[NeedCost],
-) -> Result<Vec<u8>, Error> {
-    let whole = json!({
-        "environment": environment,
-        "settings": settings(plan),
-        "records": records,
-        "ablation": ablation,
-    });
-    serde_json::to_vec_pretty(&whole).map_err(|e| Error::invalid("study.json", e.to_string()))
-}
-
 /// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
 fn decimal(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// Everything that was chosen, by the caller or by a constant.
-fn settings(plan: &StudyPlan) -> Value {
+pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
     struct Solver {
         name: &'static str,
@@ -247,4 +229,19 @@ fn settings(plan: &StudyPlan) -> Value {
             "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
         },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::report::columns::STUDY;
+    use crate::lab::study::record::tests::record;
+
+    #[test]
+    fn every_column_is_documented() {
+        let bytes = csv(&[record(8, 1, 1.0, 0.0)]).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        assert_eq!(header, STUDY.names());
+    }
 }

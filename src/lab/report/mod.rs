@@ -1,52 +1,47 @@
 //! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
 
+pub mod answer;
 pub(crate) mod axes;
+pub mod columns;
 pub mod environment;
 pub mod export;
+pub mod html;
 pub mod plot;
 pub mod profiles;
-pub mod reading;
+pub mod savings;
+pub mod study_file;
+pub mod style;
 pub mod table;
-pub mod units;
+pub use crate::lab::units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::study::ablation::NeedCost;
-use crate::lab::study::{Record, StudyPlan};
-use environment::Environment;
+use crate::lab::study::Record;
 use std::path::{Path, PathBuf};
+use study_file::StudyFile;
 
-/// Everything that a study prints.
-pub fn text(records: &[Record], ablation: &[NeedCost]) -> String {
-    let mut text = String::new();
+/// Everything that a study measured, as tables: per scene, in equal time and to equal error, and the
+/// performance profiles.
+pub fn tables(records: &[Record]) -> String {
+    let mut text = format!("{}\n", table::LEGEND);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         text += &table::scene_table(scene);
         text += "\n";
     }
-    text += table::LEGEND;
-    let ablation = table::ablation_table(ablation);
-    if !ablation.is_empty() {
-        text += &format!("\n{ablation}");
-    }
-    let slices = profiles::slice_tables(records);
-    let profiles = profiles::profile_table(records);
-    text + "\n" + &slices + "\n" + &profiles + "\n" + &reading::reading(records)
+    let (slices, profiles) = (profiles::slice_tables(records), profiles::profile_table(records));
+    text + &slices + "\n" + &profiles
 }
 
-/// Writes `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into `folder`;
-/// returns their paths.
+/// Writes `tables.txt`, `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into
+/// `folder`, and the [page](html) made from them and what else is there; returns their paths.
 ///
-/// All are made before the first is written.
-pub fn write_study(
-    folder: &Path,
-    plan: &StudyPlan,
-    records: &[Record],
-    ablation: &[NeedCost],
-) -> Result<Vec<PathBuf>, Error> {
-    let environment = Environment::current();
+/// All but the page are made before the first is written.
+pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
+    let records = &study.records;
     let contents = [
+        ("tables.txt", tables(records).into_bytes()),
         ("study.csv", export::csv(records)?),
-        ("study.json", export::json(&environment, plan, records, ablation)?),
+        ("study.json", study.to_json()?),
         ("speed_vs_error.svg", plot::svg(records)?.into_bytes()),
         ("profiles.svg", profiles::svg(records)?.into_bytes()),
     ];
@@ -57,5 +52,6 @@ pub fn write_study(
         files::write(&path, &bytes)?;
         paths.push(path);
     }
+    paths.push(html::write(folder, study)?);
     Ok(paths)
 }

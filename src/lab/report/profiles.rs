@@ -1,6 +1,6 @@
 //! `profiles.svg` and the slices: solvers compared over all scenes.
 
-use super::axes::{Area, Drawn, GRID, INK, Scale, color, solver_legend, write, write_upwards};
+use super::axes::{Area, Drawn, GRID, INK, Scale, solver_color, solver_legend, write, write_upwards};
 use super::table::{finish, table};
 use super::units::{digits, si};
 use crate::lab::error::Error;
@@ -73,7 +73,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
     write_upwards(area, &format!("share of {} scenes", profile.scenes), (x + 14, (top + bottom) / 2), 12)?;
     write(area, "time, in times that of the fastest", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
-    for (i, (_, ratios)) in profile.ratios.iter().enumerate() {
+    for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
         // Steps that coincide stay visible beside each other.
         let shift = 2 * i as i32 - profile.ratios.len() as i32;
         let at = |factor: f64, share: f64| (scale.pixel(factor, left, right), y(share) + shift);
@@ -83,7 +83,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
             line.push(at(ratio, profile.share(i, ratio)));
         }
         line.push((right, line[line.len() - 1].1));
-        area.draw(&PathElement::new(line, color(i).stroke_width(2)))?;
+        area.draw(&PathElement::new(line, solver_color(solver).stroke_width(2)))?;
     }
     Ok(())
 }
@@ -95,10 +95,9 @@ pub fn profile_table(records: &[Record]) -> String {
         table(&["solved if", "scenes", "solver", "fastest or tied", "within 1.5×", "within 4×", "at all"]);
     for profile in &profiles {
         for (i, (solver, _)) in profile.ratios.iter().enumerate() {
-            let first = |text: String| if i == 0 { text } else { String::new() };
             let share = |factor: f64| format!("{:.0} %", 100.0 * profile.share(i, factor));
-            let mut cells = vec![first(tolerance(profile.axis))];
-            cells.extend([first(format!("{} of {}", profile.solvable, profile.scenes)), solver.to_string()]);
+            let mut cells = vec![tolerance(profile.axis)];
+            cells.extend([format!("{} of {}", profile.solvable, profile.scenes), solver.to_string()]);
             cells.extend(FACTORS.map(share));
             cells.push(share(f64::INFINITY));
             rows.add_row(cells);
@@ -125,8 +124,8 @@ pub fn slice_tables(records: &[Record]) -> String {
         let mut rows = table(&header);
         for axis in ErrorAxis::ALL {
             let slices: Vec<Slice> = scenes.iter().filter_map(|scene| of(scene, axis)).collect();
-            for (i, slice) in slices.iter().enumerate() {
-                rows.add_row(slice_row(slice, if i == 0 { axis.name() } else { "" }, equal_time));
+            for slice in &slices {
+                rows.add_row(slice_row(slice, axis.name(), equal_time));
             }
         }
         text += &format!("{heading}\n{}", finish(rows, 2));
@@ -173,14 +172,14 @@ mod tests {
         let text = slice_tables(&two_solvers());
         let line = |start: &str| text.lines().rfind(|l| l.starts_with(start)).unwrap();
         // To the same error of 10 mm: between 10 and 20 µs both, within 3 %.
-        assert!(line("deepest penetration").contains("pgs = soft_step"), "{text}");
+        assert!(line("greatest penetration").contains("pgs = soft_step"), "{text}");
         assert!(text.contains("Equal time") && text.contains("—"), "{text}");
     }
 
     #[test]
     fn the_profile_has_its_table_and_its_picture() {
         let text = profile_table(&two_solvers());
-        assert!(text.contains("deepest penetration in tolerance") && text.contains("1 of 1"), "{text}");
+        assert!(text.contains("greatest penetration in tolerance") && text.contains("1 of 1"), "{text}");
         assert_eq!(text.matches("100 %").count(), 16, "{text}");
         let picture = svg(&two_solvers()).unwrap();
         assert!(picture.contains("share of 1 scenes") && !picture.to_lowercase().contains("nan"));

@@ -3,17 +3,22 @@
 use super::units::{digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
-use crate::lab::study::ablation::NeedCost;
-use crate::lab::study::{Fronts, Record};
+use crate::lab::study::{Fronts, Record, TruthError};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 /// What the columns of [`scene_table`] are, once for the whole study.
 pub const LEGEND: &str = "\
-lanes: nat is one after the other in natural order, numbers are lanes in coloured order.  ± is the median
-deviation of a repeat.  ns/row: a sweep, per row that it solves.  ×: times faster than 1 lane.
-law: contact-law residual in the scene's weight × step, and in a body's.  energy, moment.: gained or lost, relative.  rest:
-rms speed of the last second.  occ.: lanes that hold a contact.  front: on the front of time against
-p penetration, l law residual, t truth; errors are the same for all coloured widths of a budget.
+budget: substeps, and in each so many velocity (vel), relaxation (rel) and position (pos) sweeps.
+lanes: natural is one contact after the other in natural order, numbers are lanes in coloured order; the
+errors are the same for all lane widths of a budget.
+µs/step: median, ± median deviation of a repeat.  ns/row: a sweep, per constraint row that it solves.
+speed-up: over 1 lane.  holds: yes, or what happened (fell, slid, tunnelled, blew up).
+penetration: greatest, and mean over contact points and steps.  residual: rms of the contact law, in the
+weight of the whole scene × step, and in the mean weight of a body × step.
+energy, momentum: gained or lost, relative.  rest speed: rms over the last second.
+reference: distance to the scene's reference value; missed if the run never came to it, – if none is known.
+sweeps: per step.  colours: of contacts.  occupancy: lanes that hold a contact.
+Pareto: on the Pareto front of time against p penetration, l contact-law residual, t reference value.
 ";
 
 /// Lines of a table without the frame.
@@ -44,19 +49,37 @@ pub fn scene_table(records: &[Record]) -> String {
         text += &format!(" · {steps} steps");
     }
     if let Some(truth) = records.iter().find_map(|r| r.truth) {
-        text += &format!(" · truth: {} = {}", truth.quantity, si(truth.expected, truth.unit));
+        text += &format!(" · reference value: {} = {}", truth.quantity, si(truth.expected, truth.unit));
     }
     text += "\n";
     let mut rows = table(&[
-        "solver", "budget", "lanes", "µs/step", "±", "ns/row", "×", "holds", "pen.max", "mean", "law",
-        "/body", "energy", "moment.", "rest", "truth", "sweeps", "col.", "occ.", "front",
+        "solver",
+        "budget",
+        "lanes",
+        "µs/step",
+        "±",
+        "ns/row",
+        "speed-up",
+        "holds",
+        "penetration\nmax",
+        "\nmean",
+        "residual\nscene",
+        "\nbody",
+        "energy",
+        "momentum",
+        "rest speed",
+        "reference",
+        "sweeps",
+        "colours",
+        "occupancy",
+        "Pareto",
     ]);
     let mut notes = String::new();
     let mut previous: Option<&Record> = None;
     for record in records {
-        let same_budget = previous.is_some_and(|p| (p.solver, p.budget) == (record.solver, record.budget));
-        let same_order = same_budget && previous.is_some_and(|p| p.order == record.order);
-        rows.add_row(row(record, same_budget, same_order));
+        rows.add_row(row(record));
+        let key = |r: &Record| (r.solver, r.budget, r.order);
+        let same_order = previous.is_some_and(|p| key(p) == key(record));
         if let (Some(failure), false) = (record.failure, same_order) {
             notes += &format!(
                 "  failed: {}, {}, {}: {failure}\n",
@@ -80,29 +103,29 @@ pub fn scene_table(records: &[Record]) -> String {
 
 fn lanes(record: &Record) -> String {
     match record.order {
-        Order::Natural => "nat".to_string(),
+        Order::Natural => "natural".to_string(),
         Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
         Order::Colored => record.lanes.to_string(),
     }
 }
 
-fn row(record: &Record, same_budget: bool, same_order: bool) -> Vec<String> {
-    let unless = |same: bool, text: &str| if same { String::new() } else { text.to_string() };
-    let mut cells =
-        vec![unless(same_budget, record.solver), unless(same_budget, &record.budget_text), lanes(record)];
+fn row(record: &Record) -> Vec<String> {
+    const NOTHING: &str = "–";
+    let mut cells = vec![record.solver.to_string(), record.budget_text.clone(), lanes(record)];
     let Some(lap) = &record.lap else {
-        cells.push("failed".to_string());
-        cells.resize(20, String::new());
+        cells.resize(7, NOTHING.to_string());
+        cells.push(record.mark().map_or("failed", |mark| mark.word()).to_string());
+        cells.resize(20, NOTHING.to_string());
         return cells;
     };
     cells.extend([
         digits(lap.median_ns / 1e3),
         digits(lap.spread_ns / 1e3),
         digits(lap.row_sweep_ns),
-        record.speed_up.map_or(String::new(), digits),
+        record.speed_up.map_or(NOTHING.to_string(), digits),
     ]);
-    let errors = record.errors.filter(|_| !same_order);
-    let error = |show: &dyn Fn(&Errors) -> String| errors.as_ref().map_or(String::new(), show);
+    let errors = record.errors.as_ref();
+    let error = |show: &dyn Fn(&Errors) -> String| errors.map_or(NOTHING.to_string(), show);
     cells.extend([
         record.mark().map_or("yes", |mark| mark.word()).to_string(),
         error(&|e| si(e.penetration_max, "m")),
@@ -113,12 +136,12 @@ fn row(record: &Record, same_budget: bool, same_order: bool) -> Vec<String> {
         error(&|e| ratio(e.momentum)),
         error(&|e| si(e.rest_velocity, "m/s")),
     ]);
-    let truth = record.truth.filter(|_| !same_order);
-    cells.push(truth.map_or(String::new(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))));
+    let reference = |t: TruthError| t.error.map_or("missed".to_string(), |e| si(e, t.unit));
+    cells.push(record.truth.map_or(NOTHING.to_string(), reference));
     cells.extend([
         format!("{:.0}", lap.load.sweeps),
         lap.load.colors.to_string(),
-        format!("{:.0}%", 100.0 * lap.load.occupancy),
+        format!("{:.0} %", 100.0 * lap.load.occupancy),
         front(&record.front),
     ]);
     cells
@@ -126,34 +149,8 @@ fn row(record: &Record, same_budget: bool, same_order: bool) -> Vec<String> {
 
 fn front(fronts: &Fronts) -> String {
     let marks = [(fronts.penetration, 'p'), (fronts.law, 'l'), (fronts.truth, 't')];
-    marks.iter().filter(|m| m.0).map(|m| m.1).collect()
-}
-
-/// What it would cost to model what scenes do not need.
-pub fn ablation_table(costs: &[NeedCost]) -> String {
-    let Some(first) = costs.first() else { return String::new() };
-    let mut text = format!(
-        "What leaving out what a scene does not need saves ({}, {} lanes)\n",
-        first.solver, first.lanes
-    );
-    let mut rows =
-        table(&["scene", "left out", "bytes/contact", "saved", "ns/contact/sweep", "saved", "same bits"]);
-    let mut previous = "";
-    for cost in costs {
-        let scene = if cost.scene == previous { "" } else { &cost.scene };
-        previous = &cost.scene;
-        rows.add_row(vec![
-            scene.to_string(),
-            cost.need.to_string(),
-            format!("{:.0}", cost.bytes),
-            format!("{:.0}", cost.bytes_saved),
-            digits(cost.ns),
-            digits(cost.ns_saved),
-            if cost.bits_equal { "yes" } else { "NO" }.to_string(),
-        ]);
-    }
-    text += &finish(rows, 2);
-    text
+    let on: String = marks.iter().filter(|m| m.0).map(|m| m.1).collect();
+    if on.is_empty() { "–".to_string() } else { on }
 }
 
 /// The errors that stand beside a time, on one line.
@@ -217,15 +214,20 @@ mod tests {
     use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
-    fn errors_stand_once_per_budget_and_failures_below() {
+    fn every_line_stands_alone_and_failures_below() {
         let mut wrong = record(8, 1, 10.0, 1.234e-3);
         wrong.bits_equal = Some(false);
         let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1), fell(8, 3, 5.0, 0.1)]);
         assert!(text.contains(" fell ") && text.contains(" yes "), "{text}");
-        assert_eq!(text.matches("1.23 mm").count(), 1, "{text}");
+        assert_eq!(text.matches("1.23 mm").count(), 2, "{text}");
+        assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
         assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
-        assert!(text.lines().all(|line| line.chars().count() <= 160));
+        // No cell is blank.
+        let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
+        let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();
+        assert_eq!(lines, [20; 4], "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 200), "{text}");
         assert!(scene_table(&[]).is_empty());
     }
 }

@@ -42,7 +42,7 @@ pub(super) const ELASTIC: Entry =
 /// From `height` (m), rising to `apex` (m) after the first impact.
 fn tolerances(scene: &Scene, height: f64, apex: f64) -> Tolerances {
     Tolerances::impacts(scene, height)
-        .residual(2.0, "a rebound is held against the approach at the step's start: up to 1 + e weights")
+        .residual(2.0, "a rebound is compared with the approach at the step's start: up to 1 + e weights")
         .truth((2.0 * G * apex).sqrt() * scene.dt, "a rebound that is a step early or late")
 }
 

@@ -10,6 +10,12 @@ use glam::Vec2;
 /// Most bodies of a scene.
 pub const MAX_BODIES: usize = 1_000_000;
 
+/// Shortest step (s): shorter ones would be shown as 0, and `f32` rounds most motion in them away.
+pub const MIN_DT: f64 = 1e-9;
+
+/// Most steps of a run: 46 hours at 60 steps a second.
+pub const MAX_STEPS: u32 = 10_000_000;
+
 /// Greatest friction coefficient (1), so that the product of two is finite in `f32`.
 pub const MAX_FRICTION: f64 = 1e9;
 
@@ -17,13 +23,14 @@ impl Scene {
     /// Whether a world can be made of this scene.
     ///
     /// Errors, naming place and value: a name that is empty or has control characters;
-    /// a number that is not finite in `f32`; `dt` ≤ 0; no steps; more than
-    /// [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
+    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`]; no steps, or more than [`MAX_STEPS`];
+    /// no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
     /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
     /// constructors refuse; a dynamic body without mass.
     pub fn validate(&self) -> Result<(), Error> {
         self.check_head()?;
-        self.bodies.iter().enumerate().try_for_each(|(i, body)| body_def(i, body).map(drop))
+        let check = |(i, body)| body_def(body).map(drop).map_err(|e| e.within(&format!("bodies[{i}]")));
+        self.bodies.iter().enumerate().try_for_each(check)
     }
 
     fn check_head(&self) -> Result<(), Error> {
@@ -36,8 +43,15 @@ impl Scene {
         }
         finite_pair("gravity", self.gravity)?;
         positive("dt", self.dt)?;
-        if self.steps == 0 {
-            return Err(Error::invalid("steps", "must be at least 1, is 0"));
+        if self.dt < MIN_DT {
+            return Err(Error::invalid("dt", format!("must be at least {MIN_DT:e} s, is {:e} s", self.dt)));
+        }
+        if !(1..=MAX_STEPS).contains(&self.steps) {
+            let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);
+            return Err(Error::invalid("steps", message));
+        }
+        if self.bodies.is_empty() {
+            return Err(Error::invalid("bodies", "there are none: a scene needs at least one"));
         }
         if self.bodies.len() > MAX_BODIES {
             let message = format!("{} bodies, where at most {MAX_BODIES} are possible", self.bodies.len());
@@ -49,7 +63,8 @@ impl Scene {
     /// The bodies as a world takes them. Errors: as [`Scene::validate`].
     pub fn body_defs(&self) -> Result<Vec<BodyDef>, Error> {
         self.check_head()?;
-        self.bodies.iter().enumerate().map(|(i, body)| body_def(i, body)).collect()
+        let def = |(i, body)| body_def(body).map_err(|e| e.within(&format!("bodies[{i}]")));
+        self.bodies.iter().enumerate().map(def).collect()
     }
 
     /// A world with these bodies, in their order; gravity and step are the
@@ -65,16 +80,17 @@ impl Scene {
     }
 }
 
-fn body_def(index: usize, body: &SceneBody) -> Result<BodyDef, Error> {
-    let at = |name: &str| format!("bodies[{index}].{name}");
-    finite_pair(&at("position"), body.position)?;
-    finite(&at("angle"), body.angle)?;
-    finite_pair(&at("velocity"), body.velocity)?;
-    finite(&at("angular_velocity"), body.angular_velocity)?;
-    finite(&at("gravity_scale"), body.gravity_scale)?;
-    not_negative(&at("linear_damping"), body.linear_damping)?;
-    not_negative(&at("angular_damping"), body.angular_damping)?;
-    let shapes = body.shapes.iter().enumerate().map(|(k, s)| shape_def(&at(&format!("shapes[{k}]")), s));
+/// Errors name places within the body.
+fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
+    finite_pair("position", body.position)?;
+    finite("angle", body.angle)?;
+    finite_pair("velocity", body.velocity)?;
+    finite("angular_velocity", body.angular_velocity)?;
+    finite("gravity_scale", body.gravity_scale)?;
+    not_negative("linear_damping", body.linear_damping)?;
+    not_negative("angular_damping", body.angular_damping)?;
+    let shape = |(k, shape)| shape_def(shape).map_err(|e| e.within(&format!("shapes[{k}]")));
+    let shapes = body.shapes.iter().enumerate().map(shape);
     let def = BodyDef {
         kind: body.kind,
         position: body.position,
@@ -89,14 +105,14 @@ fn body_def(index: usize, body: &SceneBody) -> Result<BodyDef, Error> {
     };
     if def.kind == BodyKind::Dynamic {
         if def.shapes.is_empty() {
-            return Err(Error::invalid(at("shapes"), "a dynamic body needs at least one shape, has 0"));
+            return Err(Error::invalid("shapes", "a dynamic body needs at least one shape, has 0"));
         }
         let MassProperties { mass, inertia, .. } = mass_properties(&def);
         for (name, value) in [("mass", mass as f32), ("inertia", inertia as f32)] {
             // The reciprocal is what the solver holds, so it must be a number too.
             if !(value.is_normal() && value.recip().is_normal()) {
                 let message = format!("the {name} of a dynamic body must be positive and finite, is {value}");
-                return Err(Error::invalid(at("shapes"), message));
+                return Err(Error::invalid("shapes", message));
             }
         }
     }
@@ -108,23 +124,20 @@ pub(super) fn mass_properties(body: &BodyDef) -> MassProperties {
     combine(&body.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
 }
 
-fn shape_def(place: &str, shape: &SceneShape) -> Result<ShapeDef, Error> {
-    let at = |name: &str| format!("{place}.{name}");
-    positive(&at("density"), shape.density)?;
-    not_negative(&at("friction"), shape.friction)?;
+/// Errors name places within the shape.
+fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
+    positive("density", shape.density)?;
+    not_negative("friction", shape.friction)?;
     if shape.friction > MAX_FRICTION {
         let message = format!("must be at most {MAX_FRICTION:e}, is {:?}", shape.friction);
-        return Err(Error::invalid(at("friction"), message));
+        return Err(Error::invalid("friction", message));
     }
-    finite(&at("restitution"), shape.restitution)?;
+    finite("restitution", shape.restitution)?;
     if !(0.0..=1.0).contains(&shape.restitution) {
-        return Err(Error::invalid(
-            at("restitution"),
-            format!("must be in [0, 1], is {}", shape.restitution),
-        ));
+        return Err(Error::invalid("restitution", format!("must be in [0, 1], is {}", shape.restitution)));
     }
     Ok(ShapeDef {
-        shape: geometry(place, &shape.geometry)?,
+        shape: geometry(&shape.geometry)?,
         density: shape.density,
         friction: shape.friction,
         restitution: shape.restitution,
@@ -133,24 +146,21 @@ fn shape_def(place: &str, shape: &SceneShape) -> Result<ShapeDef, Error> {
 
 /// The range checks stand in [`Shape`]'s constructors; here only the rounding to
 /// `f32`, which must not make an infinity of a finite number.
-fn geometry(place: &str, geometry: &Geometry) -> Result<Shape, Error> {
-    let at = |name: &str| format!("{place}.{name}");
+fn geometry(geometry: &Geometry) -> Result<Shape, Error> {
     let point = |name: &str, p: [f64; 2]| {
-        finite_pair(&at(name), p)?;
+        finite_pair(name, p)?;
         Ok::<Vec2, Error>(Vec2::new(p[0] as f32, p[1] as f32))
     };
     let number = |name: &str, x: f64| {
-        finite(&at(name), x)?;
+        finite(name, x)?;
         Ok::<f32, Error>(x as f32)
     };
     let shape = match geometry {
-        Geometry::Circle(c) => Shape::circle(
-            &at("circle"),
-            point("circle.center", c.center)?,
-            number("circle.radius", c.radius)?,
-        ),
+        Geometry::Circle(c) => {
+            Shape::circle("circle", point("circle.center", c.center)?, number("circle.radius", c.radius)?)
+        }
         Geometry::Box(b) => Shape::rectangle(
-            &at("box"),
+            "box",
             point("box.half", b.half)?,
             point("box.center", b.center)?,
             number("box.angle", b.angle)?,
@@ -159,17 +169,15 @@ fn geometry(place: &str, geometry: &Geometry) -> Result<Shape, Error> {
         Geometry::Polygon(p) => {
             let points = p.points.iter().enumerate().map(|(i, &v)| point(&format!("polygon.points[{i}]"), v));
             let points = points.collect::<Result<Vec<_>, _>>()?;
-            Shape::polygon(&at("polygon"), &points, number("polygon.radius", p.radius)?)
+            Shape::polygon("polygon", &points, number("polygon.radius", p.radius)?)
         }
         Geometry::Capsule(c) => Shape::capsule(
-            &at("capsule"),
+            "capsule",
             point("capsule.a", c.a)?,
             point("capsule.b", c.b)?,
             number("capsule.radius", c.radius)?,
         ),
-        Geometry::Segment(s) => {
-            Shape::segment(&at("segment"), point("segment.a", s.a)?, point("segment.b", s.b)?)
-        }
+        Geometry::Segment(s) => Shape::segment("segment", point("segment.a", s.a)?, point("segment.b", s.b)?),
     }?;
     Ok(shape)
 }

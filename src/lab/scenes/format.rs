@@ -251,6 +251,15 @@ impl Scene {
     /// a value out of its range ([`Scene::validate`]), with its place.
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
+        // Derived code would take a list of values in the order of the fields.
+        if let Some(at) = text.find(|c: char| !c.is_whitespace())
+            && text[at..].starts_with('[')
+        {
+            let line = text[..at].matches('\n').count() + 1;
+            let column = at - text[..at].rfind('\n').map_or(0, |end| end + 1) + 1;
+            let message = format!("a scene is an object, {{…}}, not a list, at line {line} column {column}");
+            return Err(failed(message));
+        }
         let scene: Scene = serde_json::from_str(text).map_err(|e| failed(place_at(text, &e)))?;
         scene.validate().map_err(|e| failed(e.to_string()))?;
         Ok(scene)

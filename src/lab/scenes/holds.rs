@@ -15,7 +15,7 @@ use glam::DVec2;
 use std::f64::consts::TAU;
 
 /// Why a run does not hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mark {
     /// A body left those it stood on.
@@ -41,7 +41,7 @@ impl Mark {
 }
 
 /// The first demand that a run did not meet.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Broken {
     /// The word for it.
     pub mark: Mark,

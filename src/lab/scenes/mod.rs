@@ -33,7 +33,10 @@ mod truth;
 mod tumbler;
 mod washer;
 
-pub use check::{MAX_BODIES, MAX_FRICTION};
+/// JSON schema of scene files (2020-12).
+pub const SCHEMA: &str = include_str!("scene.schema.json");
+
+pub use check::{MAX_BODIES, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };

@@ -5,18 +5,20 @@
 
 use super::format::Scene;
 use crate::engine::params::LINEAR_SLOP;
+use crate::lab::interned::{self, Name};
 
 /// The most that an error may be.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerance {
     /// In the unit of the error.
     pub value: f64,
     /// Why this much.
-    pub reason: &'static str,
+    #[serde(deserialize_with = "interned::read")]
+    pub reason: Name,
 }
 
 /// The tolerances of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerances {
     /// Deepest penetration (m).
     pub penetration: Tolerance,

@@ -49,9 +49,21 @@ impl<'a> Answer<'a> {
         self.good.first().copied()
     }
 
-    /// The next one.
+    /// The cheapest of the other solvers.
     pub fn runner_up(&self) -> Option<&'a Record> {
-        self.good.get(1).copied()
+        let best = self.best()?;
+        self.good.iter().copied().find(|r| r.solver != best.solver)
+    }
+
+    /// The other solvers that are as cheap as far as can be told, the fastest first.
+    pub fn tied_solvers(&self) -> Vec<&'static str> {
+        let mut names: Vec<&'static str> = self.best().iter().map(|best| best.solver).collect();
+        for record in self.tied() {
+            if !names.contains(&record.solver) {
+                names.push(record.solver);
+            }
+        }
+        names.into_iter().skip(1).collect()
     }
 
     /// Those that are as cheap as far as can be told, without the cheapest itself.
@@ -123,8 +135,7 @@ mod tests {
         ];
         let names = |records: &[Record]| {
             let answer = Answer::of(records).unwrap();
-            let tied: Vec<&str> = answer.tied().map(|r| r.solver).collect();
-            (answer.best().map(|r| r.solver), tied)
+            (answer.best().map(|r| r.solver), answer.tied_solvers())
         };
         for _ in 0..4 {
             records.rotate_left(1);
@@ -163,7 +174,9 @@ mod tests {
         ];
         let answer = Answer::of(&records).unwrap();
         let of = |r: Option<&Record>| r.map(|r| (r.lanes, r.budget.substeps));
-        assert_eq!((of(answer.best()), of(answer.runner_up())), (Some((8, 4)), Some((8, 8))));
+        assert_eq!((of(answer.best()), of(answer.good.get(1).copied())), (Some((8, 4)), Some((8, 8))));
+        // Nothing else of another solver is good enough.
+        assert!(answer.runner_up().is_none());
         assert_eq!(of(answer.nearest), Some((8, 1)));
         let none = Answer::of(&records[1..2]).unwrap();
         assert!(none.best().is_none() && none.nearest.is_none());

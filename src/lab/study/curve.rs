@@ -25,9 +25,9 @@ impl ErrorAxis {
     /// For headings.
     pub fn name(self) -> &'static str {
         match self {
-            ErrorAxis::Penetration => "deepest penetration",
+            ErrorAxis::Penetration => "greatest penetration",
             ErrorAxis::Law => "contact-law residual",
-            ErrorAxis::Truth => "distance to truth",
+            ErrorAxis::Truth => "distance to reference value",
         }
     }
 

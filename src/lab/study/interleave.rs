@@ -32,7 +32,7 @@ const LEAST_BLOCKS: u32 = 12;
 const LEAST_BLOCK: u32 = 3;
 
 /// Times and counts of one setting.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Sample {
     /// Median over the blocks (ns per step); a block's time is the median of its repeats.
     pub median_ns: f64,
@@ -49,15 +49,32 @@ pub struct Sample {
     pub load: Load,
     /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
     /// the setting took no part.
-    #[serde(skip)]
+    #[serde(with = "blocks")]
     pub blocks_ns: Vec<Vec<f64>>,
     /// Hash of the final state.
     #[serde(skip)]
     pub hash: u64,
 }
 
+/// Blocks in files: tenths of nanoseconds, and what is not a number as null.
+mod blocks {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(blocks: &[Vec<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+        let short = |ns: &f64| ns.is_finite().then(|| (10.0 * ns).round() / 10.0);
+        let passes: Vec<Vec<_>> = blocks.iter().map(|pass| pass.iter().map(short).collect()).collect();
+        passes.serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
+        let passes = Vec::<Vec<Option<f64>>>::deserialize(deserializer)?;
+        let number = |ns: Option<f64>| ns.unwrap_or(f64::NAN);
+        Ok(passes.into_iter().map(|pass| pass.into_iter().map(number).collect()).collect())
+    }
+}
+
 /// What a step has to do, averaged over a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Load {
     /// Contacts with at least one point.
     pub contacts: f64,

@@ -5,7 +5,6 @@
 //! settings of a scene, alone on the machine; those that may be the cheapest are timed again. All
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
-pub mod ablation;
 pub mod answer;
 pub mod budget;
 pub mod compare;
@@ -13,12 +12,15 @@ pub mod curve;
 pub mod interleave;
 pub mod pareto;
 pub mod profile;
+pub mod ranking;
 pub mod record;
+pub mod savings;
 pub mod slices;
+pub mod telling;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
-use crate::engine::solvers::{VARIANTS, Variant};
+use crate::engine::solvers::{Variant, find};
 use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
@@ -48,12 +50,22 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "circle_pile:500",
 ];
 
+/// Solvers that are compared where none are named: one or two of every family. All others of
+/// [`VARIANTS`](crate::engine::solvers::VARIANTS) run when they are named, or with `all`.
+pub const DEFAULT_SOLVERS: [&str; 6] =
+    ["projection", "pgs", "pgs_ngs_block", "jacobi", "tgs_ngs", "soft_step"];
+
+/// The rows of [`DEFAULT_SOLVERS`].
+pub fn default_solvers() -> Vec<&'static Variant> {
+    DEFAULT_SOLVERS.iter().filter_map(|name| find(name).ok()).collect()
+}
+
 /// What a study tries.
 #[derive(Clone, Debug)]
 pub struct StudyPlan {
     /// Names of the catalogue, with sizes, or `.json` files.
     pub scenes: Vec<String>,
-    /// Rows of [`VARIANTS`].
+    /// Rows of [`VARIANTS`](crate::engine::solvers::VARIANTS).
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of coloured runs.
     pub widths: Vec<LaneWidth>,
@@ -79,7 +91,7 @@ impl Default for StudyPlan {
     fn default() -> Self {
         StudyPlan {
             scenes: DEFAULT_SCENES.map(String::from).to_vec(),
-            solvers: VARIANTS.to_vec(),
+            solvers: default_solvers(),
             widths: widths(native_width()),
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
@@ -214,10 +226,15 @@ pub struct Outcome {
     pub hash: u64,
 }
 
-/// Runs the plan; one record per scene, solver, budget, order and width, in that order.
+/// Runs the plan; one record per scene, solver, budget, order and width, in that order. `finished` is given the
+/// records of a scene as soon as they are complete.
 ///
 /// Errors: what [`StudyPlan::check`] refuses. A run that diverges is a record, not an error.
-pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Record>, Error> {
+pub fn run(
+    plan: &StudyPlan,
+    progress: &(dyn Fn(Progress) + Sync),
+    finished: &dyn Fn(&[Record]),
+) -> Result<Vec<Record>, Error> {
     plan.check()?;
     let scenes: Vec<(Scene, Tolerances)> = plan
         .scenes
@@ -240,11 +257,13 @@ pub fn run(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec
     for (i, (scene, tolerances)) in scenes.iter().enumerate() {
         let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene == i);
         let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
-        records.extend(timed_records(plan, scene, *tolerances, &rows, &tell)?);
-    }
-    mark_fronts(&mut records);
-    if plan.steps.is_some() {
-        leave_out_unseen_truths(&mut records);
+        let mut own = timed_records(plan, scene, *tolerances, &rows, &tell)?;
+        mark_fronts(&mut own);
+        if plan.steps.is_some() {
+            leave_out_unseen_truths(&mut own);
+        }
+        finished(&own);
+        records.extend(own);
     }
     Ok(records)
 }
@@ -441,11 +460,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_solver_of_the_default_list_exists() {
+        assert_eq!(default_solvers().len(), DEFAULT_SOLVERS.len());
+        assert!(DEFAULT_SOLVERS.contains(&crate::engine::solvers::DEFAULT));
+    }
+
+    #[test]
     fn wide_lanes_run_by_themselves_where_they_are_native() {
         assert_eq!(widths(LaneWidth::W16), LaneWidth::ALL);
         for native in [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8] {
             assert_eq!(widths(native), [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8]);
         }
-        assert_eq!(Settings::new(VARIANTS[0]).width, native_width());
+        assert_eq!(Settings::new(default_solvers()[0]).width, native_width());
     }
 }

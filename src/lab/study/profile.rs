@@ -17,6 +17,24 @@ use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
 use super::interleave::Sample;
 
+/// For each solver the least time of its `allowed` records of one scene, in times that of the fastest
+/// solver; a time that ties with the least is 1. None where no record is allowed.
+pub fn times_of_fastest(
+    scene: &[Record],
+    solvers: &[&str],
+    allowed: impl Fn(&Record) -> bool,
+) -> Vec<Option<f64>> {
+    let less = |a: &&Sample, b: &&Sample| a.median_ns.total_cmp(&b.median_ns);
+    let own = |solver: &&str| {
+        let allowed = scene.iter().filter(|r| r.solver == *solver && allowed(r));
+        allowed.filter_map(|r| r.lap.as_ref()).min_by(less)
+    };
+    let times: Vec<Option<&Sample>> = solvers.iter().map(own).collect();
+    let Some(least) = times.iter().flatten().copied().min_by(less) else { return vec![None; solvers.len()] };
+    let ratio = |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.median_ns / least.median_ns };
+    times.into_iter().map(|time| time.map(ratio)).collect()
+}
+
 /// One axis, all scenes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
@@ -41,19 +59,12 @@ impl Profile {
             // A truth that nobody came to see is still a truth.
             let known = axis != ErrorAxis::Truth || group.iter().any(|r| r.truth.is_some());
             scenes += known as usize;
-            let time = |solver: &str| {
-                let allowed = |r: &Record| r.holds() && r.in_tolerance(axis).is_some_and(|e| e <= 1.0);
-                let within = group.iter().filter(|r| r.solver == solver && allowed(r));
-                within.filter_map(|r| r.lap.as_ref()).min_by(|a, b| a.median_ns.total_cmp(&b.median_ns))
-            };
-            let times: Vec<_> = ratios.iter().map(|(solver, _)| time(solver)).collect();
-            let least = times.iter().flatten().copied().min_by(|a, b| a.median_ns.total_cmp(&b.median_ns));
-            let Some(least) = least else { continue };
-            solvable += 1;
-            for ((_, ratios), time) in ratios.iter_mut().zip(times) {
-                let ratio =
-                    |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.median_ns / least.median_ns };
-                ratios.extend(time.map(ratio));
+            let solvers: Vec<&str> = ratios.iter().map(|(solver, _)| *solver).collect();
+            let within = |r: &Record| r.holds() && r.in_tolerance(axis).is_some_and(|e| e <= 1.0);
+            let found = times_of_fastest(group, &solvers, within);
+            solvable += found.iter().any(Option::is_some) as usize;
+            for ((_, ratios), ratio) in ratios.iter_mut().zip(found) {
+                ratios.extend(ratio);
             }
         }
         ratios.iter_mut().for_each(|(_, r)| r.sort_by(f64::total_cmp));

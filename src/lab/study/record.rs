@@ -5,13 +5,14 @@ use super::interleave::Sample;
 use super::pareto::{self, Point};
 use crate::engine::params::Budget;
 use crate::engine::world::{Divergence, Order};
+use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::Truth;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::Tolerances;
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Record {
     /// Name with size.
     pub scene: String,
@@ -20,7 +21,8 @@ pub struct Record {
     /// Step (s).
     pub dt: f64,
     /// Name of the solver.
-    pub solver: &'static str,
+    #[serde(deserialize_with = "interned::read")]
+    pub solver: Name,
     /// Constraint order.
     pub order: Order,
     /// Lanes per instruction.
@@ -82,12 +84,14 @@ impl Record {
 }
 
 /// How far a run was from a known truth.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TruthError {
     /// What is known.
-    pub quantity: &'static str,
+    #[serde(deserialize_with = "interned::read")]
+    pub quantity: Name,
     /// Of both numbers.
-    pub unit: &'static str,
+    #[serde(deserialize_with = "interned::read")]
+    pub unit: Name,
     /// The truth.
     pub expected: f64,
     /// Distance to it; none where the run never came to it.
@@ -103,7 +107,7 @@ impl TruthError {
 }
 
 /// Membership in the fronts of time against three errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Fronts {
     /// Against the deepest penetration.
     pub penetration: bool,
@@ -114,7 +118,7 @@ pub struct Fronts {
 }
 
 /// Where and when a run left all bounds.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Failure {
     /// Step, from 1.
     pub step: u64,

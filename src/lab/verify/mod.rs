@@ -13,7 +13,8 @@
 //!
 //! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], soft contacts in
 //! substeps) is required to pass, and which promise of its mathematics that rests on, or which it
-//! lacks. The exit code of `simpulse verify` asks for exactly those.
+//! lacks. The exit code of `simpulse verify` asks for exactly those. A required case that fails stays
+//! required, and a row whose bound or mark was relaxed after a failure says so ([`Case::relaxed`]).
 //!
 //! | promise | because |
 //! |---|---|
@@ -106,6 +107,8 @@ pub struct Case {
     pub tolerance: &'static str,
     /// Whether the default solver must pass, and why.
     pub required: Required,
+    /// How its bound or its mark was relaxed after a failure, if it ever was.
+    pub relaxed: Option<&'static str>,
     /// The solvers whose own law the truth is.
     pub law_of: LawOf,
     /// Runs it.

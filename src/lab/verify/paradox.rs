@@ -9,14 +9,14 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 /// Angle of a card from the vertical (rad).
 const LEAN: f64 = 25.0 * std::f64::consts::PI / 180.0;
 
-/// B10. Least friction at the feet of two leaning cards, by the linear program of statics. Moments
+/// B10. Least friction at the feet of two leaning cards, by statics alone. Moments
 /// about the top of one card: tan φ (W/2 + P)/(W + P) for a load P on its top; here the worst of P = 0,
 /// W and 10 W, relative.
 pub(super) fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
     let mut worst = 0.0;
     for extra in [0.0, 1.0, 10.0] {
         let truth = LEAN.tan() * (0.5 + extra) / (1.0 + extra);
-        // Eight digits, which is what the linear program is good for, need more than one bisection.
+        // Thirty bisections: nine digits.
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..30 {
             let middle = 0.5 * (low + high);

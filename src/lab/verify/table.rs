@@ -27,11 +27,16 @@ const fn case(
     measure: Measure,
     required: Required,
 ) -> Case {
-    Case { id, summary, unit, tolerance, required, law_of: LawOf::Everyone, measure }
+    Case { id, summary, unit, tolerance, required, relaxed: None, law_of: LawOf::Everyone, measure }
 }
 
 const fn swept_once(case: Case) -> Case {
     Case { law_of: LawOf::SpringsSweptOnce, ..case }
+}
+
+/// A case whose bound or required mark was relaxed after it had failed, and how.
+const fn relaxed(how: &'static str, case: Case) -> Case {
+    Case { relaxed: Some(how), ..case }
 }
 
 const fn soft(case: Case) -> Case {
@@ -54,9 +59,7 @@ pub static CASES: &[Case] = &[
         "m",
         "list: 1e-4 m",
         sliding::stick,
-        No(
-            "sweeps of a cold first substep turn the box before they stop it: up to 0.36 g h sin θ is left, see the promises",
-        ),
+        Yes("friction rows are rigid and warm started"),
     ),
     case(
         "A1.creep",
@@ -72,9 +75,7 @@ pub static CASES: &[Case] = &[
         "m",
         "list: 1 % of 0.297 m",
         sliding::slip,
-        No(
-            "sweeps of a cold first substep turn the box before they stop it: up to 0.36 g h sin θ is left, see the promises",
-        ),
+        Yes("Coulomb's law in the last sweep"),
     ),
     case(
         "A1.threshold",
@@ -116,13 +117,16 @@ pub static CASES: &[Case] = &[
         sliding::slipping_disc,
         Yes("Coulomb's law in the last sweep"),
     ),
-    case(
-        "A3.contact",
-        "speed of the rolling disc's contact point",
-        "m/s",
-        "list: 1e-4 m/s",
-        sliding::slip_speed,
-        No("soft contacts sag by δ and act half of that above the surface: δ v/(2 r) = 2.3e-4 m/s"),
+    relaxed(
+        "required until it failed; the list's bound of 1e-4 m/s is kept",
+        case(
+            "A3.contact",
+            "speed of the rolling disc's contact point",
+            "m/s",
+            "list: 1e-4 m/s",
+            sliding::slip_speed,
+            No("soft contacts sag by δ and act half of that above the surface: δ v/(2 r) = 2.3e-4 m/s"),
+        ),
     ),
     case(
         "A3.threshold",
@@ -152,7 +156,7 @@ pub static CASES: &[Case] = &[
         "A5.bounce",
         "apexes of bounces with e = 1/2 from 10 m, worst",
         "m",
-        "one step's travel at impact, v dt",
+        "1e-5 of the height of 10 m: exact in f32, as A0.fall",
         impacts::bounce,
         Yes("the rebound keeps the discrete energy of flight"),
     ),
@@ -318,11 +322,11 @@ pub static CASES: &[Case] = &[
     ),
     case(
         "B5.drift",
-        "greatest movement in a stack of ten boxes, 15 s to 20 s",
+        "greatest movement in a stack of twenty boxes, 15 s to 20 s",
         "m",
         "list: 1e-3 m",
         stacks::drift,
-        Yes("stands below 14 boxes (Greenhill), and cos²(π/20) per sweep leaves nothing after 20 s"),
+        Yes("the list asks for it; what it asks for is more than 30 Hz contacts hold: see the promises"),
     ),
     case(
         "B5.jitter",
@@ -330,7 +334,7 @@ pub static CASES: &[Case] = &[
         "m/s",
         "list: 1e-4 m/s",
         stacks::jitter,
-        Yes("stands below 14 boxes (Greenhill), and cos²(π/20) per sweep leaves nothing after 20 s"),
+        Yes("the list asks for it; what it asks for is more than 30 Hz contacts hold: see the promises"),
     ),
     case(
         "B5.height",
@@ -380,21 +384,24 @@ pub static CASES: &[Case] = &[
         stacks::release_speed,
         No("the sag of 5.7 cm springs back; one relaxing sweep does not stop two discs"),
     ),
-    case(
-        "B9.gap",
-        "gap that opens then",
-        "m",
-        "list: the slop",
-        stacks::release_gap,
-        No(
-            "springs do not overshoot one by one, but one relaxing sweep does not stop two discs: see B9.speed",
+    relaxed(
+        "required until it failed; the list's bound is kept",
+        case(
+            "B9.gap",
+            "gap that opens then",
+            "m",
+            "list: the slop",
+            stacks::release_gap,
+            No(
+                "springs do not overshoot one by one, but one relaxing sweep does not stop two discs: see B9.speed",
+            ),
         ),
     ),
     case(
         "B10.statics",
-        "least friction under leaning cards by linear programming, relative",
+        "least friction under leaning cards by statics, relative",
         "1",
-        "1e-6: digits of the linear program",
+        "1e-6: six digits",
         paradox::cards_in_statics,
         Yes("statics, no solver involved"),
     ),
@@ -430,14 +437,17 @@ pub static CASES: &[Case] = &[
         sliding::hop,
         Yes("normal and friction rows are separate: no dilatation"),
     ),
-    case(
-        "B14.large",
-        "largest step at which slide and roll down an incline are right to 1 %",
-        "s",
-        "1/15 s is to hold",
-        motion::large_steps,
-        No(
-            "the cold first substep of A1.slip leaves up to 0.36 g h sin θ: at 1/60 s that may be 2.4 % of the slide",
+    relaxed(
+        "required until it failed; the bound is kept",
+        case(
+            "B14.large",
+            "largest step at which slide and roll down an incline are right to 1 %",
+            "s",
+            "1/15 s is to hold",
+            motion::large_steps,
+            No(
+                "the cold first substep of A1.slip leaves up to 0.36 g h sin θ: at 1/60 s that may be 2.4 % of the slide",
+            ),
         ),
     ),
     case(
@@ -468,7 +478,7 @@ pub static CASES: &[Case] = &[
         "B15.kilometre",
         "distance of ten boxes at 1 km to their twins at the origin, all steps",
         "m",
-        "one f32 spacing at 10 m at one corner of every contact: 55 of them at the top",
+        "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
         far::kilometre,
         Yes("contacts see differences of positions, taken before they are rounded"),
     ),
@@ -476,7 +486,7 @@ pub static CASES: &[Case] = &[
         "B15.far",
         "greatest distance from the origin with the same trajectory",
         "m",
-        "1e5 m is to hold, with 55 f32 spacings as at 1 km",
+        "1e5 m is to hold, with the tolerance of B15.kilometre",
         far::distance,
         Yes("contacts see differences of positions, taken before they are rounded"),
     ),
@@ -504,21 +514,29 @@ pub static CASES: &[Case] = &[
         overlap::confined_share,
         No("how it is shared follows from no promise: the problem has no solution"),
     ),
-    case(
-        "B21.three",
-        "speed of three boxes on an incline of 0.05 rad, µ 10 % above tan θ, 5 min to 10 min",
-        "m/s",
-        "list: 1e-5 m/s",
-        stacks::creep_of_three,
-        Yes("friction rows are rigid and warm started"),
+    relaxed(
+        "ten boxes were required until they failed; three are since, and B21.ten shows the ten",
+        case(
+            "B21.three",
+            "speed of three boxes on an incline of 0.05 rad, µ 10 % above tan θ, 5 min to 10 min",
+            "m/s",
+            "list: 1e-5 m/s",
+            stacks::creep_of_three,
+            Yes("friction rows are rigid and warm started"),
+        ),
     ),
-    case(
-        "B21.ten",
-        "the same of ten boxes",
-        "m/s",
-        "list: 1e-5 m/s",
-        stacks::creep_of_ten,
-        No("soft contacts turn the upper boxes by 0.4 θ, more than the tenth of θ that friction has left"),
+    relaxed(
+        "required until it failed; the list's bound is kept",
+        case(
+            "B21.ten",
+            "the same of ten boxes",
+            "m/s",
+            "list: 1e-5 m/s",
+            stacks::creep_of_ten,
+            No(
+                "soft contacts turn the upper boxes by 0.4 θ, more than the tenth of θ that friction has left",
+            ),
+        ),
     ),
     case(
         "B22.order",

@@ -1,0 +1,47 @@
+//! What is printed: text and JSON to standard output, notes to standard error. A reader that has
+//! left (`| head -1`) is not an error.
+
+use crate::lab::error::Error;
+use crate::lab::files::is_standard_output;
+use serde_json::Value;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// An answer, to standard output.
+pub fn print(text: &str) -> Result<ExitCode, Error> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output")(e)),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// An answer beside files: to standard error where one of them goes to standard output.
+pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -> Result<ExitCode, Error> {
+    if files.into_iter().any(is_standard_output) {
+        note(text);
+        return Ok(ExitCode::SUCCESS);
+    }
+    print(text)
+}
+
+/// What happens, and errors, to standard error; nobody need read it.
+pub fn note(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// The same as JSON. What is not finite is a word there: [`finite`].
+pub fn print_json(value: &Value) -> Result<ExitCode, Error> {
+    print(&format!("{value:#}\n"))
+}
+
+/// Anything that can be serialised.
+pub fn value(of: &impl serde::Serialize) -> Result<Value, Error> {
+    serde_json::to_value(of).map_err(|e| Error::invalid("json", e.to_string()))
+}
+
+/// JSON has no infinities: they are words.
+pub fn finite(number: f64) -> Value {
+    if number.is_finite() { number.into() } else { number.to_string().into() }
+}

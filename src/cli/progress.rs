@@ -1,0 +1,29 @@
+//! Progress of long work, on standard error, where that is a terminal.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar that says what runs; it goes when it is dropped.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// Nothing is drawn before the first call of [`Bar::show`], or where nobody looks.
+    pub fn new() -> Self {
+        let bar = ProgressBar::new(1);
+        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Bar(bar)
+    }
+
+    /// So much is done, and this is under way.
+    pub fn show(&self, done: usize, total: usize, what: impl Into<String>) {
+        self.0.set_length(total as u64);
+        self.0.set_position(done as u64);
+        self.0.set_message(what.into());
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

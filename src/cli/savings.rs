@@ -1,0 +1,72 @@
+//! `simpulse savings`: what kernels gain by leaving out what a scene does not have.
+
+use super::output::{print, print_json, value};
+use super::progress::Bar;
+use super::values::{Lanes, solver};
+use crate::engine::solvers::{DEFAULT, Variant};
+use crate::engine::world::Order;
+use crate::lab::error::Error;
+use crate::lab::report::environment::Environment;
+use crate::lab::report::savings::savings_table;
+use crate::lab::study::StudyPlan;
+use crate::lab::study::savings::savings;
+use clap::Args;
+use serde_json::json;
+use std::process::ExitCode;
+
+/// Measure what kernels save by leaving out features that a scene does not have
+///
+/// Kernels are specialised at compile time by what a scene can need: friction, a second contact point,
+/// rotation, restitution. Here each feature that a scene does not have is forced on, alone and all
+/// together, and timed in turn with the kernel that the scene gets. Scenes with fewer than 100
+/// contacts are left out: there the start of a sweep costs more than the sweep.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  simpulse savings
+  simpulse savings --scenes circle_pile:2000,pyramid:60 --solver pgs --lanes 8")]
+pub struct SavingsArgs {
+    /// Scenes, with a size after a colon where they have one, or .json files
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "SCENE,…",
+        default_value = "card_house,pyramid:40,circle_pile:500"
+    )]
+    pub scenes: Vec<String>,
+    /// Solver
+    #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
+    pub solver: &'static Variant,
+    /// Lanes
+    #[command(flatten)]
+    pub lanes: Lanes,
+    /// Timing runs of each setting
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub repeats: u32,
+    /// Random seed: of scenes that have one, and of the order of timing runs
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &SavingsArgs) -> Result<ExitCode, Error> {
+    let plan = StudyPlan {
+        scenes: args.scenes.clone(),
+        solvers: vec![args.solver],
+        widths: vec![args.lanes.or_native()],
+        orders: vec![Order::Colored],
+        repeats: args.repeats,
+        seed: args.seed,
+        ..StudyPlan::default()
+    };
+    let bar = Bar::new();
+    let found = savings(&plan, &|p| bar.show(p.done, p.total, p.what))?;
+    drop(bar);
+    match args.json {
+        true => print_json(&json!({ "environment": Environment::current(), "savings": value(&found)? })),
+        false => print(&savings_table(&found)),
+    }
+}

@@ -1,0 +1,223 @@
+//! What options may be: one meaning per option in every command, every list of values in the help
+//! and in the message about a wrong one.
+
+use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::params::{Budget, Parameters};
+use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
+use crate::engine::world::Order;
+use crate::lab::error::Error;
+use crate::lab::overrides::{self, Override};
+use crate::lab::scenes::CATALOG;
+use crate::lab::study::{DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+/// A member of `--solvers`.
+#[derive(Clone, Debug)]
+pub enum Choice {
+    /// `all`
+    All,
+    /// A name.
+    One(&'static Variant),
+}
+
+/// `--solvers`
+#[derive(Args, Clone, Debug, Default)]
+pub struct Solvers {
+    /// Solvers to run
+    #[arg(long, value_delimiter = ',', value_name = "SOLVER,…", value_parser = choice(), help = solvers_help())]
+    pub solvers: Vec<Choice>,
+}
+
+fn solvers_help() -> String {
+    format!("Solvers, or `all` of them [default: {}]", DEFAULT_SOLVERS.join(","))
+}
+
+impl Solvers {
+    /// Each once, in the order given; the default list where none are given.
+    pub fn chosen(&self) -> Vec<&'static Variant> {
+        if self.solvers.is_empty() {
+            return default_solvers();
+        }
+        let mut chosen: Vec<&'static Variant> = Vec::new();
+        for choice in &self.solvers {
+            let more = match choice {
+                Choice::All => VARIANTS.to_vec(),
+                Choice::One(variant) => vec![*variant],
+            };
+            for variant in more {
+                if chosen.iter().all(|v| v.name != variant.name) {
+                    chosen.push(variant);
+                }
+            }
+        }
+        chosen
+    }
+}
+
+/// A line that names the solvers of the crate that are not in `ran`; none if all are.
+pub fn left_out(ran: &[&'static Variant]) -> String {
+    let is_missing = |v: &&&Variant| ran.iter().all(|r| r.name != v.name);
+    let names: Vec<&str> = VARIANTS.iter().filter(is_missing).map(|v| v.name).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        names => format!("left out (--solvers all runs every solver): {}\n", names.join(", ")),
+    }
+}
+
+/// Help for one scene.
+pub fn scene_help() -> String {
+    format!("Scene, with a size after a colon where it has one, or a .json file: {}", scene_names())
+}
+
+/// Help for several scenes.
+pub fn scenes_help() -> String {
+    let default = DEFAULT_SCENES.join(",");
+    let names = scene_names();
+    format!("Scenes, with a size after a colon, or .json files [default: {default}] [scenes: {names}]")
+}
+
+fn scene_names() -> String {
+    CATALOG.iter().map(|e| e.name).collect::<Vec<_>>().join(", ")
+}
+
+fn described() -> impl Iterator<Item = PossibleValue> {
+    VARIANTS.iter().map(|v| PossibleValue::new(v.name))
+}
+
+fn choice() -> impl TypedValueParser<Value = Choice> {
+    let all = std::iter::once(PossibleValue::new("all"));
+    PossibleValuesParser::new(described().chain(all)).try_map(|name| match name.as_str() {
+        "all" => Ok(Choice::All),
+        name => find(name).map(Choice::One),
+    })
+}
+
+/// The parser of `--solver`.
+pub fn solver() -> impl TypedValueParser<Value = &'static Variant> {
+    PossibleValuesParser::new(described()).try_map(|name| find(&name))
+}
+
+/// The parser of `--lanes`.
+pub fn lanes() -> impl TypedValueParser<Value = LaneWidth> {
+    let names = LaneWidth::ALL.map(|w| PossibleValue::new(w.lanes().to_string()));
+    PossibleValuesParser::new(names).try_map(|text| {
+        let width = text.parse().ok().and_then(LaneWidth::from_lanes);
+        width.ok_or_else(|| Error::invalid("lanes", format!("{text} is none of 1, 4, 8, 16")))
+    })
+}
+
+/// The parser of constraint orders.
+pub fn order() -> impl TypedValueParser<Value = Order> {
+    let natural = PossibleValue::new("natural");
+    let colored = PossibleValue::new("colored").alias("coloured");
+    PossibleValuesParser::new([natural, colored]).map(|name| match name.as_str() {
+        "natural" => Order::Natural,
+        _ => Order::Colored,
+    })
+}
+
+/// Each width once, from the narrowest; `own` where none are given.
+pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
+    if given.is_empty() {
+        return own;
+    }
+    let mut widths = given.to_vec();
+    widths.sort();
+    widths.dedup();
+    widths
+}
+
+/// The solver, its budget and its parameters, for commands that run one setting.
+#[derive(Args, Clone, Debug)]
+pub struct SettingArgs {
+    /// Solver
+    #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
+    pub solver: &'static Variant,
+    /// Substeps [default: the solver's]
+    #[arg(long, value_name = "N")]
+    pub substeps: Option<u32>,
+    /// Velocity sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N")]
+    pub velocity_iterations: Option<u32>,
+    /// Relaxation sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N")]
+    pub relax_iterations: Option<u32>,
+    /// Position sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N")]
+    pub position_iterations: Option<u32>,
+    /// Parameters of the solver, as `contact_hertz=60` (`simpulse solvers` lists them)
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
+    pub set: Vec<Override>,
+}
+
+impl SettingArgs {
+    /// The default solver as it is.
+    pub fn standard() -> Result<Self, Error> {
+        let (none, solver) = (None, find(DEFAULT)?);
+        Ok(SettingArgs {
+            solver,
+            substeps: none,
+            velocity_iterations: none,
+            relax_iterations: none,
+            position_iterations: none,
+            set: Vec::new(),
+        })
+    }
+
+    /// The budget. Errors: one that the solver cannot work with.
+    pub fn budget(&self) -> Result<Budget, Error> {
+        let own = self.solver.budget;
+        let chosen = Budget {
+            substeps: self.substeps.unwrap_or(own.substeps),
+            velocity_iterations: self.velocity_iterations.unwrap_or(own.velocity_iterations),
+            relax_iterations: self.relax_iterations.unwrap_or(own.relax_iterations),
+            position_iterations: self.position_iterations.unwrap_or(own.position_iterations),
+        };
+        budget::check(&chosen, self.solver)?;
+        Ok(chosen)
+    }
+
+    /// The solver's parameters. Errors: one that it does not have, a value out of its range.
+    pub fn parameters(&self) -> Result<Parameters, Error> {
+        overrides::check(&[self.solver], &self.set)?;
+        overrides::values(self.solver, &self.set)
+    }
+}
+
+/// `--lanes` of commands that run at one width.
+#[derive(Args, Clone, Debug)]
+pub struct Lanes {
+    /// Lanes per instruction [default: the widest that this build has instructions for; wider ones
+    /// are emulated]
+    #[arg(long, value_name = "N", value_parser = lanes())]
+    pub lanes: Option<LaneWidth>,
+}
+
+impl Lanes {
+    /// The width given, or the widest native one.
+    pub fn or_native(&self) -> LaneWidth {
+        self.lanes.unwrap_or(native_width())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_hold_each_once_and_all_means_all() {
+        let names = |list: &[&str]| -> Vec<&str> {
+            let choice = |&name: &&str| find(name).map_or(Choice::All, Choice::One);
+            let solvers = Solvers { solvers: list.iter().map(choice).collect() };
+            solvers.chosen().iter().map(|v| v.name).collect()
+        };
+        assert_eq!(names(&["soft_step", "pgs", "soft_step"]), ["soft_step", "pgs"]);
+        assert_eq!(names(&["pgs", "all"]).len(), VARIANTS.len());
+        assert_eq!(names(&[]), DEFAULT_SOLVERS);
+        assert_eq!(left_out(VARIANTS.as_slice()), "");
+        assert!(left_out(&VARIANTS[1..]).ends_with(&format!(": {}\n", VARIANTS[0].name)));
+        let (w1, w8) = (LaneWidth::W1, LaneWidth::W8);
+        assert_eq!(widths(&[w8, w1, w8], vec![]), [w1, w8]);
+    }
+}

@@ -1,0 +1,61 @@
+//! Sixteen boxes that are tested at once.
+
+use crate::engine::lanes::Block;
+use wide::f32x16;
+
+/// Children of a node.
+pub const FAN: usize = 1 << BITS_OF_FAN;
+/// Its logarithm.
+pub const BITS_OF_FAN: usize = 4;
+
+/// Sixteen boxes; lanes without one hold NaN, which meets nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// min x, min y, max x, max y.
+    pub sides: [Block; 4],
+}
+
+impl Node {
+    /// No box.
+    pub const EMPTY: Node = Node { sides: [Block([f32::NAN; FAN]); 4] };
+
+    /// Sets a lane; a box with a NaN is none.
+    #[inline]
+    pub fn set(&mut self, lane: usize, sides: [f32; 4]) {
+        let sides = if sides.iter().any(|side| side.is_nan()) { [f32::NAN; 4] } else { sides };
+        for (side, value) in self.sides.iter_mut().zip(sides) {
+            side.0[lane] = value;
+        }
+    }
+
+    /// The lanes whose boxes share a point with the query's.
+    #[inline]
+    pub fn hits(&self, query: &[f32x16; 4]) -> u32 {
+        let [min_x, min_y, max_x, max_y] = self.sides.map(|side| f32x16::new(side.0));
+        let x = min_x.simd_le(query[2]) & query[0].simd_le(max_x);
+        let y = min_y.simd_le(query[3]) & query[1].simd_le(max_y);
+        (x & y).to_bitmask() & 0xFFFF
+    }
+
+    /// The box of a lane in all lanes.
+    #[inline]
+    pub fn query(&self, lane: usize) -> [f32x16; 4] {
+        [0, 1, 2, 3].map(|side: usize| f32x16::splat(self.sides[side].0[lane]))
+    }
+
+    /// Bounds of all lanes; the minimum of a number and a NaN is the number.
+    #[inline]
+    pub fn bounds(&self) -> [f32; 4] {
+        let fold = |side: &Block, pick: fn(f32, f32) -> f32| {
+            let mut v = side.0;
+            for half in [8, 4, 2, 1] {
+                for i in 0..half {
+                    v[i] = pick(v[i], v[i + half]);
+                }
+            }
+            v[0]
+        };
+        let [a, b, c, d] = &self.sides;
+        [fold(a, f32::min), fold(b, f32::min), fold(c, f32::max), fold(d, f32::max)]
+    }
+}

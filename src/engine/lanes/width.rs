@@ -1,0 +1,64 @@
+//! How many lanes there are, and which of them this build has instructions for.
+
+/// How many contacts one instruction processes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LaneWidth {
+    /// Scalar code.
+    W1,
+    /// 128-bit lanes.
+    W4,
+    /// 256-bit lanes.
+    W8,
+    /// 512-bit lanes.
+    W16,
+}
+
+impl LaneWidth {
+    /// Every width, narrowest first.
+    pub const ALL: [LaneWidth; 4] = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8, LaneWidth::W16];
+
+    /// The number of lanes.
+    pub const fn lanes(self) -> usize {
+        match self {
+            LaneWidth::W1 => 1,
+            LaneWidth::W4 => 4,
+            LaneWidth::W8 => 8,
+            LaneWidth::W16 => 16,
+        }
+    }
+
+    /// The width with that many lanes, if there is one.
+    pub fn from_lanes(lanes: usize) -> Option<Self> {
+        Self::ALL.into_iter().find(|w| w.lanes() == lanes)
+    }
+}
+
+/// The widest lanes that this build has instructions for; wider ones are emulated.
+pub const fn native_width() -> LaneWidth {
+    if cfg!(target_feature = "avx512f") {
+        LaneWidth::W16
+    } else if cfg!(target_feature = "avx") {
+        LaneWidth::W8
+    } else if cfg!(any(target_feature = "sse2", target_feature = "neon", target_feature = "simd128")) {
+        LaneWidth::W4
+    } else {
+        LaneWidth::W1
+    }
+}
+
+/// The vector extensions that this build uses, for records.
+pub fn target_features() -> &'static str {
+    if cfg!(target_feature = "avx512f") {
+        "avx512f+fma"
+    } else if cfg!(all(target_feature = "avx2", target_feature = "fma")) {
+        "avx2+fma"
+    } else if cfg!(target_feature = "avx") {
+        "avx"
+    } else if cfg!(target_feature = "sse2") {
+        "sse2"
+    } else if cfg!(target_feature = "neon") {
+        "neon"
+    } else {
+        "scalar"
+    }
+}

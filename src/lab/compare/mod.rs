@@ -1,0 +1,346 @@
+//! Two studies side by side: what became better or worse beyond the noise.
+//!
+//! Settings that both have are paired: scene, solver, budget, order, lanes. **Errors** have no noise: the
+//! same program gives the same bits, so whatever changed was changed. What matters is judged by the
+//! tolerance of the scene: an error below [`NEGLIGIBLE`] of it is as good as none. **Times** have: both
+//! studies went through the same steps in the same blocks, so block k is paired with block k, and the
+//! median of the ratios has an interval ([`Ratio`]). A machine may be slower on another day, or be another
+//! machine; the median ratio over all settings is what they have in common, and can be divided out.
+
+pub mod text;
+
+use crate::engine::params::Budget;
+use crate::engine::world::Order;
+use crate::lab::report::study_file::StudyFile;
+use crate::lab::scenes::holds::Mark;
+use crate::lab::study::Record;
+use crate::lab::study::compare::Ratio;
+use crate::lab::study::curve::ErrorAxis;
+use serde::Serialize;
+
+/// Errors below this share of their tolerance are as good as none (1).
+pub const NEGLIGIBLE: f64 = 0.01;
+
+/// How to judge.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Growth of a time or an error from which it is a regression (1): 0.1 is a tenth more.
+    pub threshold: f64,
+    /// Divide times by what all settings have in common.
+    pub relative: bool,
+}
+
+/// What both studies have of a setting.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pair {
+    /// Name with size.
+    pub scene: String,
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Constraint order.
+    pub order: Order,
+    /// Lanes per instruction.
+    pub lanes: usize,
+    /// Work per step, for tables.
+    pub budget: String,
+    /// What happened where it did not hold, before and after.
+    pub marks: [Option<Mark>; 2],
+    /// Errors that both have, by axis.
+    pub errors: Vec<ErrorChange>,
+    /// Time after in times that before; none if one of them has no time.
+    pub time: Option<TimeChange>,
+}
+
+/// An error before and after.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorChange {
+    /// `penetration`, `residual` or `reference`.
+    pub error: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Before and after.
+    pub values: [f64; 2],
+    /// What of it is negligible.
+    pub negligible: f64,
+}
+
+/// A time before and after.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TimeChange {
+    /// Median time of a step (ns), before and after.
+    pub median_ns: [f64; 2],
+    /// Ratio over paired blocks, divided by the common one if that was wished.
+    pub ratio: f64,
+    /// Its interval.
+    pub interval: [f64; 2],
+}
+
+/// Better, worse, or neither that anybody need act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// By more than the threshold.
+    Better,
+    /// Within the threshold, the noise, or what is negligible.
+    Same,
+    /// By more than the threshold.
+    Worse,
+}
+
+/// Growth of `after` over `before`, judged.
+fn judged(growth: f64, threshold: f64) -> Verdict {
+    if growth > 1.0 + threshold {
+        Verdict::Worse
+    } else if growth < 1.0 / (1.0 + threshold) {
+        Verdict::Better
+    } else {
+        Verdict::Same
+    }
+}
+
+impl ErrorChange {
+    /// Whether a single bit differs.
+    pub fn changed(&self) -> bool {
+        self.values[0].to_bits() != self.values[1].to_bits()
+    }
+
+    /// After over before, each at least what is negligible (1).
+    pub fn growth(&self) -> f64 {
+        let [before, after] = self.values.map(|v| v.max(self.negligible));
+        if before == after { 1.0 } else { after / before }
+    }
+
+    /// See [`Verdict`].
+    pub fn verdict(&self, threshold: f64) -> Verdict {
+        judged(self.growth(), threshold)
+    }
+}
+
+impl TimeChange {
+    /// See [`Verdict`]; a difference that cannot be told from noise is none.
+    pub fn verdict(&self, threshold: f64) -> Verdict {
+        let [low, high] = self.interval;
+        if low <= 1.0 && 1.0 <= high { Verdict::Same } else { judged(self.ratio, threshold) }
+    }
+}
+
+impl Pair {
+    /// Whether it holds no more, or again.
+    pub fn holding(&self) -> Verdict {
+        match self.marks.map(|m| m.is_none()) {
+            [true, false] => Verdict::Worse,
+            [false, true] => Verdict::Better,
+            _ => Verdict::Same,
+        }
+    }
+}
+
+/// The whole comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Median ratio of times over all settings (1); none without times.
+    pub common: Option<f64>,
+    /// Whether times are divided by it.
+    pub relative: bool,
+    /// See [`Options::threshold`].
+    pub threshold: f64,
+    /// Settings that both have.
+    pub pairs: Vec<Pair>,
+    /// Settings that only the first has, and only the second.
+    pub alone: [usize; 2],
+    /// Words for what was chosen differently, and where.
+    pub differences: Vec<String>,
+}
+
+impl Comparison {
+    /// Whether anything became worse.
+    pub fn regressed(&self) -> bool {
+        let worse = |p: &Pair| {
+            p.holding() == Verdict::Worse
+                || p.errors.iter().any(|e| e.verdict(self.threshold) == Verdict::Worse)
+                || p.time.is_some_and(|t| t.verdict(self.threshold) == Verdict::Worse)
+        };
+        self.pairs.iter().any(worse)
+    }
+}
+
+/// Compares `after` with `before`.
+pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comparison {
+    let mut pairs: Vec<Pair> = Vec::new();
+    let mut alone = [before.records.len(), after.records.len()];
+    for one in &before.records {
+        if let Some(other) = after.records.iter().find(|r| key(r) == key(one)) {
+            alone = alone.map(|n| n - 1);
+            pairs.push(pair(one, other));
+        }
+    }
+    let mut ratios: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio)).collect();
+    ratios.sort_by(f64::total_cmp);
+    let common = (!ratios.is_empty()).then(|| ratios[ratios.len() / 2]);
+    if let (true, Some(common)) = (options.relative, common) {
+        for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
+            time.ratio /= common;
+            time.interval = time.interval.map(|bound| bound / common);
+        }
+    }
+    Comparison {
+        common,
+        relative: options.relative,
+        threshold: options.threshold,
+        pairs,
+        alone,
+        differences: differences(before, after),
+    }
+}
+
+fn key(r: &Record) -> (&str, &str, Budget, Order, usize) {
+    (&r.scene, r.solver, r.budget, r.order, r.lanes)
+}
+
+fn pair(one: &Record, other: &Record) -> Pair {
+    let errors = ErrorAxis::ALL.into_iter().filter_map(|axis| {
+        let values = [axis.of(one)?, axis.of(other)?];
+        let tolerances = &one.tolerances;
+        let (error, unit, tolerance) = match axis {
+            ErrorAxis::Penetration => ("penetration", "m", tolerances.penetration.value),
+            ErrorAxis::Law => ("residual", "", tolerances.residual.value),
+            ErrorAxis::Truth => {
+                ("reference", one.truth.map_or("", |t| t.unit), tolerances.truth.map_or(0.0, |t| t.value))
+            }
+        };
+        Some(ErrorChange { error, unit, values, negligible: NEGLIGIBLE * tolerance })
+    });
+    let time = || {
+        let samples = [one.lap.as_ref()?, other.lap.as_ref()?];
+        let Ratio { median, interval } = Ratio::of(samples[1], samples[0])?;
+        Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
+    };
+    Pair {
+        scene: one.scene.clone(),
+        solver: one.solver,
+        order: one.order,
+        lanes: one.lanes,
+        budget: one.budget_text.clone(),
+        marks: [one.mark(), other.mark()],
+        errors: errors.collect(),
+        time: time(),
+    }
+}
+
+/// What was chosen differently, and where it ran.
+fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut differ = |what: &str, a: String, b: String| {
+        if a != b {
+            found.push(format!("{what}: {a} → {b}"));
+        }
+    };
+    let (a, b) = (&before.environment, &after.environment);
+    differ("processor", a.cpu.clone(), b.cpu.clone());
+    differ("instructions", a.instructions().into(), b.instructions().into());
+    differ("compiler", a.compiler.clone(), b.compiler.clone());
+    differ("version", a.version.clone(), b.version.clone());
+    let empty = serde_json::Map::new();
+    let [a, b] = [before, after].map(|study| study.settings.as_object().unwrap_or(&empty));
+    let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
+    names.sort();
+    names.dedup();
+    for name in names.into_iter().filter(|name| *name != "scenes") {
+        let text = |map: &serde_json::Map<String, serde_json::Value>| {
+            map.get(name).map_or("–".to_string(), ToString::to_string)
+        };
+        let short = |text: String| if text.chars().count() > 80 { "…".to_string() } else { text };
+        let (a, b) = (text(a), text(b));
+        match a == b {
+            true => {}
+            false if short(a.clone()) == short(b.clone()) => found.push(format!("{name}: differs")),
+            false => found.push(format!("{name}: {} → {}", short(a), short(b))),
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::study::StudyPlan;
+    use crate::lab::study::record::tests::{fell, record};
+
+    fn study(records: Vec<Record>) -> StudyFile {
+        StudyFile::new(&StudyPlan::default(), records, Vec::new())
+    }
+
+    const STRICT: Options = Options { threshold: 0.1, relative: false };
+
+    #[test]
+    fn a_study_is_as_good_as_itself() {
+        let study = study(vec![record(8, 1, 10.0, 1e-3), fell(8, 2, 1.0, 0.5)]);
+        let same = compare(&study, &study, &STRICT);
+        assert!(!same.regressed() && same.differences.is_empty());
+        assert_eq!((same.pairs.len(), same.alone, same.common), (2, [0, 0], Some(1.0)));
+        assert!(same.pairs.iter().flat_map(|p| &p.errors).all(|e| !e.changed()));
+    }
+
+    #[test]
+    fn errors_times_and_falling_are_judged_apart() {
+        let before =
+            study(vec![record(8, 1, 10.0, 1e-3), record(8, 2, 20.0, 1e-3), record(8, 3, 30.0, 1e-3)]);
+        let deeper = study(vec![record(8, 1, 10.0, 1.2e-3), record(8, 2, 20.0, 1e-3)]);
+        let found = compare(&before, &deeper, &STRICT);
+        assert!(found.regressed());
+        assert_eq!(found.alone, [1, 0]);
+        assert_eq!(found.pairs[0].errors[0].verdict(0.1), Verdict::Worse);
+        assert_eq!(found.pairs[0].errors[0].verdict(0.3), Verdict::Same);
+        assert_eq!(found.pairs[0].time.unwrap().verdict(0.1), Verdict::Same);
+
+        let slower = study(vec![record(8, 1, 12.0, 1e-3), record(8, 2, 20.0, 1e-3)]);
+        let found = compare(&before, &slower, &STRICT);
+        assert_eq!(found.pairs[0].time.unwrap().verdict(0.1), Verdict::Worse);
+        assert!(found.regressed() && found.pairs[0].errors[0].verdict(0.1) == Verdict::Same);
+        // Faster is no regression.
+        assert!(!compare(&slower, &before, &STRICT).regressed());
+
+        let fallen = study(vec![fell(8, 1, 10.0, 1e-3)]);
+        assert_eq!(compare(&before, &fallen, &STRICT).pairs[0].holding(), Verdict::Worse);
+        assert!(compare(&before, &fallen, &STRICT).regressed());
+        assert!(!compare(&fallen, &before, &STRICT).regressed());
+    }
+
+    #[test]
+    fn what_is_negligible_is_no_regression() {
+        // The tolerance is 1 cm: a hundredth of it is 0.1 mm.
+        let of = |depth| study(vec![record(8, 1, 10.0, depth)]);
+        assert!(!compare(&of(1e-9), &of(9e-5), &STRICT).regressed());
+        assert!(compare(&of(1e-9), &of(1.2e-4), &STRICT).regressed());
+        assert!(compare(&of(1e-9), &of(9e-5), &STRICT).pairs[0].errors[0].changed());
+    }
+
+    #[test]
+    fn a_slower_machine_can_be_divided_out() {
+        let before = study((1..=5).map(|i| record(8, i, 10.0, 1e-3)).collect());
+        let mut times = [15.0, 15.0, 15.0, 15.0, 30.0].into_iter().zip(1..);
+        let after = study(times.by_ref().map(|(time, i)| record(8, i, time, 1e-3)).collect());
+        let raw = compare(&before, &after, &STRICT);
+        let count = |c: &Comparison| {
+            c.pairs.iter().filter(|p| p.time.unwrap().verdict(0.1) == Verdict::Worse).count()
+        };
+        assert_eq!((raw.common, count(&raw)), (Some(1.5), 5));
+        let relative = compare(&before, &after, &Options { relative: true, ..STRICT });
+        assert_eq!(count(&relative), 1);
+    }
+
+    #[test]
+    fn noise_is_no_regression() {
+        let noisy = |seed: u64| {
+            let mut r = record(8, 1, 10.0, 1e-3);
+            let sample = r.lap.as_mut().unwrap();
+            // ±30 %, and no trend.
+            sample.blocks_ns[0].iter_mut().enumerate().for_each(|(i, ns)| {
+                *ns *= 1.0 + 0.3 * (((i as u64 * 7 + seed * 13) % 11) as f64 / 5.0 - 1.0);
+            });
+            study(vec![r])
+        };
+        let found = compare(&noisy(1), &noisy(2), &Options { threshold: 0.01, relative: false });
+        assert_eq!(found.pairs[0].time.unwrap().verdict(0.01), Verdict::Same);
+    }
+}

@@ -1,0 +1,120 @@
+//! A comparison as text.
+
+use super::{Comparison, Pair, Verdict};
+use crate::engine::world::Order;
+use crate::lab::report::table::{finish, table};
+use crate::lab::report::units::{digits, lanes, ratio, si};
+
+/// Rows of each list, unless all are wished.
+const ROWS: usize = 10;
+
+/// One change, and by how much it changed (1).
+struct Line {
+    cells: [String; 7],
+    growth: f64,
+    verdict: Verdict,
+}
+
+/// What changed, first what became worse; every change with `all`.
+pub fn text(found: &Comparison, all: bool) -> String {
+    let [only_before, only_after] = found.alone;
+    let mut text = format!("{} settings in both", found.pairs.len());
+    if only_before + only_after > 0 {
+        text += &format!(", {only_before} only in the first, {only_after} only in the second");
+    }
+    text += "\n";
+    for difference in &found.differences {
+        text += &format!("  {difference}\n");
+    }
+    let threshold = 100.0 * found.threshold;
+    text += &format!(
+        "worse, better: by more than {} % and beyond the noise; errors below 1 % of a scene's tolerance count as none\n",
+        digits(threshold)
+    );
+    text += "\n";
+    // The widths of a setting end in the same bits: one of them says what happened.
+    let own = |p: &Pair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);
+    let mut once: Vec<&Pair> = found.pairs.iter().collect();
+    once.dedup_by_key(|p| own(p));
+    text += &section("Scenes that hold", once.iter().filter_map(|p| holding(p)).collect(), all);
+    let errors: Vec<Line> = once.iter().flat_map(|p| errors(p, found.threshold)).collect();
+    let changed = once.iter().flat_map(|p| &p.errors).filter(|e| e.changed()).count();
+    let count = once.iter().map(|p| p.errors.len()).sum::<usize>();
+    text += &section(&format!("Errors: {changed} of {count} differ in some bit"), errors, all);
+    let times: Vec<Line> = found.pairs.iter().filter_map(|p| times(p, found.threshold)).collect();
+    let common = match (found.common, found.relative) {
+        (None, _) => String::new(),
+        (Some(common), false) => format!(": in the median {} times as long", ratio(common)),
+        (Some(common), true) => format!(": relative to the median, {} times as long", ratio(common)),
+    };
+    text += &section(&format!("Times{common}"), times, all);
+    text + if found.regressed() { "regression: yes\n" } else { "regression: no\n" }
+}
+
+/// How many became better and worse, and the greatest changes.
+fn section(title: &str, mut lines: Vec<Line>, all: bool) -> String {
+    let count = |verdict| lines.iter().filter(|l| l.verdict == verdict).count();
+    let mut text = format!("{title}; {} worse, {} better\n", count(Verdict::Worse), count(Verdict::Better));
+    lines.retain(|l| l.verdict != Verdict::Same || all);
+    lines.sort_by(|a, b| b.growth.ln().abs().total_cmp(&a.growth.ln().abs()));
+    // Worse before better before the rest.
+    lines.sort_by_key(|l| {
+        [Verdict::Worse, Verdict::Better, Verdict::Same].iter().position(|v| *v == l.verdict)
+    });
+    let shown = if all { lines.len() } else { lines.len().min(ROWS) };
+    if shown > 0 {
+        let mut rows =
+            table(&["scene", "solver", "budget", "lanes", "what", "before", "after", "growth", ""]);
+        for line in &lines[..shown] {
+            let growth = if line.growth.is_finite() { ratio(line.growth) } else { "–".into() };
+            let word = match line.verdict {
+                Verdict::Worse => "worse",
+                Verdict::Better => "better",
+                Verdict::Same => "",
+            };
+            let cells = line.cells.iter().cloned().chain([growth, word.to_string()]);
+            rows.add_row(cells.collect::<Vec<_>>());
+        }
+        text += &finish(rows, 5);
+    }
+    if shown < lines.len() {
+        text += &format!("… and {} more (--all)\n", lines.len() - shown);
+    }
+    text + "\n"
+}
+
+fn cells(pair: &Pair, what: &str, before: String, after: String) -> [String; 7] {
+    let width = match pair.order {
+        Order::Natural => "natural".to_string(),
+        Order::Colored => lanes(pair.lanes),
+    };
+    [pair.scene.clone(), pair.solver.into(), pair.budget.clone(), width, what.into(), before, after]
+}
+
+fn holding(pair: &Pair) -> Option<Line> {
+    let [before, after] = pair.marks.map(|m| m.map_or("holds", |m| m.word()).to_string());
+    (before != after).then(|| Line {
+        verdict: pair.holding(),
+        growth: f64::INFINITY,
+        cells: cells(pair, "holds", before, after),
+    })
+}
+
+fn errors(pair: &Pair, threshold: f64) -> Vec<Line> {
+    // The widths of a setting have the same bits: one of them will do.
+    let line = |e: &super::ErrorChange| {
+        let [before, after] = e.values.map(|v| if e.unit.is_empty() { ratio(v) } else { si(v, e.unit) });
+        Line { cells: cells(pair, e.error, before, after), growth: e.growth(), verdict: e.verdict(threshold) }
+    };
+    pair.errors.iter().filter(|e| e.changed()).map(line).collect()
+}
+
+fn times(pair: &Pair, threshold: f64) -> Option<Line> {
+    let time = pair.time?;
+    let [before, after] = time.median_ns.map(|ns| si(1e-9 * ns, "s"));
+    Some(Line {
+        cells: cells(pair, "step", before, after),
+        growth: time.ratio,
+        verdict: time.verdict(threshold),
+    })
+}

@@ -1,0 +1,99 @@
+//! What convergence comes to, in sentences.
+
+use super::replay::{Sequence, Start};
+use super::{Curve, Reached, Report, TOLERANCES};
+
+/// Places in [`TOLERANCES`] of the two that are told.
+const TOLD: [usize; 2] = [1, 3];
+
+/// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the exact rate of
+/// Gauss–Seidel. Whole schedules in coloured order.
+pub fn text(report: &Report) -> String {
+    let own: Vec<&Curve> = report
+        .curves
+        .iter()
+        .filter(|c| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part)
+        .collect();
+    let mut text = "In coloured order, against the rigid contact law:\n".to_string();
+    for at in TOLD {
+        for start in [Start::Cold, Start::Warm] {
+            text += &sentence(&own, at, start);
+        }
+    }
+    let changed: Vec<&Curve> = own.iter().copied().filter(|c| !c.own_is_rigid).collect();
+    if !changed.is_empty() {
+        let each = changed.iter().filter(|c| c.start == Start::Cold).map(|c| {
+            let sweeps = TOLD.map(|at| match to(c, &c.own, at) {
+                Some(n) => format!("{n} to {:.0e}", TOLERANCES[at]),
+                None => format!("none to {:.0e}", TOLERANCES[at]),
+            });
+            format!("{} {}", c.solver, sweeps.join(", "))
+        });
+        let list: Vec<String> = each.collect();
+        text += &format!(
+            "Sweeps to the law that a solver itself sets, where that is another one, cold: {}.\n",
+            list.join("; ")
+        );
+    }
+    text + &exact(report, &own)
+}
+
+/// Sweeps to a tolerance.
+fn to(curve: &Curve, law: &Reached, at: usize) -> Option<usize> {
+    law.first[at].map(|i| curve.points[i].sweeps)
+}
+
+fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
+    let own = || curves.iter().filter(|c| c.start == start);
+    let mut reached: Vec<(usize, &str)> =
+        own().filter_map(|c| Some((to(c, &c.rigid, at)?, c.solver.as_str()))).collect();
+    reached.sort();
+    let never: Vec<&str> = own().filter(|c| c.rigid.first[at].is_none()).map(|c| c.solver.as_str()).collect();
+    if own().next().is_none() {
+        return String::new();
+    }
+    let goal = format!("{:.0e}, {start}", TOLERANCES[at]);
+    let mut text = match reached.as_slice() {
+        [] => format!("To {goal}: no solver gets there"),
+        [(least, _), ..] => {
+            let first: Vec<&str> = reached.iter().filter(|r| r.0 == *least).map(|r| r.1).collect();
+            let when = match least {
+                0 => "at the start".to_string(),
+                1 => "in 1 sweep".to_string(),
+                n => format!("in {n} sweeps"),
+            };
+            let mut text = format!("To {goal}: {} {when}", first.join(" and "));
+            let others: Vec<String> =
+                reached.iter().filter(|r| r.0 > *least).map(|(n, name)| format!("{name} {n}")).collect();
+            if !others.is_empty() {
+                text += &format!("; then {}", others.join(", "));
+            }
+            text
+        }
+    };
+    if !never.is_empty() && !reached.is_empty() {
+        text += &format!("; never {}", never.join(", "));
+    }
+    text + ".\n"
+}
+
+/// Measured rates beside that of Gauss–Seidel.
+fn exact(report: &Report, curves: &[&Curve]) -> String {
+    let Some(exact) = report.gauss_seidel_rate else {
+        return "Gauss-Seidel has no rate here: it comes to no solution, or at once.\n".into();
+    };
+    let sweeps = |tolerance: f64| (tolerance.ln() / exact.ln()).ceil();
+    let mut text = format!("Gauss-Seidel's exact rate is {exact:.4} per sweep");
+    if exact < 1.0 {
+        text += &format!(", {:.0} sweeps for 1e-2 and {:.0} for 1e-4", sweeps(1e-2), sweeps(1e-4));
+    }
+    let measured: Vec<String> = curves
+        .iter()
+        .filter(|c| c.start == Start::Cold && c.own_is_rigid)
+        .filter_map(|c| Some(format!("{} {:.4}", c.solver, c.rigid.rate?)))
+        .collect();
+    match measured.as_slice() {
+        [] => text + ".\n",
+        list => format!("{text}; measured per iteration: {}.\n", list.join(", ")),
+    }
+}

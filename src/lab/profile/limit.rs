@@ -1,0 +1,88 @@
+//! What limits a phase, in the terms of the roofline.
+
+use super::PhaseReport;
+
+/// What a pass spends its time on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Moving bytes between the level of memory that holds the working set and the core.
+    Bandwidth,
+    /// Floating-point operations.
+    Compute,
+    /// Neither: chains of dependent operations, gathers, branches.
+    Latency,
+    /// Not bandwidth; operations are not counted in this phase.
+    NotBandwidth,
+}
+
+/// A phase that reaches this share of its lower ceiling is bound by it (1).
+pub const REACHED: f64 = 0.5;
+
+impl Limit {
+    /// Of a phase whose ceilings were measured: its bandwidth, and `multiply_adds` (GFLOP/s). None of a
+    /// phase that does nothing, or without ceilings.
+    pub fn of(phase: &PhaseReport, multiply_adds: Option<f64>) -> Option<Limit> {
+        let peak = multiply_adds?;
+        let bandwidth = phase.bandwidth?.of_mix(&phase.traffic);
+        if phase.pass_ns <= 0.0 || phase.traffic.total() <= 0.0 {
+            return None;
+        }
+        let memory = phase.traffic.total() / bandwidth / phase.pass_ns;
+        Some(match phase.flops.map(|flops| flops / peak / phase.pass_ns) {
+            _ if memory >= REACHED && phase.flops.is_none() => Limit::Bandwidth,
+            None => Limit::NotBandwidth,
+            Some(arithmetic) if memory.max(arithmetic) < REACHED => Limit::Latency,
+            Some(arithmetic) if memory >= arithmetic => Limit::Bandwidth,
+            Some(_) => Limit::Compute,
+        })
+    }
+
+    /// The field's word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Limit::Bandwidth => "bandwidth-bound",
+            Limit::Compute => "compute-bound",
+            Limit::Latency => "latency-bound",
+            Limit::NotBandwidth => "latency- or compute-bound",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::traffic::Traffic;
+    use super::super::{Bandwidth, PhaseReport};
+    use super::*;
+    use crate::engine::clock::Phase;
+    use crate::engine::world::Probe;
+
+    #[test]
+    fn the_lower_ceiling_binds_if_half_of_it_is_reached() {
+        let phase = |pass_ns: f64, flops: Option<f64>| PhaseReport {
+            probe: Probe {
+                phase: Phase::Solve,
+                passes: 1,
+                rows: 1,
+                operations: None,
+                counted_contacts: 1,
+                per_contact: [[0.0; 4]; 3],
+                bytes: [0.0; 2],
+            },
+            // 100 ns at 10 GB/s.
+            traffic: Traffic { read: 1000.0, written: 0.0, working_set: 1000.0 },
+            pass_ns,
+            spread_ns: 0.0,
+            passes: 1,
+            bandwidth: Some(Bandwidth { read: 10.0, update: 10.0 }),
+            flops,
+        };
+        let of = |pass_ns, flops| Limit::of(&phase(pass_ns, flops), Some(2.0)).map(Limit::word);
+        assert_eq!(of(199.0, Some(10.0)), Some("bandwidth-bound"));
+        assert_eq!(of(201.0, Some(10.0)), Some("latency-bound"));
+        // 400 operations take 200 ns.
+        assert_eq!(of(250.0, Some(400.0)), Some("compute-bound"));
+        assert_eq!(of(150.0, None), Some("bandwidth-bound"));
+        assert_eq!(of(900.0, None), Some("latency- or compute-bound"));
+        assert_eq!(Limit::of(&phase(1.0, None), None), None);
+    }
+}

@@ -1,0 +1,68 @@
+//! What a contact problem must be before anything is computed with it.
+
+use super::problem::ContactProblem;
+use crate::lab::error::Error;
+
+impl ContactProblem {
+    /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
+    /// that every contact has a side that answers to impulses.
+    pub fn validate(&self) -> Result<(), Error> {
+        // Names go into tables.
+        require(!self.name.chars().any(char::is_control), "name", || {
+            format!("must not have control characters, is {:?}", self.name)
+        })?;
+        let h = [self.h];
+        finite("h", &h)?;
+        require(self.h > 0.0, "h", || format!("the step is {} s, must be > 0", self.h))?;
+        for (i, b) in self.bodies.iter().enumerate() {
+            let place = || format!("bodies[{i}]");
+            finite(place(), &[b.inv_mass, b.inv_inertia])?;
+            finite(place(), &b.velocity)?;
+            finite(place(), &b.free_velocity)?;
+            require(b.inv_mass >= 0.0, place(), || format!("inv_mass is {}, must be ≥ 0", b.inv_mass))?;
+            require(b.inv_inertia >= 0.0, place(), || {
+                format!("inv_inertia is {}, must be ≥ 0", b.inv_inertia)
+            })?;
+        }
+        for (i, c) in self.contacts.iter().enumerate() {
+            let place = || format!("contacts[{i}]");
+            for pair in [c.normal, c.arm_a, c.arm_b, [c.gap, c.friction], c.warm_impulse] {
+                finite(place(), &pair)?;
+            }
+            finite(place(), &[c.rebound])?;
+            for body in [c.body_a, c.body_b].into_iter().flatten() {
+                require((body as usize) < self.bodies.len(), place(), || {
+                    format!("names body {body} of {}", self.bodies.len())
+                })?;
+            }
+            require(c.body_a != c.body_b, place(), || format!("both sides are {:?}", c.body_a))?;
+            let length = c.normal[0].hypot(c.normal[1]);
+            // Normals that come from f32 are unit only to their own precision.
+            require((length - 1.0).abs() < 1e-5, place(), || {
+                format!("the normal has length {length}, must be 1")
+            })?;
+            require(c.friction >= 0.0, place(), || format!("friction is {}, must be ≥ 0", c.friction))?;
+            require(c.rebound >= 0.0, place(), || format!("rebound is {}, must be ≥ 0", c.rebound))?;
+            let g = self.delassus_block(c);
+            require(g[0] > 0.0 && g[1] > 0.0, place(), || "no side answers to impulses".to_string())?;
+            let starts = i == 0 || self.contacts[i - 1].manifold != c.manifold;
+            let p = &self.contacts[i.saturating_sub(1)];
+            let same = p.normal == c.normal && p.body_a == c.body_a && p.body_b == c.body_b;
+            require(starts || same, place(), || {
+                format!("manifold {} has points of different bodies or normals", c.manifold)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn require(ok: bool, place: impl Into<String>, message: impl FnOnce() -> String) -> Result<(), Error> {
+    if ok { Ok(()) } else { Err(Error::invalid(place, message())) }
+}
+
+fn finite(place: impl Into<String>, values: &[f64]) -> Result<(), Error> {
+    match values.iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(Error::invalid(place, format!("{x} is not a finite number"))),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,281 @@
+//! The columns of every CSV file, in one place. Tests hold that no file has another header.
+//!
+//! Cells are empty where there is nothing: a run that failed has no errors, a scene without a
+//! reference value no distance to it.
+
+/// A column.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// In the header. `<phase>_ns` stands for a column of each phase, and so on.
+    pub name: &'static str,
+    /// Empty for words and counts; 1 for ratios.
+    pub unit: &'static str,
+    /// What it holds.
+    pub meaning: &'static str,
+}
+
+/// A kind of CSV file.
+#[derive(Clone, Copy, Debug)]
+pub struct Sheet {
+    /// Its usual name.
+    pub file: &'static str,
+    /// What writes it.
+    pub command: &'static str,
+    /// What a line is.
+    pub line: &'static str,
+    /// In their order.
+    pub columns: &'static [Column],
+}
+
+const fn column(name: &'static str, unit: &'static str, meaning: &'static str) -> Column {
+    Column { name, unit, meaning }
+}
+
+/// `study.csv`
+pub static STUDY: Sheet = Sheet {
+    file: "study.csv",
+    command: "simpulse study",
+    line: "a scene, solver, budget, order and lane width",
+    columns: &[
+        column("scene", "", "name with its size"),
+        column("bodies", "", "bodies of the scene"),
+        column("dt", "s", "length of a step"),
+        column("solver", "", "name of the solver"),
+        column("order", "", "constraint order: natural or colored"),
+        column("lanes", "", "lanes per instruction"),
+        column("lanes_emulated", "", "whether the build has no instructions so wide"),
+        column("substeps", "", "substeps of a step"),
+        column("velocity_iterations", "", "velocity sweeps of a substep"),
+        column("relax_iterations", "", "relaxation sweeps of a substep"),
+        column("position_iterations", "", "position sweeps of a substep"),
+        column("median_us", "µs", "time of a step, median over blocks of steps"),
+        column("spread_us", "µs", "median deviation of a repeat from its block's median"),
+        column("quartile_1_us", "µs", "lower quartile of the blocks"),
+        column("quartile_3_us", "µs", "upper quartile of the blocks"),
+        column("ns_per_row_sweep", "ns", "time of a sweep per constraint row that it solves, median"),
+        column("speed_up", "1", "times faster than one lane in coloured order"),
+        column("steps", "", "steps over which errors were measured"),
+        column("points", "", "contact points over all steps"),
+        column("penetration_max", "m", "greatest penetration after a step, pairs searched again"),
+        column("penetration_mean", "m", "mean penetration of contact points, open ones counted as 0"),
+        column("penetration_rms", "m", "root mean square of the same"),
+        column("penetration_p99", "m", "what 99 % of contact points do not exceed"),
+        column(
+            "penetration_relative",
+            "1",
+            "greatest penetration over half the width of the thinnest dynamic shape",
+        ),
+        column(
+            "penetration_excess",
+            "m",
+            "greatest penetration of the last second beyond what soft contacts give way at rest",
+        ),
+        column("soft_floor", "m", "the most that soft contacts give way under the last second's load"),
+        column("law_rms", "1", "residual of the rigid contact law, rms, over weight of the scene × step"),
+        column("law_rms_body", "1", "the same over mean weight of a body × step"),
+        column("law_normal_rms", "1", "its normal part, rms, over weight of the scene × step"),
+        column("law_normal_max", "1", "its normal part, largest"),
+        column("law_tangent_rms", "1", "its tangential part, rms"),
+        column("law_tangent_max", "1", "its tangential part, largest"),
+        column("complementarity", "1", "largest violation of complementarity, over (weight × step)²/mass"),
+        column("cone", "1", "largest violation of the friction cone, over weight × step"),
+        column("dissipation", "1", "largest gap to maximal dissipation, over (weight × step)²/mass"),
+        column("own_rms", "1", "residual of the law that the solver itself sets, rms, over weight × substep"),
+        column("own_max", "1", "the same, largest part"),
+        column("momentum", "1", "momentum out of balance, relative"),
+        column("angular_momentum", "1", "angular momentum out of balance, relative"),
+        column("energy_change", "1", "energy gained (positive) or lost over the run, relative"),
+        column("energy_created", "1", "most energy created in one step, relative"),
+        column("friction_loss", "1", "energy taken by friction, relative"),
+        column("impact_loss", "1", "energy taken by normal impulses, relative"),
+        column("energy_unexplained", "1", "most energy in one step that no impulse explains, relative"),
+        column("rest_velocity", "m/s", "residual speed, rms over the last second"),
+        column("creep", "m/s", "fastest creep of a body on another over the last second"),
+        column("creep_half_width", "m/s", "half the width of its 95 % interval"),
+        column("settled", "s", "when the scene came to rest for good"),
+        column("truth", "", "what the reference value is of"),
+        column("truth_unit", "", "unit of the next two columns"),
+        column("truth_expected", "*", "reference value of the scene"),
+        column("truth_error", "*", "distance to the reference value"),
+        column("contacts", "", "contacts of a step, mean"),
+        column("rows", "", "constraint rows of a step, mean"),
+        column("sweeps", "", "sweeps of a step over the constraints, mean"),
+        column("colors", "", "colours of contacts, most of any step"),
+        column("overflow", "", "contacts of a step that no colour had room for, mean"),
+        column("occupancy", "1", "share of lanes that hold a contact"),
+        column("bytes_per_contact", "B", "prepared constraint records"),
+        column("bits_equal", "", "whether this width ended in the bits of the error run"),
+        column("front_penetration", "", "whether on the Pareto front of time against penetration"),
+        column("front_law", "", "whether on the Pareto front of time against the contact-law residual"),
+        column(
+            "front_truth",
+            "",
+            "whether on the Pareto front of time against the distance to the reference value",
+        ),
+        column("mark", "", "fell, slid, tunnelled or blew up, where the scene does not hold"),
+        column("mark_step", "", "step at which it did"),
+        column("tolerance_penetration", "m", "tolerance of penetration_max"),
+        column("tolerance_residual", "1", "tolerance of law_rms_body"),
+        column("tolerance_truth", "*", "tolerance of truth_error, in truth_unit"),
+        column("in_tolerance", "", "whether the scene holds and keeps every tolerance"),
+        column("failed_step", "", "step at which the run diverged"),
+        column("failed_body", "", "body that did"),
+        column("failed_speed", "m/s", "its speed, or rad/s, if it is a finite number"),
+    ],
+};
+
+/// `converge.csv`
+pub static CONVERGE: Sheet = Sheet {
+    file: "converge.csv",
+    command: "simpulse converge",
+    line: "a solver, order and start after some iterations",
+    columns: &[
+        column("problem", "", "name of the frozen problem"),
+        column("solver", "", "name of the solver, with its stage where that is not all of it"),
+        column("arithmetic", "", "f32 for the simulation's code, f64 for methods to compare with"),
+        column("order", "", "natural, colored or shuffled"),
+        column("start", "", "impulses at the start: cold (zero) or warm"),
+        column("iterations", "", "iterations of the solver"),
+        column("sweeps", "", "sweeps over the constraints"),
+        column("time_ns", "ns", "time of these iterations, set-up excluded"),
+        column("rigid_residual", "1", "residual of the rigid contact law, in the problem's unit of impulse"),
+        column("own_residual", "1", "residual of the law that the solver itself sets"),
+        column(
+            "velocity_error",
+            "1",
+            "distance of the velocities from the reference, in the mass norm, relative",
+        ),
+    ],
+};
+
+/// `growth.csv`
+pub static GROWTH: Sheet = Sheet {
+    file: "growth.csv",
+    command: "simpulse growth",
+    line: "a size of the scene",
+    columns: &[
+        column("scene", "", "name with its size"),
+        column("bodies", "", "bodies of the scene"),
+        column("pairs", "", "candidate pairs of the step"),
+        column("contacts", "", "contacts of the step"),
+        column("points", "", "contact points of the step"),
+        column("step_ns", "ns", "time of a step, median"),
+        column("step_spread_ns", "ns", "median deviation from it"),
+        column("<phase>_ns", "ns", "time of a phase, median"),
+        column("<phase>_spread_ns", "ns", "median deviation from it"),
+        column("<part>_held_bytes", "B", "memory that a part of the world holds"),
+        column("<part>_used_bytes", "B", "what of it is in use"),
+        column("penetration_max", "m", "greatest penetration of the last settling steps"),
+        column("law_rms", "1", "residual of the rigid contact law, rms, over weight of the scene × step"),
+        column("law_rms_body", "1", "the same over mean weight of a body × step"),
+    ],
+};
+
+/// What `run --state` writes.
+pub static STATE: Sheet = Sheet {
+    file: "FILE of run --state",
+    command: "simpulse run --state FILE",
+    line: "a body after a step",
+    columns: &[
+        column("step", "", "step, from 1"),
+        column("time", "s", "time after the step"),
+        column("body", "", "index in the scene, from 0"),
+        column("x", "m", "origin of the body's frame"),
+        column("y", "m", "the same"),
+        column("angle", "rad", "with all turns since the start"),
+        column("vx", "m/s", "velocity of the centre of mass"),
+        column("vy", "m/s", "the same"),
+        column("omega", "rad/s", "angular velocity"),
+    ],
+};
+
+/// What `run --contacts` writes.
+pub static CONTACTS: Sheet = Sheet {
+    file: "FILE of run --contacts",
+    command: "simpulse run --contacts FILE",
+    line: "a contact point of a step",
+    columns: &[
+        column("step", "", "step, from 1"),
+        column("body_a", "", "index of the first body"),
+        column("body_b", "", "index of the second body"),
+        column("feature", "", "which corners or edges meet; the same from step to step"),
+        column("px", "m", "contact point at the start of the step"),
+        column("py", "m", "the same"),
+        column("nx", "1", "normal, from a to b"),
+        column("ny", "1", "the same"),
+        column("separation", "m", "at the start of the step; negative is penetration"),
+        column("normal_impulse", "N s", "on body b over the step"),
+        column("tangent_impulse", "N s", "on body b over the step, along the normal turned clockwise"),
+    ],
+};
+
+/// All of them.
+pub static SHEETS: [&Sheet; 5] = [&STUDY, &CONVERGE, &GROWTH, &STATE, &CONTACTS];
+
+impl Sheet {
+    /// The names, in their order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.columns.iter().map(|c| c.name).collect()
+    }
+
+    /// Whether a header has these columns, in their order. Columns with a placeholder may stand any
+    /// number of times, mixed with each other.
+    pub fn documents(&self, header: &[&str]) -> bool {
+        let is_any = |c: &Column| c.name.starts_with('<');
+        let suffix = |c: &Column| c.name.split_once('>').map_or("", |(_, suffix)| suffix);
+        let of_any = |name: &str| {
+            self.columns
+                .iter()
+                .any(|c| is_any(c) && name.len() > suffix(c).len() && name.ends_with(suffix(c)))
+        };
+        let plain: Vec<&str> = self.columns.iter().filter(|c| !is_any(c)).map(|c| c.name).collect();
+        let given: Vec<&str> = header.iter().copied().filter(|n| plain.contains(n) || !of_any(n)).collect();
+        given == plain
+    }
+}
+
+/// All columns as text.
+pub fn text() -> String {
+    let mut text = String::new();
+    for sheet in SHEETS {
+        text += &format!("{}, written by `{}`: a line is {}\n", sheet.file, sheet.command, sheet.line);
+        let width = |of: fn(&Column) -> usize| sheet.columns.iter().map(of).max().unwrap_or(0);
+        let (name, unit) = (width(|c| c.name.chars().count()), width(|c| c.unit.chars().count()));
+        for c in sheet.columns {
+            let shown = if c.unit.is_empty() { "–" } else { c.unit };
+            text += &format!("  {:<name$}  {shown:<unit$}  {}\n", c.name, c.meaning);
+        }
+        text += "\n";
+    }
+    text + "Units: – words and counts, 1 ratios, * in the unit that the line gives.\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn a_header_is_documented_or_not() {
+        assert!(STATE.documents(&STATE.names()));
+        assert!(!STATE.documents(&STATE.names()[1..]));
+        let reversed: Vec<&str> = STATE.names().into_iter().rev().collect();
+        assert!(!STATE.documents(&reversed));
+        let mut growth: Vec<&str> = GROWTH.names().into_iter().filter(|n| !n.starts_with('<')).collect();
+        growth.insert(7, "warm_start_spread_ns");
+        growth.insert(7, "solve_ns");
+        assert!(GROWTH.documents(&growth));
+        growth.insert(7, "solve_µs");
+        assert!(!GROWTH.documents(&growth));
+    }
+
+    #[test]
+    fn every_column_stands_once_with_its_meaning() {
+        for sheet in SHEETS {
+            let names: BTreeSet<_> = sheet.names().into_iter().collect();
+            assert_eq!(names.len(), sheet.columns.len(), "{}", sheet.file);
+            assert!(sheet.columns.iter().all(|c| !c.meaning.is_empty()), "{}", sheet.file);
+            assert!(text().contains(sheet.file));
+        }
+    }
+}

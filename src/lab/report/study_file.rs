@@ -1,0 +1,228 @@
+//! `study.json`: everything that a study chose and measured, written and read back.
+
+use super::environment::Environment;
+use super::export::settings;
+use crate::lab::error::Error;
+use crate::lab::study::{Record, StudyPlan};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Name of the file in a study's folder.
+pub const NAME: &str = "study.json";
+
+/// A study: whole, cut short, or put together.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StudyFile {
+    /// Where it ran; of a study that was put together, where its first part did.
+    pub environment: Environment,
+    /// Everything that was chosen.
+    pub settings: Value,
+    /// Scenes of the plan that have no records, because the study was interrupted or is a part of one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing_scenes: Vec<String>,
+    /// What it was put together from. Times are comparable within a part only.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Part>,
+    /// A record per setting, scene by scene.
+    pub records: Vec<Record>,
+}
+
+/// A part of a study that was put together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Where it ran.
+    pub environment: Environment,
+    /// Its scenes.
+    pub scenes: Vec<String>,
+}
+
+impl StudyFile {
+    /// A study that ran here, without some of its scenes.
+    pub fn new(plan: &StudyPlan, records: Vec<Record>, missing_scenes: Vec<String>) -> Self {
+        StudyFile {
+            environment: Environment::current(),
+            settings: settings(plan),
+            missing_scenes,
+            parts: Vec::new(),
+            records,
+        }
+    }
+
+    /// One study of several parts that were chosen alike; `names` is what the parts are called in errors.
+    /// Scenes take turns, the first of every part first, which is the order of a study that was split.
+    ///
+    /// Errors: no parts; parts that differ in what was chosen; a scene in two parts.
+    pub fn merged(parts: Vec<StudyFile>, names: &[String]) -> Result<Self, Error> {
+        let chosen = |study: &StudyFile| {
+            let mut settings = study.settings.clone();
+            if let Some(map) = settings.as_object_mut() {
+                map.remove("scenes");
+            }
+            settings
+        };
+        let Some(first) = parts.first() else { return Err(Error::invalid("merge", "no parts given")) };
+        let mut whole = StudyFile {
+            environment: first.environment.clone(),
+            settings: first.settings.clone(),
+            missing_scenes: Vec::new(),
+            parts: Vec::new(),
+            records: Vec::new(),
+        };
+        let mut found: Vec<(String, &String)> = Vec::new();
+        for (part, name) in parts.iter().zip(names) {
+            if chosen(part) != chosen(first) {
+                let message = format!("{name} was run with other settings than {}", names[0]);
+                return Err(Error::invalid("merge", message));
+            }
+            for scene in part.scenes() {
+                if let Some((_, other)) = found.iter().find(|(known, _)| *known == scene) {
+                    return Err(Error::invalid("merge", format!("{scene} is in {other} and in {name}")));
+                }
+                found.push((scene, name));
+            }
+            match part.parts.is_empty() {
+                true => {
+                    whole.parts.push(Part { environment: part.environment.clone(), scenes: part.scenes() })
+                }
+                false => whole.parts.extend(part.parts.iter().cloned()),
+            }
+        }
+        let plan = |study: &StudyFile| -> Vec<String> {
+            let list = study.settings.get("scenes").and_then(Value::as_array).into_iter().flatten();
+            list.filter_map(|name| Some(name.as_str()?.to_string())).collect()
+        };
+        // What a part did not finish, and what no part had in its plan.
+        let finished =
+            |name: &String| parts.iter().any(|p| plan(p).contains(name) && !p.missing_scenes.contains(name));
+        let missing: Vec<String> = parts.iter().flat_map(|p| p.missing_scenes.clone()).collect();
+        for name in missing {
+            if !finished(&name) && !whole.missing_scenes.contains(&name) {
+                whole.missing_scenes.push(name);
+            }
+        }
+        let plans: Vec<Vec<String>> = parts.iter().map(plan).collect();
+        let scenes =
+            in_turns(plans.iter().map(|p| p.iter().map(|name| vec![name.clone()]).collect()).collect());
+        if let Some(map) = whole.settings.as_object_mut() {
+            map.insert("scenes".into(), scenes.into());
+        }
+        let by_scene = |study: StudyFile| -> Vec<Vec<Record>> {
+            study.records.chunk_by(|a, b| a.scene == b.scene).map(<[Record]>::to_vec).collect()
+        };
+        whole.records = in_turns(parts.into_iter().map(by_scene).collect());
+        Ok(whole)
+    }
+
+    /// The scenes that have records, in their order.
+    pub fn scenes(&self) -> Vec<String> {
+        self.records.chunk_by(|a, b| a.scene == b.scene).map(|scene| scene[0].scene.clone()).collect()
+    }
+
+    /// What a reader must know first: scenes that are missing, times of several machines. Empty for a
+    /// whole study.
+    pub fn caution(&self) -> String {
+        let mut text = String::new();
+        if !self.missing_scenes.is_empty() {
+            text += &format!("PARTIAL: without {}\n", self.missing_scenes.join(", "));
+        }
+        if self.parts.len() > 1 {
+            text += &format!(
+                "Times come from {} runs; each scene was timed in one of them, and times of different scenes \
+                 are not comparable.\n",
+                self.parts.len()
+            );
+        }
+        text
+    }
+
+    /// The text of the file.
+    pub fn to_json(&self) -> Result<Vec<u8>, Error> {
+        serde_json::to_vec_pretty(self).map_err(|e| Error::invalid(NAME, e.to_string()))
+    }
+
+    /// Reads the study of a folder, or a file.
+    ///
+    /// Errors: no such file, or one that is no study, with line and column.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let path: PathBuf = if path.is_dir() { path.join(NAME) } else { path.into() };
+        let text = std::fs::read(&path).map_err(Error::io(&path))?;
+        serde_json::from_slice(&text).map_err(|e| Error::Format { path, message: e.to_string() })
+    }
+}
+
+/// The first of every list, then the second of every list, and so on.
+fn in_turns<T: Clone>(lists: Vec<Vec<Vec<T>>>) -> Vec<T> {
+    let longest = lists.iter().map(Vec::len).max().unwrap_or(0);
+    (0..longest).flat_map(|i| lists.iter().filter_map(move |list| list.get(i))).flatten().cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::study::record::tests::{failed, fell, record};
+
+    #[test]
+    fn a_study_comes_back_with_the_same_bits() {
+        let plan = StudyPlan { scenes: vec!["stack:2".into(), "arch".into()], ..StudyPlan::default() };
+        let mut records = vec![record(8, 1, 10.25, 0.1 + 0.2), fell(8, 2, 3.0, 1e-300), failed(4)];
+        if let Some(sample) = &mut records[0].lap {
+            sample.blocks_ns = vec![vec![10.5, f64::NAN], vec![7.0]];
+        }
+        let study = StudyFile::new(&plan, records, vec!["arch".into()]);
+        assert_eq!(study.caution(), "PARTIAL: without arch\n");
+        let text = study.to_json().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(NAME), &text).unwrap();
+        let back = StudyFile::read(folder.path()).unwrap();
+        assert_eq!(back.to_json().unwrap(), text);
+        assert_eq!(format!("{:?}", back.records[0].errors), format!("{:?}", study.records[0].errors));
+        assert!(back.records[0].lap.as_ref().unwrap().blocks_ns[0][1].is_nan());
+    }
+
+    #[test]
+    fn parts_make_the_whole_again() {
+        let of = |scenes: &[&str], missing: &[&str]| {
+            let names = |list: &[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+            let plan = StudyPlan { scenes: names(scenes), ..StudyPlan::default() };
+            let done = scenes.iter().filter(|s| !missing.contains(s));
+            let records = done.map(|&s| Record { scene: s.into(), ..record(8, 1, 1.0, 0.0) }).collect();
+            StudyFile::new(&plan, records, names(missing))
+        };
+        let names = ["one".to_string(), "two".to_string()];
+        // A study of a, b, c, d, e in two parts.
+        let parts = vec![of(&["a", "c", "e"], &[]), of(&["b", "d"], &[])];
+        let parts = parts.into_iter().zip([vec!["b", "d"], vec!["a", "c", "e"]]).map(|(mut part, others)| {
+            part.missing_scenes = others.into_iter().map(String::from).collect();
+            part
+        });
+        let whole = StudyFile::merged(parts.collect(), &names).unwrap();
+        assert_eq!(whole.scenes(), ["a", "b", "c", "d", "e"]);
+        assert_eq!(whole.settings["scenes"], serde_json::json!(["a", "b", "c", "d", "e"]));
+        assert_eq!((whole.missing_scenes.len(), whole.parts.len()), (0, 2));
+        assert!(whole.caution().contains("2 runs"), "{}", whole.caution());
+        // One part was interrupted before d.
+        let cut = StudyFile::merged(vec![of(&["a", "c"], &[]), of(&["b", "d"], &["d"])], &names).unwrap();
+        assert_eq!(
+            (cut.scenes(), cut.missing_scenes),
+            (vec!["a".into(), "b".into(), "c".into()], vec!["d".to_string()])
+        );
+
+        let twice = StudyFile::merged(vec![of(&["a"], &[]), of(&["a"], &[])], &names).unwrap_err();
+        assert_eq!(twice.to_string(), "merge: a is in one and in two");
+        let mut other = of(&["b"], &[]);
+        other.settings["seed"] = 9.into();
+        let message = StudyFile::merged(vec![of(&["a"], &[]), other], &names).unwrap_err().to_string();
+        assert_eq!(message, "merge: two was run with other settings than one");
+    }
+
+    #[test]
+    fn what_is_no_study_is_refused_with_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.json");
+        std::fs::write(&path, "{\"records\": [\n{}]}").unwrap();
+        let message = StudyFile::read(&path).unwrap_err().to_string();
+        assert!(message.contains("x.json") && message.contains("line 2"), "{message}");
+        assert!(StudyFile::read(folder.path()).unwrap_err().to_string().contains(NAME));
+    }
+}

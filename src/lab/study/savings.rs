@@ -1,0 +1,125 @@
+//! Savings from specialisation: what the kernels of a scene gain by leaving out features that the
+//! scene does not have.
+//!
+//! A scene's features choose the kernel. Here each feature that a scene is without is forced on,
+//! alone and all together, and interleaved timing tells what that would have cost. Since few scenes
+//! are without friction, each one also runs frictionless, with every friction coefficient zero.
+//!
+//! Scenes of few contacts are left out: what their sweeps cost is the cost of starting them.
+
+use super::interleave::{Sample, race};
+use super::{Progress, StudyPlan, timing_steps};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Features;
+use crate::engine::lanes::native_width;
+use crate::engine::world::{Divergence, Settings};
+use crate::lab::error::Error;
+use crate::lab::scenes::Scene;
+
+/// What leaving out one feature saves on a scene that does not have it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Saving {
+    /// Name with size.
+    pub scene: String,
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Lanes per instruction.
+    pub lanes: usize,
+    /// What was left out; `all` for everything.
+    pub feature: &'static str,
+    /// Prepared records with the features of the scene alone (bytes per contact).
+    pub bytes: f64,
+    /// What leaving this one out saves (bytes per contact).
+    pub bytes_saved: f64,
+    /// Passes over constraints with the features of the scene alone (ns per contact and sweep).
+    pub ns: f64,
+    /// What leaving this one out saves (ns per contact and sweep); negative if it costs.
+    pub ns_saved: f64,
+    /// Whether both ended in the same bits.
+    pub bits_equal: bool,
+}
+
+/// Names of features and what forces them on.
+const FEATURES: [(&str, Features); 4] = [
+    ("friction", Features { friction: true, ..Features::NONE }),
+    ("second point", Features { two_points: true, ..Features::NONE }),
+    ("rotation", Features { rotation: true, ..Features::NONE }),
+    ("restitution", Features { restitution: true, ..Features::NONE }),
+];
+
+/// Contacts that a scene must have on average to be worth a line.
+const FEWEST_CONTACTS: f64 = 100.0;
+
+/// The scene with every friction coefficient zero.
+fn frictionless(scene: &Scene) -> Scene {
+    let mut copy = scene.clone();
+    copy.name += " frictionless";
+    copy.bodies.iter_mut().flat_map(|b| &mut b.shapes).for_each(|shape| shape.friction = 0.0);
+    copy
+}
+
+/// For every scene of the plan what each feature that it is without would cost, with every solver of
+/// the plan at its standard budget, and with the plan's widest lanes.
+pub fn savings(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Saving>, Error> {
+    plan.check()?;
+    let width = plan.widths.iter().copied().max().unwrap_or(native_width());
+    let mut scenes = Vec::new();
+    for name in &plan.scenes {
+        let scene = plan.open(name)?.scene;
+        scenes.extend([frictionless(&scene), scene]);
+    }
+    let total = plan.solvers.len() * scenes.len();
+    let mut savings = Vec::new();
+    let mut done = 0;
+    for solver in &plan.solvers {
+        for scene in &scenes {
+            progress(Progress { done, total, what: format!("{} · {}", scene.name, solver.name) });
+            done += 1;
+            savings.extend(of_scene(plan, scene, Settings { width, ..Settings::new(solver) })?);
+        }
+    }
+    Ok(savings)
+}
+
+/// The savings on one scene; none if it has every feature, or few contacts.
+fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Saving>, Error> {
+    let has = scene.build(base.clone())?.features();
+    let lacks = |feature: &Features| has.union(*feature) != has;
+    let mut forced: Vec<_> = FEATURES.into_iter().filter(|(_, feature)| lacks(feature)).collect();
+    if forced.is_empty() {
+        return Ok(Vec::new());
+    }
+    if forced.len() > 1 {
+        forced.push(("all", Features { damping: false, ..Features::FULL }));
+    }
+    let mut settings = vec![base.clone()];
+    settings.extend(forced.iter().map(|&(_, extra_features)| Settings { extra_features, ..base.clone() }));
+    let samples = race(scene, &settings, timing_steps(plan, scene), plan.repeats, plan.seed)?;
+    let Some(Ok(own)) = samples.first() else { return Ok(Vec::new()) };
+    if own.load.contacts < FEWEST_CONTACTS {
+        return Ok(Vec::new());
+    }
+    let ns = per_contact(own);
+    let saving = |((feature, _), sample): (&(&'static str, Features), &Result<Sample, Divergence>)| {
+        let sample = sample.as_ref().ok()?;
+        Some(Saving {
+            scene: scene.name.clone(),
+            solver: base.solver.name,
+            lanes: base.width.lanes(),
+            feature,
+            bytes: own.load.bytes_per_contact,
+            bytes_saved: sample.load.bytes_per_contact - own.load.bytes_per_contact,
+            ns,
+            ns_saved: per_contact(sample) - ns,
+            bits_equal: sample.hash == own.hash,
+        })
+    };
+    Ok(forced.iter().zip(&samples[1..]).filter_map(saving).collect())
+}
+
+/// ns per contact and sweep, from the median times of the phases that sweep.
+fn per_contact(lap: &Sample) -> f64 {
+    let sweeps = Phase::ALL.iter().zip(lap.phase_ns).filter(|(phase, _)| phase.is_sweep());
+    let ns: f64 = sweeps.map(|(_, ns)| ns).sum();
+    ns / (lap.load.contacts * lap.load.sweeps).max(1.0)
+}
