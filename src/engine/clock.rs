@@ -85,6 +85,16 @@ impl Timings {
     }
 }
 
+/// What the passes of one phase request, where that is counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Requested {
+    /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
+    /// rows written.
+    pub contacts: [[f64; 4]; 3],
+    /// Bytes read and written besides: of bodies, of vectors.
+    pub bytes: [f64; 2],
+}
+
 /// Which phases of a step run: all of them, or one alone, again and again, on the records of a
 /// step that was prepared before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -106,23 +116,13 @@ impl PhaseFilter {
     }
 }
 
-/// What the passes of one phase asked for, where that is counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Asked {
-    /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
-    /// rows written.
-    pub contacts: [[f64; 4]; 3],
-    /// Bytes read and written besides: of bodies, of vectors.
-    pub bytes: [f64; 2],
-}
-
 /// Adds the time since the last lap to a phase, and counts laps; reads no clock while it is off.
 #[derive(Debug)]
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
+    requested: Requested,
     laps: [u32; Phase::ALL.len()],
-    asked: Asked,
     /// Time that the thread had waited at the last lap, where that is taken out.
     waited: Option<Duration>,
 }
@@ -134,8 +134,13 @@ impl Clock {
             let now = Instant::now();
             (now, now)
         });
-        let laps = [0; Phase::ALL.len()];
-        Clock { timings: Timings::default(), start, laps, asked: Asked::default(), waited: None }
+        Clock {
+            timings: Timings::default(),
+            start,
+            requested: Requested::default(),
+            laps: [0; Phase::ALL.len()],
+            waited: None,
+        }
     }
 
     /// Starts a step from whose times the pauses are taken out in which the thread waited for a
@@ -147,19 +152,19 @@ impl Clock {
 
     /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
     pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
-        for (sum, each) in self.asked.contacts[opposite].iter_mut().zip(per_contact) {
+        for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
             *sum += contacts as f64 * each as f64;
         }
     }
 
     /// Books bytes read and written.
     pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
-        self.asked.bytes = [0, 1].map(|k| self.asked.bytes[k] + bytes[k]);
+        self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
     }
 
     /// What has been booked.
-    pub(crate) fn asked(&self) -> Asked {
-        self.asked
+    pub(crate) fn requested(&self) -> Requested {
+        self.requested
     }
 
     /// Laps of each phase; indexed by `Phase as usize`.
