@@ -124,7 +124,7 @@ fn schema_and_reading_agree_on_every_member() {
         json!(1),
         json!(1.5),
         json!(1e-3),
-        json!(1e10),
+        json!(100),
         json!(1e39),
         json!(-1e39),
         json!([]),
