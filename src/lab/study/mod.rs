@@ -19,7 +19,7 @@ pub mod slices;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
-use crate::engine::solvers::{Variant, find};
+use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
@@ -57,6 +57,15 @@ pub const DEFAULT_SOLVERS: [&str; 6] =
 /// The rows of [`DEFAULT_SOLVERS`].
 pub fn default_solvers() -> Vec<&'static Variant> {
     DEFAULT_SOLVERS.iter().filter_map(|name| find(name).ok()).collect()
+}
+
+/// The solvers of the crate that a comparison of `ran` left out, where `ran` is the default list: who
+/// names solvers knows what is left out.
+pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
+    let is_default =
+        ran.len() == DEFAULT_SOLVERS.len() && ran.iter().all(|name| DEFAULT_SOLVERS.contains(name));
+    let others = VARIANTS.iter().map(|v| v.name).filter(|name| is_default && !ran.contains(name));
+    others.collect()
 }
 
 /// What a study tries.
@@ -462,6 +471,8 @@ mod tests {
     fn every_solver_of_the_default_list_exists() {
         assert_eq!(default_solvers().len(), DEFAULT_SOLVERS.len());
         assert!(DEFAULT_SOLVERS.contains(&crate::engine::solvers::DEFAULT));
+        assert_eq!(left_out(&DEFAULT_SOLVERS).len(), VARIANTS.len() - DEFAULT_SOLVERS.len());
+        assert!(left_out(&["pgs"]).is_empty() && left_out(&[]).is_empty());
     }
 
     #[test]
