@@ -7,8 +7,11 @@ use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
 use super::merge::MergeArgs;
 use super::profile::ProfileArgs;
+use super::replay::ReplayArgs;
+use super::report::ReportArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
+use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::values;
 use super::verify::VerifyArgs;
@@ -34,8 +37,8 @@ Examples:
 ///
 /// Without a command, runs the default study: a solver of every family on scenes that are hard or
 /// whose reference value is known, at lane widths 1, 4, 8 and 16 and three budgets each. It prints
-/// the cheapest setting that is good enough on each scene and a ranking, and writes tables.txt,
-/// study.csv, study.json, speed_vs_error.svg and profiles.svg.
+/// the cheapest setting that is good enough on each scene and a ranking, and writes report.html,
+/// tables.txt, study.csv, study.json, speed_vs_error.svg and profiles.svg.
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -56,6 +59,9 @@ pub enum Command {
     Compare(CompareArgs),
     Merge(MergeArgs),
     Run(RunArgs),
+    Snapshot(SnapshotArgs),
+    Replay(ReplayArgs),
+    Report(ReportArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),
     Converge(ConvergeArgs),

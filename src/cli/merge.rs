@@ -4,6 +4,7 @@ use super::output::print;
 use super::study;
 use crate::lab::error::Error;
 use crate::lab::report;
+use crate::lab::report::html;
 use crate::lab::report::study_file::StudyFile;
 use clap::Args;
 use std::path::PathBuf;
@@ -39,6 +40,8 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode, Error> {
     let parts = args.parts.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<String> = args.parts.iter().map(|path| path.display().to_string()).collect();
     let whole = StudyFile::merged(parts, &names)?;
+    // Those of another study there.
+    html::write_recordings(&args.out, &[])?;
     let paths = report::write_study(&args.out, &whole)?;
     if args.json {
         return print(&String::from_utf8_lossy(&whole.to_json()?));

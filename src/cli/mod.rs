@@ -14,8 +14,11 @@ pub mod merge;
 pub mod output;
 pub mod profile;
 pub mod progress;
+pub mod replay;
+pub mod report;
 pub mod run;
 pub mod savings;
+pub mod snapshot;
 pub mod study;
 pub mod values;
 pub mod verify;
@@ -69,6 +72,9 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Snapshot(args)) => snapshot::run(&args),
+        Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),

@@ -11,6 +11,7 @@ use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
+use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
@@ -20,6 +21,7 @@ use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -64,7 +66,13 @@ pub struct RunArgs {
     /// Write contact points with their impulses (N·s over the step)
     #[arg(long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
-    /// Write every K-th step [default: the last step only]
+    /// Write a recording for `simpulse replay`
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Keep contact points and impulses in the recording, too
+    #[arg(long, requires = "record")]
+    pub record_contacts: bool,
+    /// Write every K-th step [default: of CSV files the last step only, of a recording all]
     #[arg(long, value_name = "K")]
     pub every: Option<u32>,
     /// Print all phases, counts and errors
@@ -85,14 +93,20 @@ struct Found {
 
 /// Runs the scene that was asked for; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
-    let settings = settings(args)?;
+    let settings = settings(&args.setting, args.order, args.lanes)?;
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
-    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() {
-        return Err(Error::invalid("every", "needs --state or --contacts"));
+    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() && args.record.is_none() {
+        return Err(Error::invalid("every", "needs --state, --contacts or --record"));
+    }
+    let sheets = [&args.state, &args.contacts].into_iter().flatten();
+    if let Some(record) = args.record.iter().find(|record| sheets.clone().any(|s| same_file(s, record))) {
+        let message =
+            format!("'{}' is the same file as --state or --contacts; give another name", record.display());
+        return Err(Error::invalid("--record", message));
     }
     if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
         && same_file(state, contacts)
@@ -107,6 +121,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let mut contacts =
         args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
 
+    let every = args.every.unwrap_or(1);
+    let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
+        let (scene, solver) = (scene.name.clone(), world.settings.solver.name.into());
+        let caption = Caption { scene, solver, setting: how(&world.settings) };
+        // Begun now, so that a file that cannot be written is refused before the run.
+        Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
+    });
+    let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands);
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
@@ -128,6 +150,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
         bar.step(step as usize, scene.steps as usize, "steps");
         times.add(&world.timings);
+        if let Some((_, recorder)) = &mut recorder {
+            recorder.add(&world)?;
+        }
         observation.observe(&world);
         watch.observe(&world);
         angles.add(&world);
@@ -149,6 +174,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let truth = loaded.truth.as_ref().map(TruthError::of);
     let found = Found { times, errors: observation.errors(), truth, broken: watch.broken() };
     let mut written = String::new();
+    if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
+        let outcome = found.broken.map_or("holds".to_string(), |broken| broken.to_string());
+        file.write_all(&recorder.finish(&outcome)?).map_err(Error::io(path))?;
+        file.commit()?;
+        written += &format!("wrote {}\n", path.display());
+    }
     for sheet in [state, contacts].into_iter().flatten() {
         written += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;
@@ -158,12 +189,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let mut text = head(&world, scene);
     text += &if args.all { everything(&world, &found) } else { found.figures() };
-    let files = [&args.state, &args.contacts].into_iter().flatten();
+    let files = [&args.state, &args.contacts, &args.record].into_iter().flatten();
     print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
-fn settings(args: &RunArgs) -> Result<Settings, Error> {
-    let lanes = match (args.order, args.lanes) {
+/// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
+/// lanes.
+pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
+    let lanes = match (order, lanes) {
         (Order::Natural, None | Some(LaneWidth::W1)) => LaneWidth::W1,
         (Order::Natural, Some(width)) => {
             let message = format!("{}, but natural order has 1 lane", width.lanes());
@@ -173,12 +206,12 @@ fn settings(args: &RunArgs) -> Result<Settings, Error> {
     };
     Ok(Settings {
         width: lanes,
-        order: args.order,
-        budget: args.setting.budget()?,
-        parameters: args.setting.parameters()?,
+        order,
+        budget: setting.budget()?,
+        parameters: setting.parameters()?,
         record_impulses: true,
         timed: true,
-        ..Settings::new(args.setting.solver)
+        ..Settings::new(setting.solver)
     })
 }
 
@@ -257,20 +290,25 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
     }))
 }
 
-fn head(world: &World, scene: &Scene) -> String {
-    let s = &world.settings;
+/// Budget and order or lanes.
+fn how(s: &Settings) -> String {
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(s.width.lanes()),
     };
+    format!("{}, {order}", budget::brief(&s.budget, s.solver))
+}
+
+fn head(world: &World, scene: &Scene) -> String {
+    let s = &world.settings;
     format!(
-        "{}: {} bodies, {} steps of {} · {}, {}, {order}\n\n",
+        "{}: {} bodies, {} steps of {} · {}, {}\n\n",
         scene.name,
         scene.bodies.len(),
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,
-        budget::brief(&s.budget, s.solver),
+        how(s),
     )
 }
 

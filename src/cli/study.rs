@@ -11,10 +11,10 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::Override;
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer};
+use crate::lab::report::{self, answer, html};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
-use crate::lab::study::{self, Record, StudyPlan};
+use crate::lab::study::{self, Record, StudyPlan, telling};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -194,6 +194,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     plan.check()?;
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
+    html::write_recordings(&args.out, &[])?;
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
         let (plan, out, finished, elsewhere) =
@@ -210,7 +211,10 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     })?;
     drop(bar);
     let study = StudyFile::new(&plan, records, elsewhere);
-    let paths = report::write_study(&args.out, &study)?;
+    let replays = telling::recordings(&plan, &study.records)?;
+    let replays = html::write_recordings(&args.out, &replays)?;
+    let mut paths = report::write_study(&args.out, &study)?;
+    paths.extend(replays);
     drop(guard);
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));

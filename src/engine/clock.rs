@@ -85,6 +85,16 @@ impl Timings {
     }
 }
 
+/// What the passes of one phase request, where that is counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Requested {
+    /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
+    /// rows written.
+    pub contacts: [[f64; 4]; 3],
+    /// Bytes read and written besides: of bodies, of vectors.
+    pub bytes: [f64; 2],
+}
+
 /// Which phases of a step run: all of them, or one alone, again and again, on the records of a
 /// step that was prepared before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,6 +121,7 @@ impl PhaseFilter {
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
+    requested: Requested,
     laps: [u32; Phase::ALL.len()],
     /// Time that the thread had waited at the last lap, where that is taken out.
     waited: Option<Duration>,
@@ -123,7 +134,13 @@ impl Clock {
             let now = Instant::now();
             (now, now)
         });
-        Clock { timings: Timings::default(), start, laps: [0; Phase::ALL.len()], waited: None }
+        Clock {
+            timings: Timings::default(),
+            start,
+            requested: Requested::default(),
+            laps: [0; Phase::ALL.len()],
+            waited: None,
+        }
     }
 
     /// Starts a step from whose times the pauses are taken out in which the thread waited for a
@@ -131,6 +148,23 @@ impl Clock {
     /// booked; the time of the step is that of its phases.
     pub(crate) fn without_pauses() -> Self {
         Clock { waited: waited(), ..Clock::start(true) }
+    }
+
+    /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
+    pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
+        for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
+            *sum += contacts as f64 * each as f64;
+        }
+    }
+
+    /// Books bytes read and written.
+    pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
+        self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
+    }
+
+    /// What has been booked.
+    pub(crate) fn requested(&self) -> Requested {
+        self.requested
     }
 
     /// Laps of each phase; indexed by `Phase as usize`.

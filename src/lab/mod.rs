@@ -4,8 +4,10 @@
 //!
 //! ```text
 //! error  files  overrides        what can go wrong; result files; parameters by name
+//! units                          numbers for people
 //! reference  metrics             certified solutions; errors read from states
-//! scenes  capture                what is simulated, and its known truth; frozen problems
+//! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
+//! recording                      whole runs in a file, and the page that plays them
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
 //! profile                        phases against the roofline; cost by size
@@ -20,9 +22,12 @@ pub mod files;
 pub mod interned;
 pub mod metrics;
 pub mod overrides;
+pub mod picture;
 pub mod profile;
+pub mod recording;
 pub mod reference;
 pub mod report;
 pub mod scenes;
 pub mod study;
+pub mod units;
 pub mod verify;

@@ -9,3 +9,4 @@ mod shapes;
 mod soundness;
 mod structure;
 mod tutorial;
+mod types;

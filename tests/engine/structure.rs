@@ -79,9 +79,10 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "interned", "overrides"],
+    &["files", "interned", "overrides", "units"],
     &["metrics", "reference"],
-    &["scenes", "capture"],
+    &["scenes", "capture", "picture"],
+    &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
     &["profile", "compare"],

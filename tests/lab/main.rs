@@ -15,4 +15,5 @@ mod solver_rules;
 mod truth;
 mod verify;
 mod warm_starting;
+mod watch;
 mod width_invariance;

@@ -115,6 +115,49 @@ fn bytes_are_those_of_the_layout() {
     }
 }
 
+/// Nothing that a solver does is free: every phase asks for bytes, and every pass over contacts counts
+/// its operations.
+#[test]
+fn every_pass_of_every_solver_has_its_traffic() {
+    for solver in &VARIANTS {
+        let mut world = settled("pyramid:6", settings(solver), 5);
+        let mut frozen = world.hold();
+        let probes = frozen.probes();
+        assert!(probes.iter().any(|p| p.phase == Phase::Solve), "{}", solver.name);
+        for probe in probes {
+            let bytes = traffic::of(&frozen, &probe);
+            let place = format!("{} {:?}: {probe:?}", solver.name, probe.phase);
+            assert!(bytes.read > 0.0 && bytes.written > 0.0 && bytes.working_set > 0.0, "{place} {bytes:?}");
+            if probe.phase.is_sweep() {
+                // Bodies of two thirds of the contacts are gathered, or vectors are read.
+                assert!(bytes.read > 32.0 * frozen.world().counts.contacts as f64, "{place} {bytes:?}");
+                let by_contact = probe.per_contact.iter().flatten().any(|&each| each > 0.0);
+                assert_eq!(by_contact, probe.operations.is_some_and(|o| o.flops() > 0), "{place}");
+            }
+        }
+    }
+}
+
+/// By hand: a Jacobi sweep gathers the sums of the bodies beside their velocities, a position sweep
+/// reads no impulse, a block sweep is as wide as a plain one.
+#[test]
+fn passes_that_are_not_plain_sweeps_ask_for_what_they_read() {
+    let per_contact = |solver: &str, phase: Phase| {
+        let mut world = settled("stack:3", settings(find(solver).unwrap()), 5);
+        probe(&mut world.hold(), phase).per_contact
+    };
+    let [dynamic, _, ground] = per_contact("pgs", Phase::Solve);
+    // Normal, friction; eight arms, two separations, four masses and four impulses.
+    assert_eq!(dynamic, [3.0 + 8.0 + 2.0 + 4.0 + 4.0, 4.0, 2.0, 2.0]);
+    assert_eq!(ground, [3.0 + 4.0 + 2.0 + 4.0 + 4.0, 4.0, 1.0, 1.0]);
+    assert_eq!(per_contact("pgs_ngs_block", Phase::Solve), [dynamic, [0.0; 4], ground]);
+    let with_sums = |[read, written, rows, halves]: [f64; 4]| [read, written, 2.0 * rows, halves];
+    assert_eq!(per_contact("jacobi", Phase::Solve), [with_sums(dynamic), [0.0; 4], with_sums(ground)]);
+    // Normal; arms, separations and masses.
+    let [dynamic, _, ground] = per_contact("pgs_ngs_block", Phase::Position);
+    assert_eq!((dynamic, ground), ([2.0 + 8.0 + 4.0, 0.0, 2.0, 2.0], [2.0 + 4.0 + 4.0, 0.0, 1.0, 1.0]));
+}
+
 /// Solvers, scenes and orders: every phase alone, counted, reset, then a whole step; the steps
 /// after that have the bits that they would have had.
 #[test]

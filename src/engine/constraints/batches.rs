@@ -1,34 +1,19 @@
 //! Which contact is in which lane: batches, segments, and the buffer that holds records.
 
 use super::features::{Features, Layout, OppositeKind};
+use super::order::SweepOrder;
+pub use super::segment::Segment;
 use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
 use std::mem::size_of_val;
+use std::ops::Range;
 
-/// Batches of one colour and one kind of body a: one kernel runs over them.
-///
-/// No dynamic body occurs twice in a segment, unless the segment is serial (width 1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Segment {
-    /// What stands opposite body b.
+/// Where a segment comes: what [`Segment`] says of it besides its records.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
     pub opposite: OppositeKind,
-    /// First lane slot (a multiple of the width).
-    pub first_lane: usize,
-    /// Lanes that hold a contact: the first ones. What the last batch has beyond is padding.
-    pub contacts: usize,
-    /// Batches of `width` lanes.
-    pub batches: usize,
-    /// Where the first record starts in the buffer, in lane vectors.
-    pub first_vector: usize,
-    /// Lane vectors of a record ([`Layout::stride`]).
-    pub stride: usize,
-}
-
-impl Segment {
-    /// How many lanes of a batch hold a contact.
-    #[inline(always)]
-    pub fn filled(&self, batch: usize, width: usize) -> usize {
-        self.contacts.saturating_sub(batch * width).min(width)
-    }
+    pub stage: u32,
+    pub level: u32,
+    pub disjoint: bool,
 }
 
 /// Constraint records of one width, with the lane each contact has.
@@ -39,6 +24,10 @@ impl Segment {
 pub struct Batches {
     width: usize,
     segments: Vec<Segment>,
+    /// `segments` in the order of a sweep, and which of them are run now.
+    visits: Vec<Segment>,
+    focus: Range<usize>,
+    order: SweepOrder,
     contact: Indices,
     row_a: Indices,
     row_b: Indices,
@@ -69,9 +58,41 @@ impl Batches {
         self.width
     }
 
-    /// What runs, in order.
+    /// All segments, as they were pushed.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
+    }
+
+    /// What a pass runs over, in order: all segments unless [`Self::arrange`] said otherwise.
+    pub fn visits(&self) -> &[Segment] {
+        &self.visits[self.focus.clone()]
+    }
+
+    /// Brings what passes run over into an order.
+    pub fn arrange(&mut self, order: SweepOrder) {
+        if order != self.order {
+            order.arrange(&self.segments, self.width, &mut self.visits);
+            self.order = order;
+        }
+        self.focus = 0..self.visits.len();
+    }
+
+    /// The rank of the first visit after those that passes run over; none if there is no other.
+    pub(super) fn next_rank(&self) -> Option<u64> {
+        self.visits.get(self.focus.end).map(|s| self.order.rank(s.stage))
+    }
+
+    /// Makes passes run over nothing; [`Self::focus_on`] goes on from the beginning.
+    pub(super) fn unfocus(&mut self) {
+        self.focus = 0..0;
+    }
+
+    /// Makes passes run over the visits of this rank that come next.
+    pub(super) fn focus_on(&mut self, rank: u64) {
+        let start = self.focus.end;
+        let of_rank = |s: &&Segment| self.order.rank(s.stage) == rank;
+        let count = self.visits[start..].iter().take_while(of_rank).count();
+        self.focus = start..start + count;
     }
 
     /// Contact in each lane; padding repeats one. `[lanes]`
@@ -120,6 +141,8 @@ impl Batches {
         assert!(width > 0, "batches without lanes");
         self.width = width;
         self.segments.clear();
+        self.visits.clear();
+        (self.focus, self.order) = (0..0, SweepOrder::Forward);
         self.contact.clear();
         self.row_a.clear();
         self.row_b.clear();
@@ -127,7 +150,8 @@ impl Batches {
     }
 
     /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
-    /// batches with lanes that point at the `inert` row.
+    /// batches with lanes that point at the `inert` row: a colour of a stage of its own, or with one
+    /// lane to a batch contacts that follow each other.
     ///
     /// # Panics
     /// If the batches have no width yet ([`Self::clear`]).
@@ -135,6 +159,19 @@ impl Batches {
         &mut self,
         opposite: OppositeKind,
         layout: &Layout,
+        contacts: impl Iterator<Item = (u32, [u32; 2])>,
+        inert: u32,
+    ) {
+        let (stage, disjoint) = (self.segments.len() as u32, self.width > 1);
+        self.push(Place { opposite, stage, level: 0, disjoint }, layout.stride, contacts, inert);
+    }
+
+    /// Appends one segment of constraints of any type with records of `stride` lane vectors; see
+    /// [`Self::push_segment`].
+    pub(super) fn push(
+        &mut self,
+        Place { opposite, stage, level, disjoint }: Place,
+        stride: usize,
         contacts: impl Iterator<Item = (u32, [u32; 2])>,
         inert: u32,
     ) {
@@ -163,9 +200,22 @@ impl Batches {
         self.contact.fill_to(end, self.contact[end - self.width]);
         self.row_a.fill_to(end, inert);
         self.row_b.fill_to(end, inert);
-        let (first_vector, stride) = (self.vectors, layout.stride);
-        self.segments.push(Segment { opposite, first_lane, contacts, batches, first_vector, stride });
+        let first_vector = self.vectors;
+        let segment =
+            Segment { opposite, first_lane, contacts, batches, first_vector, stride, stage, level, disjoint };
+        self.segments.push(segment);
+        self.visits.push(segment);
+        (self.focus, self.order) = (0..self.visits.len(), SweepOrder::Forward);
         self.vectors += batches * stride;
+    }
+
+    /// Brings segments into the order of their stages; their records stay where they are.
+    pub(super) fn sort_by_stage(&mut self) {
+        let is_later = |pair: &[Segment]| pair[0].stage > pair[1].stage;
+        if self.segments.windows(2).any(is_later) {
+            self.segments.sort_by_key(|s| s.stage);
+            self.visits.clone_from(&self.segments);
+        }
     }
 
     /// Makes room in the buffer for the records of all segments.
@@ -199,8 +249,21 @@ impl Batches {
     /// If the batches are of another width or layout, or have no buffer ([`Self::reserve_buffer`]).
     #[inline(always)]
     pub fn records_of<L: Lanes>(&mut self, segment: &Segment, layout: &Layout) -> SegmentRecords<'_, L> {
+        self.records_with_stride(segment, layout.stride)
+    }
+
+    /// As [`Self::records_of`], for records that are `stride` lane vectors long.
+    ///
+    /// # Panics
+    /// As [`Self::records_of`].
+    #[inline(always)]
+    pub fn records_with_stride<L: Lanes>(
+        &mut self,
+        segment: &Segment,
+        stride: usize,
+    ) -> SegmentRecords<'_, L> {
         assert!(self.width == L::WIDTH, "batches of {} lanes for a kernel of {}", self.width, L::WIDTH);
-        assert!(segment.stride == layout.stride, "records of another kernel's layout");
+        assert!(segment.stride == stride, "records of another kernel's layout");
         let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
         let vectors = segment.first_vector..segment.first_vector + segment.batches * segment.stride;
         let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut self.buffer);
@@ -225,10 +288,11 @@ impl Batches {
     }
 
     /// Per array, bytes held and bytes in use.
-    pub fn memory(&self) -> [(usize, usize); 5] {
+    pub fn memory(&self) -> [(usize, usize); 6] {
         let of = |list: &Indices| (list.held_bytes(), size_of_val::<[u32]>(list));
         [
             (held(&self.segments), size_of_val(self.segments.as_slice())),
+            (held(&self.visits), size_of_val(self.visits.as_slice())),
             of(&self.contact),
             of(&self.row_a),
             of(&self.row_b),

@@ -33,7 +33,7 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::NormalRule;
 use super::sweep::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
@@ -49,7 +49,9 @@ const SINGULAR: f32 = 1e-3;
 pub struct BlockSweep<R>(pub R);
 
 impl<R: NormalRule> Pass for BlockSweep<R> {
-    const COUNTED: bool = false;
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {

@@ -197,6 +197,11 @@ impl Layout {
         Layout::new(features.rotation, features.friction, points, opposite != OppositeKind::Static)
     }
 
+    /// Floats of a point's arms.
+    pub fn arms(&self) -> usize {
+        2 * self.has_arms.iter().filter(|&&has| has).count()
+    }
+
     /// Where a quantity of point `p` stands.
     #[inline(always)]
     pub const fn at(&self, p: usize, quantity: usize) -> usize {

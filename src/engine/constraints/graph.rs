@@ -23,7 +23,7 @@ pub struct Graph {
 impl Graph {
     /// Builds the graph of `edges`, given by their two bodies; what is not below `bodies` is the
     /// world, which has no edges of its own. `is_dynamic` tells which bodies are carried by others.
-    pub(super) fn build(
+    pub(crate) fn build(
         &mut self,
         bodies: usize,
         edges: impl Iterator<Item = [u32; 2]>,

@@ -6,9 +6,9 @@
 //! width; in exact arithmetic no order matters. The kernel is that of [`super::sweep`], given a store
 //! of rows that reads from one place and adds up in another.
 
-use super::features::{KernelFeatures, OnDynamic, OnKinematic, OnStatic, OppositeKind};
-use super::pass::{AnyPass, Pass, PassInput};
-use super::rules::{Rigid, Rule, Soft};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, OppositeKind};
+use super::pass::{AnyPass, Pass, PassInput, PerLane};
+use super::rules::{Relaxed, Rigid, Rule, Soft};
 use super::sweep::{INV_MASS, NormalRule, Sweep, VX, VY, W, over_segments, sweep_segment};
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
@@ -20,7 +20,11 @@ struct JacobiSweep<R> {
 }
 
 impl<R: NormalRule> Pass for JacobiSweep<R> {
-    const COUNTED: bool = false;
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Both bodies once for their velocities and once for their sums.
+        let sweep = PerLane::of_sweep(layout, R::FRICTION, opposite);
+        PerLane { rows: sweep.rows + sweep.halves, ..sweep }
+    }
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
@@ -57,40 +61,24 @@ impl JacobiRule {
     }
 }
 
-/// Another rule's line c − s v, a part of the way from the old impulse: λ + ω (c − s v − λ).
-#[derive(Clone, Copy, Debug)]
-struct Relaxed<R> {
-    rule: R,
-    factor: f32,
-}
-
-impl<R: NormalRule> NormalRule for Relaxed<R> {
-    const FRICTION: bool = R::FRICTION;
-
-    #[inline(always)]
-    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        let [constant, slope] = self.rule.line(against_static, separation, mass, old);
-        let factor = L::splat(self.factor);
-        [factor.mul_add(constant - old, old), factor * slope]
-    }
-
-    #[inline(always)]
-    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
-        L::splat(self.factor) * self.rule.tangent_slope(mass)
-    }
-}
-
 /// Sums start at zero.
 pub(super) fn begin(rows: &[BodyRow], sums: &mut Vec<BodyRow>) {
     sums.clear();
     sums.resize(rows.len(), BodyRow::default());
 }
 
-/// v ← v + Σ Δv, for every row.
-pub(super) fn finish(rows: &mut [BodyRow], sums: &[BodyRow]) {
-    for (row, sum) in rows.iter_mut().zip(sums) {
+/// v ← v + Σ Δv, for every row. Of a body that was split into n copies, each with the n-th part of its
+/// mass, the mean of the copies: v + Σ Δv/n. `masses` are the inverse masses and inertias of the whole
+/// bodies, or empty.
+pub(super) fn finish(rows: &mut [BodyRow], sums: &[BodyRow], masses: &[[f32; 2]]) {
+    for (i, (row, sum)) in rows.iter_mut().zip(sums).enumerate() {
+        let split = row.velocity[INV_MASS];
+        let share = match masses.get(i) {
+            Some(whole) if split > 0.0 => whole[0] / split,
+            _ => 1.0,
+        };
         for k in [VX, VY, W] {
-            row.velocity[k] += sum.velocity[k];
+            row.velocity[k] = share.mul_add(sum.velocity[k], row.velocity[k]);
         }
     }
 }

@@ -5,30 +5,41 @@
 //! solves), [`prepare`], [`restitution`], [`motion`]; then [`passes`], which is all that a solver
 //! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
 //! sweep; [`system`] shows the problem as vectors, [`graph`] as nodes and edges, and [`kept`]
-//! keeps a solver's own numbers. [`pass`] is how a kernel is added.
+//! keeps a solver's own numbers. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
+//! added, and [`types`] how constraints of other types join.
 
 pub mod assign;
 pub mod batches;
 pub mod block;
 pub mod bounces;
+pub mod cone;
+pub mod dense;
+pub mod descent;
 pub mod features;
 pub mod graph;
 pub mod jacobi;
 pub mod kept;
+mod masses;
 pub mod motion;
 pub mod observe;
+pub mod order;
 pub mod pass;
 pub mod passes;
 pub mod position;
+mod positional;
 pub mod prepare;
 pub mod restitution;
 pub mod rules;
+pub mod segment;
+mod sticky;
 pub mod sweep;
 pub mod system;
+pub mod types;
 
 pub use batches::Batches;
 pub use features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
-pub use pass::{AnyPass, Pass, PassInput};
+pub use order::SweepOrder;
+pub use pass::{AnyPass, Pass, PassInput, PerLane};
 pub use passes::{Passes, StepInput, WorkCount, Workspace};
 pub use position::PositionSweep;
 pub use rules::{NormalRule, Rule};

@@ -166,6 +166,11 @@ impl Motion {
         }
     }
 
+    /// Time for which bodies move with the velocities of a substep's end (s).
+    pub(super) fn after_velocities(&self) -> f32 {
+        if self.integrator == Integrator::SemiImplicitEuler { self.h } else { 0.0 }
+    }
+
     fn explicit_positions(&mut self, rows: &mut [BodyRow]) {
         if self.integrator == Integrator::ExplicitEuler {
             self.advance(rows);
@@ -179,7 +184,8 @@ impl Motion {
         }
     }
 
-    fn advance(&mut self, rows: &mut [BodyRow]) {
+    /// Δx ← Δx + h v and Δθ ← Δθ + h ω, whatever the integrator.
+    pub fn advance(&mut self, rows: &mut [BodyRow]) {
         let h = f32x4::from([self.h, self.h, self.h, 0.0]);
         match self.rotation {
             RotationUpdate::Exact => {
@@ -197,6 +203,11 @@ impl Motion {
                 }
             }
         }
+        self.hide_turns(rows);
+    }
+
+    /// Takes the turns of round bodies out of their rows, until [`Self::finish`].
+    pub(super) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
         // A contact's anchor turns with its body, as a corner does. The contact point of a disc
         // does not: it stays on the line of centres however the disc rolls. So sweeps are
         // not shown the turn of a round body; it is kept here for its pose. Without this a disc

@@ -6,7 +6,8 @@
 
 use super::batches::Batches;
 use super::bounces::Bounces;
-use super::features::{Features, Kernel, KernelFeatures};
+use super::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
+use super::kept::Kept;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 
@@ -22,17 +23,48 @@ pub struct PassInput<'a> {
     pub bounces: &'a mut Bounces,
     /// All contacts.
     pub contacts: &'a mut [Contact],
+    /// Numbers that the solver keeps per contact point and per body.
+    pub kept: &'a mut Kept,
     /// Changes of velocity in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
+}
+
+/// What a pass asks for per contact; see [`crate::engine::clock::Clock::book`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PerLane {
+    /// Floats of records that are read.
+    pub floats_read: usize,
+    /// Floats of records that are written.
+    pub floats_written: usize,
+    /// Rows of bodies that are gathered (32 B each).
+    pub rows: usize,
+    /// Halves of rows that are written back (16 B each).
+    pub halves: usize,
+}
+
+impl PerLane {
+    /// A pass that gathers the bodies of a contact once and writes back a half row of each that moves.
+    pub fn of_bodies(floats_read: usize, floats_written: usize, opposite: OppositeKind) -> Self {
+        let rows = 1 + usize::from(opposite != OppositeKind::Static);
+        let halves = 1 + usize::from(opposite == OppositeKind::Dynamic);
+        PerLane { floats_read, floats_written, rows, halves }
+    }
+
+    /// A velocity sweep: normal and friction; arms, separation, masses and impulses of each point.
+    pub fn of_sweep(layout: &Layout, friction: bool, opposite: OppositeKind) -> Self {
+        let friction = layout.has_friction && friction;
+        let impulses = if friction { 2 } else { 1 };
+        let read = 2 + usize::from(friction) + layout.points * (layout.arms() + 1 + 2 * impulses);
+        Self::of_bodies(read, layout.points * impulses, opposite)
+    }
 }
 
 /// A pass over contacts, compiled per width and features.
 ///
 /// To add one, implement this; [`super::sweep::Sweep`] is the example.
 pub trait Pass {
-    /// Whether there is an instance that counts operations, for profiles. Kernels that are not
-    /// profiled are compiled faster without.
-    const COUNTED: bool = true;
+    /// What it asks for per contact with records of this layout.
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
     /// Runs over all segments of `on.batches`, in order.
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>);
@@ -49,15 +81,22 @@ pub struct PassWidth {
 
 /// A [`Pass`] behind a pointer: what [`super::Passes::run`] takes.
 pub trait AnyPass {
+    /// [`Pass::traffic`]
+    fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
+
     /// Runs the instance for this width and these features.
     fn run_at(&self, width: PassWidth, features: &Features, on: PassInput<'_>);
 }
 
 impl<P: Pass> AnyPass for P {
+    fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        self.traffic(layout, opposite)
+    }
+
     fn run_at(&self, width: PassWidth, features: &Features, on: PassInput<'_>) {
         match width.width {
             #[cfg(feature = "count")]
-            LaneWidth::W1 if width.counted && P::COUNTED => {
+            LaneWidth::W1 if width.counted => {
                 with_features::<P, crate::engine::lanes::Counted>(self, features, on);
             }
             LaneWidth::W1 => with_features::<P, f32>(self, features, on),

@@ -3,23 +3,30 @@
 use super::batches::Batches;
 use super::block::BlockSweep;
 use super::bounces::Bounces;
-use super::features::Features;
+use super::descent::Blocks;
+use super::features::{Features, Layout};
 use super::graph::Graph;
 use super::jacobi::{self, JacobiRule};
 use super::kept::Kept;
+use super::masses::EffectiveMasses;
 use super::motion::Motion;
 use super::observe::ObservedRule;
-use super::pass::{AnyPass, PassInput, PassWidth};
+use super::order::SweepOrder;
+use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
 use super::position::PositionSweep;
+use super::positional::{AfterDisplacing, Displace};
 use super::prepare::{Prepare, Store};
 use super::restitution;
-use super::rules::{Rigid, Rule};
+use super::rules::{NormalRule, Rule};
+use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
-use super::system::System;
+use super::system::{Pair, System};
+use super::types::{Joined, TypeInput};
 use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth};
+use crate::engine::lanes::{BodyRow, LaneWidth, held};
 use crate::engine::params::{Budget, Parameters};
+use std::fmt;
 
 /// Everything a step works on, kept from step to step so that nothing is allocated.
 #[derive(Debug, Default)]
@@ -42,10 +49,35 @@ pub struct Workspace {
     pub kept: Kept,
     /// Which constraints each body has.
     pub graph: Graph,
+    /// Constraints of other types than contacts.
+    pub types: Vec<Joined>,
+    /// Called after each iteration of a solver.
+    pub watch: Option<Watch>,
+    /// Vectors that solvers have given back.
+    pub vectors: Vec<Vec<Pair>>,
+    /// Inverse masses and inertias of the rows while they are scaled; else empty.
+    pub masses: Vec<[f32; 2]>,
     /// Keep the rule of the last velocity sweep in `last_rule`.
     pub observe: bool,
     /// See `observe`.
     pub last_rule: Option<ObservedRule>,
+}
+
+/// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
+pub struct Watch(pub Box<dyn FnMut(u32, &mut System<'_>)>);
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Watch")
+    }
+}
+
+impl Workspace {
+    /// Bytes held by what only some solvers have.
+    pub fn own_bytes(&self) -> usize {
+        let vectors: usize = self.vectors.iter().map(held).sum();
+        self.kept.held_bytes() + self.graph.held_bytes() + vectors + held(&self.masses)
+    }
 }
 
 /// What a step did.
@@ -89,6 +121,8 @@ pub struct Passes<'a> {
     input: &'a StepInput,
     width: LaneWidth,
     count: WorkCount,
+    iterations: u32,
+    order: SweepOrder,
 }
 
 impl<'a> Passes<'a> {
@@ -103,15 +137,17 @@ impl<'a> Passes<'a> {
         input: &'a StepInput,
         width: LaneWidth,
     ) -> Self {
-        let mut passes = Passes { work, contacts, clock, input, width, count: WorkCount::default() };
+        let (count, order) = (WorkCount::default(), SweepOrder::Forward);
+        let mut passes = Passes { work, contacts, clock, input, width, count, iterations: 0, order };
+        passes.set_order(SweepOrder::Forward);
         // A phase that is repeated finds the records, and the check, of the step before it.
         if passes.input.phases.runs(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
                 batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
-            passes.over_batches(&Prepare);
+            passes.over_batches(Phase::Prepare, &Prepare);
             if input.features.restitution {
-                passes.over_batches(&restitution::Begin { h: input.h });
+                passes.over_contacts(&restitution::Begin { h: input.h });
             }
             passes.clock.lap(Phase::Prepare);
         }
@@ -131,6 +167,17 @@ impl<'a> Passes<'a> {
     /// The solver's own parameter of this index in [`crate::engine::solvers::Variant::parameters`].
     pub fn parameter(&self, index: usize) -> f32 {
         self.input.parameters[index]
+    }
+
+    /// Points of all contacts.
+    pub fn points(&self) -> usize {
+        self.input.points
+    }
+
+    /// How long a body moves with the velocity of [`Self::integrate_velocities`] (s): h, or 0 where it has
+    /// moved before (explicit Euler).
+    pub fn motion_after_velocities(&self) -> f32 {
+        self.work.motion.after_velocities()
     }
 
     /// Body pass: v ← damped v + h a.
@@ -170,7 +217,12 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: applies the accumulated impulses.
     pub fn warm_start(&mut self) {
-        self.run(Phase::WarmStart, &WarmStart);
+        self.run(Phase::WarmStart, &WarmStart { turned: false });
+    }
+
+    /// As [`Self::warm_start`], with arms that have turned with their bodies since the step began.
+    pub fn warm_start_turned(&mut self) {
+        self.run(Phase::WarmStart, &WarmStart { turned: true });
     }
 
     /// Constraint pass: one velocity sweep under `rule`, Gauss–Seidel, booked on `phase`.
@@ -187,7 +239,7 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
     /// together; see [`super::block`].
-    pub fn block_sweep(&mut self, phase: Phase, rule: Rigid) {
+    pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         if self.run(phase, &BlockSweep(rule)) {
             self.solved(&Sweep(rule));
         }
@@ -200,10 +252,141 @@ impl<'a> Passes<'a> {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
-        rule.with_pass(relaxation, |pass| self.over_batches(pass));
-        jacobi::finish(&mut self.work.rows, &self.work.sums);
+        rule.with_pass(relaxation, |pass| self.over_batches(phase, pass));
+        // Sums are cleared, read, and added to velocities.
+        let row = size_of::<BodyRow>() as f64;
+        self.book_rows([row, 1.5 * row]);
+        jacobi::finish(&mut self.work.rows, &self.work.sums, &self.work.masses);
         self.clock.lap(phase);
         self.solved(rule.rule().sweep());
+    }
+
+    /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart; the law of the
+    /// solver is that of its other sweeps.
+    pub fn push_sweep(&mut self, phase: Phase, rule: &Rule) {
+        if self.run(phase, rule.sweep()) {
+            self.count_sweep(if self.input.features.friction && rule.sweep().has_friction() { 2 } else { 1 });
+        }
+    }
+
+    /// Puts velocities and impulses aside, lets `solve` find others that begin at zero, moves bodies by
+    /// them for one substep and brings back those that were put aside. Booked on `phase`.
+    pub fn with_pseudo_velocities(&mut self, phase: Phase, solve: impl FnOnce(&mut Self)) {
+        if !self.input.phases.runs(phase) {
+            return;
+        }
+        let (mut impulses, zero) = (self.vector(), self.vector());
+        let mut system = self.system();
+        system.impulses(&mut impulses);
+        system.set_impulses(&zero);
+        let Workspace { rows, sums, .. } = &mut *self.work;
+        sums.clone_from(rows);
+        rows.iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
+        solve(self);
+        let Workspace { rows, sums, motion, .. } = &mut *self.work;
+        motion.advance(rows);
+        for (row, before) in rows.iter_mut().zip(sums.iter()) {
+            row.velocity = before.velocity;
+        }
+        self.system().set_impulses(&impulses);
+        self.give_back([impulses, zero]);
+        let row = size_of::<BodyRow>() as f64;
+        self.book_rows([2.0 * row, 2.0 * row]);
+        self.clock.lap(phase);
+    }
+
+    /// Body pass: marks where bodies are, for [`Self::displacing_sweep`] to displace them from there.
+    pub fn begin_displacing(&mut self) {
+        self.over_bodies(Phase::Integrate, |work| work.sums.clone_from(&work.rows));
+    }
+
+    /// Constraint pass: displaces bodies that overlap or slip, see [`super::positional`]; `first` in each
+    /// substep, and overlap removed at `push_speed` (m/s) at most.
+    pub fn displacing_sweep(&mut self, push_speed: f32, first: bool) {
+        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, first }) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Body pass: v ← v + (x − x_marked)/h.
+    pub fn velocities_from_displacements(&mut self) {
+        let inv_h = 1.0 / self.input.h;
+        self.over_bodies(Phase::Integrate, |work| {
+            for (row, marked) in work.rows.iter_mut().zip(&work.sums) {
+                for k in 0..3 {
+                    row.velocity[k] = (row.delta[k] - marked.delta[k]).mul_add(inv_h, row.velocity[k]);
+                }
+            }
+        });
+    }
+
+    /// Constraint pass: takes the normal velocity of points that were displaced, and kinetic friction.
+    pub fn displaced_velocity_sweep(&mut self) {
+        if self.run(Phase::Solve, &AfterDisplacing) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Constraint pass: a sweep whose friction holds places, see [`super::sticky`]: removes `fraction` of an
+    /// overlap and `stick` of a drift per substep, overlap at `push_speed` (m/s) at most, drift of points
+    /// within `reach` (m).
+    pub fn sticky_sweep(&mut self, phase: Phase, fraction: f32, push_speed: f32, stick: f32, reach: f32) {
+        if self.run(phase, &StickySweep { h: self.input.h, fraction, push_speed, stick, reach }) {
+            self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+        }
+    }
+
+    /// Constraint pass: books how far points have drifted in this step, at its end.
+    pub fn book_drift(&mut self, reach: f32) {
+        if self.input.features.friction {
+            self.run(Phase::Store, &BookDrift { reach });
+        }
+    }
+
+    /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
+    pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
+        if !self.input.phases.runs(phase) {
+            return;
+        }
+        let Workspace { rows, graph, kept, motion, .. } = &mut *self.work;
+        work(&mut Blocks {
+            rows,
+            graph,
+            kept,
+            contacts: self.contacts,
+            increments: motion.velocity_increments(),
+            rotation: self.input.features.rotation,
+            friction: self.input.features.friction,
+        });
+        // Each contact point is looked at from both of its bodies, and its numbers are kept.
+        let (points, size) = (2.0 * self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
+        self.clock.book_bytes([points * (2.0 * (32.0 + 32.0) + 2.0 * size), points * size]);
+        self.book_rows([32.0, 16.0]);
+        self.clock.lap(phase);
+    }
+
+    /// Writes impulses (N·s) that `of` reads from what is kept per point into the records, rounded into
+    /// their cones, for who asks what the contacts bore.
+    pub fn keep_impulses(&mut self, phase: Phase, of: impl Fn(&[f32]) -> Pair) {
+        if !self.input.phases.runs(phase) {
+            return;
+        }
+        let mut impulses = self.vector();
+        for (contact, c) in self.contacts.iter().enumerate() {
+            for p in 0..c.manifold.count as usize {
+                let [normal, tangent] = of(self.work.kept.point(contact, p));
+                let bound = c.friction * normal;
+                impulses[2 * contact + p] = [normal, tangent.min(bound).max(-bound)];
+            }
+        }
+        self.system().set_impulses(&impulses);
+        self.give_back([impulses]);
+        self.clock.lap(phase);
+    }
+
+    /// Body pass: takes the turns of round bodies out of their rows, as moving them by velocities does.
+    pub fn hide_turns(&mut self) {
+        self.over_bodies(Phase::Integrate, |work| work.motion.hide_turns(&mut work.rows));
     }
 
     /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.
@@ -220,9 +403,94 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return false;
         }
-        self.over_batches(pass);
+        self.over_batches(phase, pass);
         self.clock.lap(phase);
         true
+    }
+
+    /// The order of the passes that follow, until the next call or the end of the step.
+    pub fn set_order(&mut self, order: SweepOrder) {
+        let Workspace { lanes, serial, types, .. } = &mut *self.work;
+        lanes.arrange(order);
+        serial.arrange(order);
+        types.iter_mut().for_each(|joined| joined.arrange(order));
+        self.order = order;
+    }
+
+    /// Multiplies inverse masses and inertias by `factor(body, graph)`, from what they are without
+    /// any, and lets the effective masses of the contacts follow that the order has. Until
+    /// [`Self::restore_masses`] a Jacobi sweep takes a factor n for n copies of a body.
+    pub fn scale_masses(&mut self, phase: Phase, factor: impl Fn(usize, &Graph) -> f32) {
+        if !self.input.phases.runs(phase) {
+            return;
+        }
+        let Workspace { rows, masses, graph, .. } = &mut *self.work;
+        if masses.is_empty() {
+            masses.extend(rows.iter().map(|row| [row.velocity[3], row.delta[3]]));
+        }
+        let bodies = rows.len() - 1;
+        for (i, (row, whole)) in rows[..bodies].iter_mut().zip(masses.iter()).enumerate() {
+            let factor = factor(i, graph);
+            (row.velocity[3], row.delta[3]) = (factor * whole[0], factor * whole[1]);
+        }
+        self.book_rows([32.0, 32.0]);
+        self.over_contacts(&EffectiveMasses);
+        self.clock.lap(phase);
+    }
+
+    /// Ends what [`Self::scale_masses`] began.
+    pub fn restore_masses(&mut self, phase: Phase) {
+        self.scale_masses(phase, |_, _| 1.0);
+        if self.input.phases.runs(phase) {
+            self.work.masses.clear();
+        }
+    }
+
+    /// Levels of the contact graph: 1 unless [`crate::engine::solvers::Variant::by_levels`] is set.
+    pub fn levels(&self) -> u32 {
+        let segments = self.work.lanes.segments().iter().chain(self.work.serial.segments());
+        1 + segments.map(|s| s.level).max().unwrap_or(0)
+    }
+
+    /// Ends an iteration, in the solver's own sense of the word.
+    pub fn iteration_done(&mut self) {
+        self.iterations += 1;
+        if let Some(mut watch) = self.work.watch.take() {
+            let iteration = self.iterations;
+            (watch.0)(iteration, &mut self.system());
+            self.work.watch = Some(watch);
+        }
+    }
+
+    /// The greatest violation of the rigid contact law now (N·s), see [`System::residual`].
+    pub fn residual(&mut self) -> f64 {
+        let h = self.h();
+        self.system().residual(h)
+    }
+
+    /// A vector over contact points, all zero. Given back by [`Self::give_back`], it is not allocated
+    /// again in the next step.
+    pub fn vector(&mut self) -> Vec<Pair> {
+        let mut vector = self.work.vectors.pop().unwrap_or_default();
+        vector.clear();
+        vector.resize(2 * self.contacts.len(), [0.0; 2]);
+        vector
+    }
+
+    /// Takes vectors back.
+    pub fn give_back<const N: usize>(&mut self, vectors: [Vec<Pair>; N]) {
+        // The last one out is the first one in, so that each finds its own length again.
+        self.work.vectors.extend(vectors.into_iter().rev());
+    }
+
+    /// Work on vectors, booked on `phase`; not done while another phase is repeated alone.
+    pub fn with_system<T: Default>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
+        if !self.input.phases.runs(phase) {
+            return T::default();
+        }
+        let result = work(&mut self.system());
+        self.clock.lap(phase);
+        result
     }
 
     /// Counts a sweep that solved `rows_per_point` rows at each contact point.
@@ -234,11 +502,11 @@ impl<'a> Passes<'a> {
     /// All impulses and velocities as vectors, in an order that no width changes.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, .. } = &mut *self.work;
-        System::new(rows, [lanes, serial], self.contacts, &self.input.features)
+        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock)
     }
 
-    /// Which contacts each body has.
-    pub fn graph(&mut self) -> &Graph {
+    /// Finds out which contacts each body has.
+    pub fn build_graph(&mut self) -> &Graph {
         let bodies = self.work.rows.len() - 1;
         let dynamic = |body: u32| self.work.rows[body as usize].velocity[3] > 0.0;
         self.work.graph.build(bodies, self.contacts.iter().map(|c| [c.body_a, c.body_b]), dynamic);
@@ -254,9 +522,9 @@ impl<'a> Passes<'a> {
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
         if self.input.features.restitution && self.input.phases.runs(Phase::Restitution) {
-            self.over_batches(&restitution::Track);
+            self.over_contacts(&restitution::Track);
             if substep + 1 == self.input.budget.substeps {
-                self.over_batches(&restitution::Apply { h: self.input.h });
+                self.over_contacts(&restitution::Apply { h: self.input.h });
                 self.count_sweep(1);
             }
             self.clock.lap(Phase::Restitution);
@@ -282,11 +550,12 @@ impl<'a> Passes<'a> {
 
     /// Writes accumulated impulses back to the contacts; returns what was done.
     pub fn finish(mut self) -> WorkCount {
+        self.set_order(SweepOrder::Forward);
         if self.input.phases.runs(Phase::Store) {
             if self.input.features.restitution {
-                self.over_batches(&restitution::Forget);
+                self.over_contacts(&restitution::Forget);
             }
-            self.over_batches(&Store);
+            self.over_batches(Phase::Store, &Store);
             self.clock.lap(Phase::Store);
         }
         self.count
@@ -308,22 +577,118 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Coloured batches at the width of the step, then serial ones at one lane.
-    fn over_batches(&mut self, pass: &dyn AnyPass) {
-        let width = PassWidth { width: self.width, counted: self.input.phases.counted };
-        let serial = PassWidth { width: LaneWidth::W1, counted: false };
-        let Workspace { rows, sums, motion, lanes, serial: one, lane_bounces, serial_bounces, .. } =
+    /// Coloured batches at the width of the step, then serial ones at one lane; in reverse order the
+    /// other way round. Constraints of other types take part.
+    fn over_batches(&mut self, phase: Phase, pass: &dyn AnyPass) {
+        if self.work.types.is_empty() {
+            return self.over_contacts(pass);
+        }
+        for part in self.parts() {
+            let order = self.order;
+            for batches in self.all(part) {
+                batches.unfocus();
+            }
+            while let Some(rank) = self.all(part).filter_map(|batches| batches.next_rank()).min() {
+                self.over_types(phase, part, rank);
+                let batches = part.of(&mut self.work.lanes, &mut self.work.serial);
+                if batches.next_rank() == Some(rank) {
+                    batches.focus_on(rank);
+                    self.over_part(part, pass);
+                }
+            }
+            self.all(part).for_each(|batches| batches.arrange(order));
+        }
+    }
+
+    /// As [`Self::over_batches`], over contacts alone.
+    fn over_contacts(&mut self, pass: &dyn AnyPass) {
+        for part in self.parts() {
+            self.over_part(part, pass);
+        }
+    }
+
+    /// Constraints of other types that come at this rank.
+    fn over_types(&mut self, phase: Phase, part: Part, rank: u64) {
+        let width = self.width_of(part);
+        let Workspace { rows, types, .. } = &mut *self.work;
+        for Joined { kind, lanes, serial } in types {
+            let batches = part.of(lanes, serial);
+            if batches.next_rank() == Some(rank) {
+                batches.focus_on(rank);
+                kind.run(TypeInput { phase, h: self.input.h, width, rows, batches });
+            }
+        }
+    }
+
+    fn over_part(&mut self, part: Part, pass: &dyn AnyPass) {
+        let width = self.width_of(part);
+        let Workspace { rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, .. } =
             &mut *self.work;
-        for (width, batches, bounces) in [(width, lanes, lane_bounces), (serial, one, serial_bounces)] {
-            let on = PassInput {
-                rows,
-                sums,
-                batches,
-                bounces,
-                contacts: self.contacts,
-                increments: motion.velocity_increments(),
-            };
-            pass.run_at(width, &self.input.features, on);
+        let (batches, bounces) = match part {
+            Part::Lanes => (lanes, lane_bounces),
+            Part::Serial => (serial, serial_bounces),
+        };
+        if self.input.phases.counted {
+            for segment in batches.visits() {
+                let layout = Layout::for_features(&self.input.features, segment.opposite);
+                let PerLane { floats_read, floats_written, rows, halves } =
+                    pass.traffic_of(&layout, segment.opposite);
+                let each = [floats_read, floats_written, rows, halves];
+                self.clock.book(segment.opposite as usize, segment.contacts, each);
+            }
+        }
+        let on = PassInput {
+            rows,
+            sums,
+            batches,
+            bounces,
+            contacts: self.contacts,
+            increments: motion.velocity_increments(),
+            kept,
+        };
+        pass.run_at(width, &self.input.features, on);
+    }
+
+    fn parts(&self) -> [Part; 2] {
+        match self.order {
+            SweepOrder::Reverse => [Part::Serial, Part::Lanes],
+            _ => [Part::Lanes, Part::Serial],
+        }
+    }
+
+    fn width_of(&self, part: Part) -> PassWidth {
+        match part {
+            Part::Lanes => PassWidth { width: self.width, counted: self.input.phases.counted },
+            Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+        }
+    }
+
+    /// Batches of every type of constraint.
+    fn all(&mut self, part: Part) -> impl Iterator<Item = &mut Batches> {
+        let Workspace { lanes, serial, types, .. } = &mut *self.work;
+        let types = types.iter_mut().map(move |t| part.of(&mut t.lanes, &mut t.serial));
+        types.chain([part.of(lanes, serial)])
+    }
+
+    /// Books bytes read and written of each row.
+    fn book_rows(&mut self, bytes: [f64; 2]) {
+        let rows = self.work.rows.len() as f64;
+        self.clock.book_bytes(bytes.map(|b| rows * b));
+    }
+}
+
+/// The two sets of batches.
+#[derive(Clone, Copy)]
+enum Part {
+    Lanes,
+    Serial,
+}
+
+impl Part {
+    fn of<'b>(self, lanes: &'b mut Batches, serial: &'b mut Batches) -> &'b mut Batches {
+        match self {
+            Part::Lanes => lanes,
+            Part::Serial => serial,
         }
     }
 }

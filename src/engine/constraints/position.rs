@@ -24,7 +24,7 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, for_each_batch, over_moving_segments, spin,
     to_frame, turn, with_arms,
@@ -45,6 +45,11 @@ pub struct PositionSweep {
 }
 
 impl Pass for PositionSweep {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Normal; arms, separation and mass of each point.
+        PerLane::of_bodies(2 + layout.points * (layout.arms() + 2), 0, opposite)
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         position_sweep::<L, F>(on.rows, on.batches, *self);
     }

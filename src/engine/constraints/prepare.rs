@@ -2,7 +2,7 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::over_segments;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
@@ -109,6 +109,12 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 pub struct Prepare;
 
 impl Pass for Prepare {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // The index of the contact; the masses of bodies that have one.
+        let rows = 1 + usize::from(opposite == OppositeKind::Dynamic);
+        PerLane { floats_read: 1, floats_written: layout.stride, rows, halves: 0 }
+    }
+
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         prepare::<L, F>(on.rows, on.batches, on.contacts);
@@ -129,6 +135,11 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
 pub struct Store;
 
 impl Pass for Store {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        let impulses = layout.points * if layout.has_friction { 2 } else { 1 };
+        PerLane { floats_read: 1 + impulses, ..PerLane::default() }
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         store::<L, F>(on.batches, on.contacts);
     }
@@ -136,8 +147,8 @@ impl Pass for Store {
 
 /// Writes the accumulated impulses of all segments back to their contacts.
 pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut [Contact]) {
-    for i in 0..batches.segments().len() {
-        let segment = batches.segments()[i];
+    for i in 0..batches.visits().len() {
+        let segment = batches.visits()[i];
         store_segment::<L>(batches, &segment, &N::layout(segment.opposite), contacts);
     }
 }

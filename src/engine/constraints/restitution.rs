@@ -30,7 +30,7 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::bounces::Bounces;
 use super::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
-use super::pass::{Pass, PassInput};
+use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
@@ -44,6 +44,12 @@ pub struct Begin {
 }
 
 impl Pass for Begin {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let bounce = 1 + 2 * layout.points;
+        let read = 2 + layout.points * (layout.arms() + 1);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, bounce, opposite) }
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
     }
@@ -53,6 +59,10 @@ impl Pass for Begin {
 pub struct Track;
 
 impl Pass for Track {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        PerLane { floats_read: 2 * layout.points, floats_written: layout.points, ..PerLane::default() }
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         track::<L, F>(on.batches, on.bounces);
     }
@@ -65,6 +75,14 @@ pub struct Apply {
 }
 
 impl Pass for Apply {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Bodies are gathered for each point: to look, and to push.
+        let read = 3 + layout.points * (layout.arms() + 5);
+        let once = PerLane::of_bodies(read, layout.points, opposite);
+        let rows = layout.points * (once.rows + once.halves);
+        PerLane { rows, halves: layout.points * once.halves, ..once }
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         apply::<L, F>(on.rows, on.batches, on.bounces, self.h);
     }
@@ -74,6 +92,12 @@ impl Pass for Apply {
 pub struct Forget;
 
 impl Pass for Forget {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        let impulses = if layout.has_friction { 2 } else { 1 };
+        let floats = layout.points * impulses;
+        PerLane { floats_read: floats + 2 * layout.points, floats_written: floats, ..PerLane::default() }
+    }
+
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         forget::<L, F>(on.batches, on.bounces);
     }
@@ -93,8 +117,8 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     h: f32,
 ) {
     bounces.reserve(batches.lanes(), N::POINTS);
-    for i in 0..batches.segments().len() {
-        let segment = batches.segments()[i];
+    for i in 0..batches.visits().len() {
+        let segment = batches.visits()[i];
         let layout = N::layout(segment.opposite);
         prepare_segment::<L>(rows, batches, &segment, &layout, bounces, contacts, increments, h);
     }
@@ -189,8 +213,8 @@ fn each_record<L: Lanes>(
     layout_of: LayoutOf,
     mut visit: impl FnMut(&mut [L], &mut [L], &Layout),
 ) {
-    for i in 0..batches.segments().len() {
-        let segment = batches.segments()[i];
+    for i in 0..batches.visits().len() {
+        let segment = batches.visits()[i];
         let layout = layout_of(segment.opposite);
         let records = batches.records_of::<L>(&segment, &layout).records.chunks_exact_mut(layout.stride);
         for (record, bounce) in records.zip(bounces.of::<L>(&segment, layout.points)) {
@@ -206,8 +230,8 @@ pub fn apply<L: Lanes, N: KernelFeatures>(
     bounces: &mut Bounces,
     h: f32,
 ) {
-    for i in 0..batches.segments().len() {
-        let segment = batches.segments()[i];
+    for i in 0..batches.visits().len() {
+        let segment = batches.visits()[i];
         apply_segment::<L>(rows, batches, &segment, &N::layout(segment.opposite), bounces, h);
     }
 }

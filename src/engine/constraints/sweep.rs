@@ -74,14 +74,14 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
-use super::pass::{AnyPass, Pass, PassInput};
+use super::pass::{AnyPass, Pass, PassInput, PerLane};
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
 macro_rules! over_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        for i in 0..$batches.segments().len() {
-            let segment = $batches.segments()[i];
+        for i in 0..$batches.visits().len() {
+            let segment = $batches.visits()[i];
             match segment.opposite {
                 OppositeKind::Dynamic => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
                 OppositeKind::Kinematic => $kernel::<$l, $n, OnKinematic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
@@ -96,8 +96,8 @@ pub(super) use over_segments;
 /// so that nothing changes it. For kernels that seldom run: an instance less.
 macro_rules! over_moving_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        for i in 0..$batches.segments().len() {
-            let segment = $batches.segments()[i];
+        for i in 0..$batches.visits().len() {
+            let segment = $batches.visits()[i];
             match segment.opposite {
                 OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
                 _ => $kernel::<$l, $n, OnDynamic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
@@ -115,6 +115,8 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     const FRICTION: bool;
     /// Whether the rule reads the separation.
     const SEPARATION: bool = true;
+    /// Whether arms turn with their bodies within the step.
+    const TURNED: bool = false;
 
     /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
     /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
@@ -150,6 +152,10 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
 pub struct Sweep<R>(pub R);
 
 impl<R: NormalRule> Pass for Sweep<R> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
+
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         self.0.sweep::<L, F>(on.rows, on.batches);
@@ -192,6 +198,15 @@ pub(super) fn turn<L: Lanes>(angle: L) -> (L, L) {
     let sine = angle * square.neg_mul_add(L::splat(1.0 / 6.0), L::splat(1.0));
     let versine = square * square.neg_mul_add(L::splat(1.0 / 24.0), L::splat(0.5));
     (sine, versine)
+}
+
+/// Arms r × n and r × t of bodies a and b, turned by Δθ (see [`super::position`]):
+/// R r × n = cos Δθ (r × n) + sin Δθ (r × t), R r × t = cos Δθ (r × t) − sin Δθ (r × n).
+#[inline(always)]
+pub(super) fn turned<L: Lanes>(arm_n: [L; 2], arm_t: [L; 2], sine: [L; 2], versine: [L; 2]) -> [[L; 2]; 2] {
+    let n = |k: usize| sine[k].mul_add(arm_t[k], versine[k].neg_mul_add(arm_n[k], arm_n[k]));
+    let t = |k: usize| sine[k].neg_mul_add(arm_n[k], versine[k].neg_mul_add(arm_t[k], arm_t[k]));
+    [[n(0), n(1)], [t(0), t(1)]]
 }
 
 /// The two bodies of a batch, in registers.
@@ -338,15 +353,18 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
 
         let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());
         for p in 0..N::POINTS {
-            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
-            let arm_t = arms::<L, N, O>(record, &layout, p, 1);
-            (normal.arm[p], tangent.arm[p]) = (arm_n, arm_t);
+            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let mut arm_t = arms::<L, N, O>(record, &layout, p, 1);
             let mut separation = L::zero();
             if R::SEPARATION {
                 separation = record[layout.at(p, layout.separation)] + moved;
                 separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
                 separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             }
+            if R::TURNED {
+                [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+            }
+            (normal.arm[p], tangent.arm[p]) = (arm_n, arm_t);
             let mass = record[layout.at(p, layout.normal_mass)];
             let old = record[layout.at(p, layout.normal_impulse)];
             let [constant, slope] = rule.line(!O::MOVES, separation, mass, old);
@@ -443,6 +461,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
+    is_turned: bool,
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
@@ -452,13 +471,19 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
         let mut w = [a[W], b[W]];
         let (mut sum_n, mut sum_t) = (L::zero(), L::zero());
         for p in 0..N::POINTS {
+            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let mut arm_t = arms::<L, N, O>(record, &layout, p, 1);
+            if is_turned && N::ROTATION {
+                let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+                [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+            }
             let normal = record[layout.at(p, layout.normal_impulse)];
             sum_n = sum_n + normal;
-            spin::<L, N, O>(&mut w, inertia, arms::<L, N, O>(record, &layout, p, 0), normal);
+            spin::<L, N, O>(&mut w, inertia, arm_n, normal);
             if N::FRICTION {
                 let tangent = record[layout.at(p, layout.tangent_impulse)];
                 sum_t = sum_t + tangent;
-                spin::<L, N, O>(&mut w, inertia, arms::<L, N, O>(record, &layout, p, 1), tangent);
+                spin::<L, N, O>(&mut w, inertia, arm_t, tangent);
             }
         }
         apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
@@ -511,18 +536,38 @@ pub fn sweep_store<L: Lanes, N: KernelFeatures, R: NormalRule, S: RowStore>(
     over_segments!(sweep_segment, L, N, R, S; rows, batches, rule);
 }
 
-/// The warm start: applies the accumulated impulses.
-pub struct WarmStart;
+/// The warm start: applies the accumulated impulses, with the arms of the start of the step or with
+/// arms that turn with their bodies.
+pub struct WarmStart {
+    /// Arms turn.
+    pub turned: bool,
+}
 
 impl Pass for WarmStart {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Without friction only the arms along the normal.
+        let impulses = if layout.has_friction { 2 } else { 1 };
+        let arms = if layout.has_friction { layout.arms() } else { layout.arms() / 2 };
+        PerLane::of_bodies(2 + layout.points * (impulses + arms), 0, opposite)
+    }
+
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        warm_start::<L, F>(on.rows, on.batches);
+        if self.turned {
+            warm_start_turned::<L, F>(on.rows, on.batches);
+        } else {
+            warm_start::<L, F>(on.rows, on.batches);
+        }
     }
 }
 
 /// Applies all accumulated impulses.
 #[inline(never)]
 pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
-    over_segments!(warm_start_segment, L, N; rows, batches);
+    over_segments!(warm_start_segment, L, N; rows, batches, false);
+}
+
+#[inline(never)]
+fn warm_start_turned<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
+    over_moving_segments!(warm_start_segment, L, N; rows, batches, true);
 }

@@ -8,6 +8,7 @@
 
 use super::batches::Batches;
 use super::features::Features;
+use crate::engine::clock::Clock;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
 
@@ -20,6 +21,7 @@ pub struct System<'a> {
     batches: [&'a mut Batches; 2],
     contacts: &'a [Contact],
     features: &'a Features,
+    clock: &'a mut Clock,
 }
 
 impl<'a> System<'a> {
@@ -28,8 +30,9 @@ impl<'a> System<'a> {
         batches: [&'a mut Batches; 2],
         contacts: &'a [Contact],
         features: &'a Features,
+        clock: &'a mut Clock,
     ) -> Self {
-        System { rows, batches, contacts, features }
+        System { rows, batches, contacts, features, clock }
     }
 
     /// Entries of every vector over contact points: two a contact.
@@ -51,7 +54,10 @@ impl<'a> System<'a> {
     pub fn impulses(&mut self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
-        self.each_record(|at, normal, tangent| to[at] = [*normal, tangent.map_or(0.0, |t| *t)]);
+        self.book_points([8.0, 8.0]);
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
+            to[at] = [*normal, tangent.map_or(0.0, |t| *t)];
+        });
     }
 
     /// Replaces all accumulated impulses (N·s); velocities stay as they are.
@@ -60,7 +66,8 @@ impl<'a> System<'a> {
     /// If `from` is not [`Self::len`] long.
     pub fn set_impulses(&mut self, from: &[Pair]) {
         assert_eq!(from.len(), self.len(), "a vector over contact points has two entries a contact");
-        self.each_record(|at, normal, tangent| {
+        self.book_points([8.0, 8.0]);
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
             *normal = from[at][0];
             if let Some(tangent) = tangent {
                 *tangent = from[at][1];
@@ -69,15 +76,13 @@ impl<'a> System<'a> {
     }
 
     /// J v: how fast the surfaces part and slide at each point (m/s).
-    pub fn relative_velocities(&self, to: &mut Vec<Pair>) {
+    pub fn relative_velocities(&mut self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
-        for (at, [a, b], [along_n, along_t], [arms_n, arms_t]) in self.points() {
-            let (va, vb) = (self.row(a).velocity, self.row(b).velocity);
-            let d = [vb[0] - va[0], vb[1] - va[1]];
-            let along =
-                |u: [f32; 2], arms: Pair| u[0] * d[0] + u[1] * d[1] + vb[2] * arms[1] - va[2] * arms[0];
-            to[at] = [along(along_n, arms_n), along(along_t, arms_t)];
+        self.book_points([GEOMETRY, 8.0]);
+        let view = self.view();
+        for (at, bodies, axes, arms) in view.points() {
+            to[at] = view.velocity(bodies, axes, arms);
         }
     }
 
@@ -87,9 +92,10 @@ impl<'a> System<'a> {
     /// If `delta` is not [`Self::len`] long.
     pub fn apply(&mut self, delta: &[Pair]) {
         assert_eq!(delta.len(), self.len(), "a vector over contact points has two entries a contact");
+        self.book_points([8.0 + GEOMETRY, 32.0]);
         for contact in 0..self.contacts.len() {
             for p in 0..self.contacts[contact].manifold.count as usize {
-                let (at, [a, b], [n, t], [arms_n, arms_t]) = self.point(contact, p);
+                let (at, [a, b], [n, t], [arms_n, arms_t]) = self.view().point(contact, p);
                 let [normal, tangent] = delta[at];
                 let push = [normal * n[0] + tangent * t[0], normal * n[1] + tangent * t[1]];
                 for (body, sign, side) in [(a, -1.0, 0), (b, 1.0, 1)] {
@@ -112,21 +118,25 @@ impl<'a> System<'a> {
     /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly
     /// where a rigid sweep would change nothing.
     pub fn residual(&mut self, h: f32) -> f64 {
-        let (mut impulses, mut velocities) = (Vec::new(), Vec::new());
-        self.impulses(&mut impulses);
-        self.relative_velocities(&mut velocities);
+        self.book_points([128.0, 0.0]);
+        let view = Points { rows: self.rows, contacts: self.contacts, features: self.features };
         let mut worst = 0.0_f64;
-        for (at, bodies, _, arms) in self.points() {
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
             let contact = &self.contacts[at / 2];
+            if at % 2 >= contact.manifold.count as usize {
+                return;
+            }
+            let (_, bodies, axes, arms) = view.point(at / 2, at % 2);
+            let [vn, vt] = view.velocity(bodies, axes, arms).map(f64::from);
             let gap = contact.manifold.points[at % 2].separation.max(0.0) / h;
-            let ([normal, tangent], [vn, vt]) = (impulses[at].map(f64::from), velocities[at].map(f64::from));
-            let mass = arms.map(|arms| self.effective_mass(bodies, arms));
+            let (normal, tangent) = (f64::from(*normal), tangent.map_or(0.0, |t| f64::from(*t)));
+            let mass = arms.map(|arms| view.effective_mass(bodies, arms));
             let wanted = (normal - mass[0] * (vn + f64::from(gap))).max(0.0);
             let bound = f64::from(contact.friction) * normal.max(0.0);
             let held = (tangent - mass[1] * vt).max(-bound).min(bound);
             let friction = if self.features.friction { (tangent - held).abs() } else { 0.0 };
             worst = worst.max((normal - wanted).abs()).max(friction);
-        }
+        });
         worst
     }
 
@@ -137,6 +147,69 @@ impl<'a> System<'a> {
         x.iter().zip(y).map(product).sum()
     }
 
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point; zero of absent ones.
+    pub fn gaps_and_friction(&self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        for (at, ..) in self.view().points() {
+            let contact = &self.contacts[at / 2];
+            let friction = if self.features.friction { contact.friction } else { 0.0 };
+            to[at] = [contact.manifold.points[at % 2].separation, friction];
+        }
+    }
+
+    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg); zero of
+    /// absent ones.
+    pub fn effective_masses(&self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        let view = self.view();
+        for (at, bodies, _, arms) in view.points() {
+            to[at] = arms.map(|arms| view.effective_mass(bodies, arms) as f32);
+        }
+    }
+
+    /// What the Jacobian of a point is made of; see [`PointRows`].
+    pub fn point_rows(&self) -> impl Iterator<Item = PointRows> {
+        self.view().points().map(|(at, bodies, axes, arms)| PointRows { at, bodies, axes, arms })
+    }
+
+    fn view(&self) -> Points<'_> {
+        Points { rows: self.rows, contacts: self.contacts, features: self.features }
+    }
+
+    /// Books bytes read and written of each contact point.
+    fn book_points(&mut self, bytes: [f64; 2]) {
+        let points = self.len() as f64;
+        self.clock.book_bytes(bytes.map(|b| points * b));
+    }
+}
+
+/// The normal and the tangential row of one contact point.
+#[derive(Clone, Copy, Debug)]
+pub struct PointRows {
+    /// Its place in vectors.
+    pub at: usize,
+    /// Bodies a and b; what is no row is the world.
+    pub bodies: [u32; 2],
+    /// n and t.
+    pub axes: [[f32; 2]; 2],
+    /// `[r_a × u, r_b × u]` for u = n and t (m).
+    pub arms: [Pair; 2],
+}
+
+/// Bytes of a point's geometry and its two bodies.
+const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
+
+/// What does not change while impulses do.
+#[derive(Clone, Copy)]
+struct Points<'a> {
+    rows: &'a [BodyRow],
+    contacts: &'a [Contact],
+    features: &'a Features,
+}
+
+impl<'a> Points<'a> {
     /// 1/(J M⁻¹ Jᵀ) of one row (kg).
     fn effective_mass(&self, [a, b]: [u32; 2], arms: Pair) -> f64 {
         let (a, b) = (self.row(a), self.row(b));
@@ -150,8 +223,16 @@ impl<'a> System<'a> {
         self.rows.get(body as usize).copied().unwrap_or_default()
     }
 
+    /// How fast the surfaces part and slide at a point (m/s).
+    fn velocity(&self, [a, b]: [u32; 2], [n, t]: [[f32; 2]; 2], [arms_n, arms_t]: [Pair; 2]) -> Pair {
+        let (va, vb) = (self.row(a).velocity, self.row(b).velocity);
+        let d = [vb[0] - va[0], vb[1] - va[1]];
+        let along = |u: [f32; 2], arms: Pair| u[0] * d[0] + u[1] * d[1] + vb[2] * arms[1] - va[2] * arms[0];
+        [along(n, arms_n), along(t, arms_t)]
+    }
+
     /// Every point in use, see [`Self::point`].
-    fn points(&self) -> impl Iterator<Item = (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2])> {
+    fn points(self) -> impl Iterator<Item = (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2])> + use<'a> {
         self.contacts
             .iter()
             .enumerate()
@@ -167,25 +248,29 @@ impl<'a> System<'a> {
         let arms = |u: glam::Vec2| [point.anchor_a, point.anchor_b].map(|r| turns * r.perp_dot(u));
         (2 * contact + p, [c.body_a, c.body_b], [n.to_array(), t.to_array()], [arms(n), arms(t)])
     }
+}
 
-    /// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point.
-    fn each_record(&mut self, mut visit: impl FnMut(usize, &mut f32, Option<&mut f32>)) {
-        for batches in &mut self.batches {
-            let width = batches.width();
-            batches.for_each_lane(self.features, |contact, layout, record, lane| {
-                for p in 0..layout.points.min(2) {
-                    let normal = layout.at(p, layout.normal_impulse) * width + lane;
-                    let tangent = layout.at(p, layout.tangent_impulse) * width + lane;
-                    let at = 2 * contact as usize + p;
-                    if layout.has_friction {
-                        let [normal, tangent] =
-                            record.get_disjoint_mut([normal, tangent]).expect("two places in a record");
-                        visit(at, normal, Some(tangent));
-                    } else {
-                        visit(at, &mut record[normal], None);
-                    }
+/// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point of every record.
+fn each_record(
+    batches: &mut [&mut Batches; 2],
+    features: &Features,
+    mut visit: impl FnMut(usize, &mut f32, Option<&mut f32>),
+) {
+    for batches in batches {
+        let width = batches.width();
+        batches.for_each_lane(features, |contact, layout, record, lane| {
+            for p in 0..layout.points.min(2) {
+                let normal = layout.at(p, layout.normal_impulse) * width + lane;
+                let tangent = layout.at(p, layout.tangent_impulse) * width + lane;
+                let at = 2 * contact as usize + p;
+                if layout.has_friction {
+                    let [normal, tangent] =
+                        record.get_disjoint_mut([normal, tangent]).expect("two places in a record");
+                    visit(at, normal, Some(tangent));
+                } else {
+                    visit(at, &mut record[normal], None);
                 }
-            });
-        }
+            }
+        });
     }
 }

@@ -64,6 +64,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     softness: Some(angular_frequencies),
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "diverges where a body has three contacts or more"),
@@ -82,6 +83,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
             passes.jacobi_sweep(Phase::Solve, soft, relaxation);
+            passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {

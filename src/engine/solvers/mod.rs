@@ -16,21 +16,61 @@ use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::{Budget, MAX_PARAMETERS, Parameter, Parameters};
 
+pub mod admm;
+pub mod anderson;
+pub mod apgd;
+pub mod avbd;
+pub mod box2d;
+pub mod direct;
 pub mod jacobi;
+pub mod local_gs;
+pub mod mass_splitting;
+pub mod nncg;
 pub mod pgs;
+pub mod pgs_ngs;
 pub mod pgs_ngs_block;
+pub mod pgs_soft;
 pub mod projection;
+pub mod random_order;
+pub mod rapier;
+pub mod shock;
 pub mod soft_step;
+pub mod sor;
+pub mod split_impulse;
+pub mod symmetric_gs;
 pub mod tgs_ngs;
+pub mod tgs_soft;
+pub mod tgs_sticky;
+pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 6] = [
+pub static VARIANTS: [&Variant; 26] = [
     &projection::SOLVER,
     &pgs::SOLVER,
+    &pgs_ngs::SOLVER,
     &pgs_ngs_block::SOLVER,
+    &pgs_soft::SOLVER,
+    &symmetric_gs::SOLVER,
+    &sor::SOLVER,
+    &random_order::SOLVER,
+    &local_gs::SOLVER,
+    &nncg::SOLVER,
+    &anderson::SOLVER,
+    &apgd::SOLVER,
+    &admm::SOLVER,
+    &direct::SOLVER,
+    &shock::SOLVER,
+    &split_impulse::SOLVER,
     &jacobi::SOLVER,
+    &mass_splitting::SOLVER,
     &tgs_ngs::SOLVER,
+    &tgs_soft::SOLVER,
+    &tgs_sticky::SOLVER,
+    &xpbd::SOLVER,
+    &avbd::SOLVER,
     &soft_step::SOLVER,
+    &box2d::SOLVER,
+    &rapier::SOLVER,
 ];
 
 /// The solver that is used where none is named.
@@ -87,6 +127,9 @@ pub struct Variant {
     /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
     /// such a contact gives way, and metrics tell that from error.
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
+    /// Contacts are grouped by their level in the contact graph, see
+    /// [`crate::engine::constraints::SweepOrder::Level`].
+    pub by_levels: bool,
     /// What it keeps from step to step beside impulses.
     pub kept: KeptSize,
     /// What it cannot promise, and why.

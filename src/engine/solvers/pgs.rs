@@ -56,6 +56,7 @@ pub static SOLVER: Variant = Variant {
         trials: &[],
     }],
     softness: None,
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     step,
@@ -69,6 +70,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
         }
         passes.integrate_positions();
         passes.end_substep(substep);

@@ -37,6 +37,7 @@ pub static SOLVER: Variant = Variant {
         trials: &[],
     }],
     softness: None,
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
@@ -59,6 +60,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
             passes.block_sweep(Phase::Solve, rigid);
+            passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.position_iterations {

@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[],
     softness: None,
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "no friction and no warm starting")],
     step,
@@ -49,6 +50,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         for _ in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &touching);
+            passes.iteration_done();
         }
         passes.end_substep(substep);
     }

@@ -63,6 +63,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     softness: Some(angular_frequencies),
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[],
     step,
@@ -82,6 +83,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         for _ in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &soft);
+            passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {

@@ -37,6 +37,7 @@ pub static SOLVER: Variant = Variant {
         trials: &[],
     }],
     softness: None,
+    by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "jitters at its standard budget")],
     step,
@@ -60,6 +61,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         for _ in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rigid);
+            passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.position_iterations {

@@ -21,7 +21,8 @@ use super::World;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::{Features, WorkCount, Workspace};
+use crate::engine::constraints::kept::Kept;
+use crate::engine::constraints::{Features, OppositeKind, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
@@ -43,10 +44,11 @@ struct Saved {
     proxies: Vec<Proxy>,
     fat_boxes: FatBoxes,
     counts: StepCounts,
+    kept: Kept,
 }
 
 /// What a step does in one phase.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
     /// The phase.
     pub phase: Phase,
@@ -58,6 +60,11 @@ pub struct Probe {
     pub operations: Option<Operations>,
     /// Contacts on which they were counted: those that have a colour.
     pub counted_contacts: usize,
+    /// Per pass and contact, by kind of body a: floats of records read and written, rows gathered, half
+    /// rows written.
+    pub per_contact: [[f64; 4]; 3],
+    /// Bytes of bodies and vectors read and written, per pass.
+    pub bytes: [f64; 2],
 }
 
 impl World {
@@ -69,6 +76,7 @@ impl World {
             proxies: self.proxies.clone(),
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
+            kept: self.work.kept.clone(),
         };
         let timings = self.timings;
         self.frozen_step();
@@ -205,7 +213,24 @@ impl HeldWorld<'_> {
         let counted_contacts = self.world.work.lanes.lanes();
         let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
         let rows = count.row_updates / passes.max(1) as usize;
-        (passes > 0).then_some(Probe { phase, passes, rows, operations, counted_contacts })
+        let requested = clock.requested();
+        let times = f64::from(passes.max(1));
+        let per_contact = OppositeKind::ALL.map(|kind| {
+            let batches = [&self.world.work.lanes, &self.world.work.serial];
+            let of_kind = batches.into_iter().flat_map(|b| b.segments()).filter(|s| s.opposite == kind);
+            let contacts = of_kind.map(|s| s.contacts).sum::<usize>().max(1) as f64;
+            requested.contacts[kind as usize].map(|sum| sum / contacts / times)
+        });
+        let bytes = requested.bytes.map(|sum| sum / times);
+        (passes > 0).then_some(Probe {
+            phase,
+            passes,
+            rows,
+            operations,
+            counted_contacts,
+            per_contact,
+            bytes,
+        })
     }
 
     /// What the constraints of the step need.
@@ -242,5 +267,6 @@ impl Drop for HeldWorld<'_> {
         self.world.fat_boxes.clone_from(&self.before.fat_boxes);
         self.world.pairs_are_stale = true;
         self.world.counts = self.before.counts;
+        self.world.work.kept.clone_from(&self.before.kept);
     }
 }

@@ -5,30 +5,36 @@ use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::assign::Sides;
 use crate::engine::constraints::bounces::Bounces;
 use crate::engine::constraints::{Features, OppositeKind};
-use crate::engine::contacts::Contact;
 
 impl World {
     /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
-        let choice = Some((self.settings.width, self.settings.order, *features));
+        let by_levels = self.settings.solver.by_levels;
+        let choice = Some((self.settings.width, self.settings.order, by_levels, *features));
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
         let kinds = &self.bodies.kind;
-        let opposite = |contact: &Contact| match kinds[contact.body_a as usize] {
+        let opposite = |body: u32| match kinds[body as usize] {
             BodyKind::Dynamic => OppositeKind::Dynamic,
             BodyKind::Kinematic => OppositeKind::Kinematic,
             BodyKind::Static => OppositeKind::Static,
         };
-        let sides = Sides { bodies: kinds.len(), opposite };
         let (work, contacts) = (&mut self.work, &self.contacts);
+        let mut graph = std::mem::take(&mut work.graph);
+        if by_levels {
+            let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
+            graph.build(kinds.len(), contacts.iter().map(|c| [c.body_a, c.body_b]), is_dynamic);
+        }
+        let sides = Sides { bodies: kinds.len(), opposite, levels: by_levels.then_some(&graph) };
         match self.settings.order {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);
             }
             Order::Colored => self.assignment.colored(work, self.settings.width, features, contacts, &sides),
         }
+        work.graph = graph;
         self.counts.colors = self.assignment.colors;
         self.counts.overflow = self.assignment.overflow;
         self.counts.lane_slots = work.lanes.lanes() + work.serial.lanes();

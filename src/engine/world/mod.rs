@@ -10,6 +10,7 @@ use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::assign::Assignment;
 use crate::engine::constraints::motion::{self, MotionInput};
 use crate::engine::constraints::observe::ObservedRule;
+use crate::engine::constraints::types::{ConstraintType, Joined};
 use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
@@ -77,7 +78,7 @@ pub struct World {
     narrow: Narrow,
     assignment: Assignment,
     /// What the present lanes were assigned for.
-    lanes_are_for: Option<(LaneWidth, Order, Features)>,
+    lanes_are_for: Option<(LaneWidth, Order, bool, Features)>,
     work: Workspace,
 }
 
@@ -141,6 +142,13 @@ impl World {
         self.features = self.traits.features();
         self.pairs_are_stale = true;
         index
+    }
+
+    /// Adds constraints of another type than contacts. They take part in every pass of the solver; a
+    /// [`HeldWorld`] does not bring back what they keep.
+    pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
+        self.work.types.push(Joined::new(kind));
+        self.lanes_are_for = None;
     }
 
     /// What the scene needs of its constraints.

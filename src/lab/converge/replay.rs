@@ -8,6 +8,7 @@
 use super::setup;
 use crate::engine::clock::{Clock, PhaseFilter};
 use crate::engine::constraints::assign::{Assignment, Sides};
+use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
 use crate::engine::contacts::Contact;
@@ -147,7 +148,7 @@ impl<'a> Replay<'a> {
 
     /// One step of `variant` with `budget`, from the problem's start.
     pub fn run(&mut self, variant: &Variant, budget: Budget, start: Start) -> Outcome {
-        self.reset(start);
+        self.reset(variant, start);
         self.work.observe = true;
         self.work.last_rule = None;
         let input = StepInput { budget, ..self.input };
@@ -165,7 +166,7 @@ impl<'a> Replay<'a> {
 
     /// Time of one such step, its preparation included.
     pub fn time(&mut self, variant: &Variant, budget: Budget, start: Start) -> Duration {
-        self.reset(start);
+        self.reset(variant, start);
         self.work.observe = false;
         let input = StepInput { budget, ..self.input };
         let mut clock = Clock::start(false);
@@ -174,8 +175,10 @@ impl<'a> Replay<'a> {
         begin.elapsed()
     }
 
-    fn reset(&mut self, start: Start) {
+    fn reset(&mut self, variant: &Variant, start: Start) {
         self.work.rows.clone_from(&self.rows);
+        self.work.kept = Kept::default();
+        self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
         self.scratch.clone_from(&self.contacts);
         if start == Start::Cold {
             for point in self.scratch.iter_mut().flat_map(|c| &mut c.manifold.points) {
@@ -201,7 +204,7 @@ impl<'a> Replay<'a> {
         };
         let row = |(i, c): (usize, &ProblemContact)| {
             let contact = &self.scratch[self.places[i].0];
-            let against_static = opposite(self.problem, contact) != OppositeKind::Dynamic;
+            let against_static = opposite(self.problem, contact.body_a) != OppositeKind::Dynamic;
             match rule.law(against_static, moved(c) as f32, 1.0 / diagonal[i][0]) {
                 Some(law) => OwnRow { bias: law.bias, compliance: law.compliance },
                 None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
@@ -215,7 +218,7 @@ impl<'a> Replay<'a> {
     fn assign_lanes(&mut self, sequence: Sequence) {
         let problem = self.problem;
         let sides =
-            Sides { bodies: problem.bodies.len(), opposite: |contact: &Contact| opposite(problem, contact) };
+            Sides { bodies: problem.bodies.len(), opposite: |body| opposite(problem, body), levels: None };
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let mut assignment = Assignment::default();
         if sequence == Sequence::Colored {
@@ -228,8 +231,8 @@ impl<'a> Replay<'a> {
 }
 
 /// What stands opposite the dynamic body of a contact.
-fn opposite(problem: &ContactProblem, contact: &Contact) -> OppositeKind {
-    match problem.bodies.get(contact.body_a as usize) {
+fn opposite(problem: &ContactProblem, body_a: u32) -> OppositeKind {
+    match problem.bodies.get(body_a as usize) {
         None => OppositeKind::Static,
         Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
         Some(_) => OppositeKind::Dynamic,

@@ -59,7 +59,15 @@ mod tests {
     #[test]
     fn the_lower_ceiling_binds_if_half_of_it_is_reached() {
         let phase = |pass_ns: f64, flops: Option<f64>| PhaseReport {
-            probe: Probe { phase: Phase::Solve, passes: 1, rows: 1, operations: None, counted_contacts: 1 },
+            probe: Probe {
+                phase: Phase::Solve,
+                passes: 1,
+                rows: 1,
+                operations: None,
+                counted_contacts: 1,
+                per_contact: [[0.0; 4]; 3],
+                bytes: [0.0; 2],
+            },
             // 100 ns at 10 GB/s.
             traffic: Traffic { read: 1000.0, written: 0.0, working_set: 1000.0 },
             pass_ns,

@@ -44,32 +44,6 @@ const HALF: f64 = ROW / 2.0;
 /// The quads of a contact that the narrow phase and preparation share.
 const MANIFOLD: f64 = 16.0 * (quad::HEADER + 1) as f64;
 
-/// Bytes per lane of a pass over constraints.
-struct PerLane {
-    /// Floats of the record that are read, and that are written.
-    floats: [usize; 2],
-    /// Rows gathered, and half rows written back.
-    rows: [usize; 2],
-}
-
-/// Floats that a pass reads and writes in a record of this layout.
-fn floats(phase: Phase, layout: &Layout, friction: bool) -> [usize; 2] {
-    let points = layout.points;
-    let arms = 2 * layout.has_arms.iter().filter(|&&has| has).count();
-    let impulses = if friction { 2 } else { 1 };
-    match phase {
-        // Normal, friction; arms, separation, masses and impulses of each point.
-        Phase::Solve | Phase::Relax => {
-            let read = 2 + usize::from(friction) + points * (arms + 1 + 2 * impulses);
-            [read, points * impulses]
-        }
-        // Without friction only the arms along the normal.
-        Phase::WarmStart => [2 + points * (impulses + if layout.has_friction { arms } else { arms / 2 }), 0],
-        Phase::Position => [2 + points * (arms + 2), 0],
-        _ => [0, 0],
-    }
-}
-
 /// Bytes of one pass of a phase.
 pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
     let (world, work, features) = (frozen.world(), frozen.workspace(), frozen.features());
@@ -95,11 +69,7 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
         Phase::Prepare => {
             // Velocities, masses, forces, gravity: nine floats and two flags; then row and velocity increment.
             let load = in_and_out(bodies * 38.0, rows * (ROW + HALF + damping));
-            let per_lane = |layout: &Layout, opposite| PerLane {
-                floats: [1, layout.stride],
-                rows: [1 + usize::from(opposite == OppositeKind::Dynamic), 0],
-            };
-            let records = constraints(frozen, per_lane);
+            let records = constraints(frozen, probe);
             Traffic {
                 read: load.read + MANIFOLD * contacts + records.read,
                 written: load.written + records.written,
@@ -117,40 +87,17 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
         Phase::Store => {
             let layout = Layout::for_features(&features, OppositeKind::Dynamic);
             let floats = (layout.points * if features.friction { 2 } else { 1 }) as f64;
-            let lanes = world.counts.lane_slots as f64;
+            let records = constraints(frozen, probe);
             // Impulses to contacts; velocities, four parts of the position and the rotation to bodies.
             let turned = if world.features().rotation { 8.0 } else { 0.0 };
             Traffic {
-                read: lanes * 4.0 * (1.0 + floats) + moving * (24.0 + 16.0 + turned),
+                read: records.read + moving * (24.0 + 16.0 + turned),
                 written: world.contacts.len() as f64 * 4.0 * floats + moving * (12.0 + 16.0 + turned),
                 working_set: used("records") + MANIFOLD * contacts + moving * (ROW + 28.0 + turned),
             }
         }
-        Phase::Restitution => {
-            let substeps = f64::from(world.settings.budget.substeps);
-            let layout = Layout::for_features(&features, OppositeKind::Dynamic);
-            let points = layout.points as f64;
-            let lanes = world.counts.lane_slots as f64;
-            // Every substep reads an impulse and keeps the largest; the last one also reads each
-            // point's record and energy, gathers both rows twice per point and applies an impulse.
-            let track = in_and_out(lanes * points * 8.0, lanes * points * 4.0);
-            let record = 4.0 * (2.0 + 4.0 + 3.0 + 3.0);
-            Traffic {
-                read: substeps * track.read + lanes * points * (record + 4.0 * ROW + 16.0),
-                written: substeps * track.written + lanes * points * (4.0 + 2.0 * HALF),
-                working_set: used("records") + rows * ROW,
-            }
-        }
-        Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position => {
-            let friction = match probe.phase {
-                Phase::Solve | Phase::Relax => probe.rows > world.counts.points,
-                _ => features.friction,
-            };
-            let sweep = constraints(frozen, |layout, opposite| {
-                let moves = usize::from(opposite == OppositeKind::Dynamic);
-                let has_row = usize::from(opposite != OppositeKind::Static);
-                PerLane { floats: floats(probe.phase, layout, friction), rows: [1 + has_row, 1 + moves] }
-            });
+        Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position | Phase::Restitution => {
+            let sweep = constraints(frozen, probe);
             Traffic { working_set: used_by_sweeps(frozen) + rows * ROW, ..sweep }
         }
     }
@@ -162,16 +109,16 @@ fn used_by_sweeps(frozen: &HeldWorld<'_>) -> f64 {
     (work.lanes.bytes() + work.serial.bytes()) as f64
 }
 
-fn constraints(frozen: &HeldWorld<'_>, per_lane: impl Fn(&Layout, OppositeKind) -> PerLane) -> Traffic {
-    let (work, features) = (frozen.workspace(), frozen.features());
-    let mut sum = Traffic::default();
+/// What a pass asks for of records, rows and vectors, padding included.
+fn constraints(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
+    let work = frozen.workspace();
+    let mut sum = Traffic { read: probe.bytes[0], written: probe.bytes[1], working_set: 0.0 };
     for batches in [&work.lanes, &work.serial] {
         for segment in batches.segments() {
-            let layout = Layout::for_features(&features, segment.opposite);
-            let PerLane { floats, rows } = per_lane(&layout, segment.opposite);
+            let [floats_read, floats_written, rows, halves] = probe.per_contact[segment.opposite as usize];
             let lanes = (segment.batches * batches.width()) as f64;
-            sum.read += lanes * (4.0 * (floats[0] + rows[0]) as f64 + ROW * rows[0] as f64);
-            sum.written += lanes * (4.0 * floats[1] as f64 + HALF * rows[1] as f64);
+            sum.read += lanes * (4.0 * (floats_read + rows) + ROW * rows);
+            sum.written += lanes * (4.0 * floats_written + HALF * halves);
         }
     }
     sum

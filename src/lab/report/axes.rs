@@ -3,6 +3,7 @@
 //! Axes are drawn here and not by the chart builder, so that a panel of any range has
 //! readable ticks within tight limits.
 
+use super::style::Style;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -24,9 +25,15 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(160, 160, 40),
 ];
 
-/// The colour of the solver at this index.
-pub fn color(solver: usize) -> RGBColor {
-    COLORS[solver % COLORS.len()]
+/// The colour of the curve at this index, where curves are no solvers.
+pub fn color(curve: usize) -> RGBColor {
+    COLORS[curve % COLORS.len()]
+}
+
+/// The colour of a solver, the same in every plot.
+pub fn solver_color(solver: &str) -> RGBColor {
+    let crate::lab::picture::Color(r, g, b, _) = Style::of(solver).rgb();
+    RGBColor(r, g, b)
 }
 
 /// A logarithmic axis.
@@ -100,8 +107,8 @@ pub fn solver_legend(
     mut x: i32,
     y: i32,
 ) -> Result<i32, Box<dyn std::error::Error>> {
-    for (i, name) in solvers.iter().enumerate() {
-        area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], color(i).stroke_width(3)))?;
+    for name in solvers {
+        area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], solver_color(name).stroke_width(3)))?;
         write(area, name, (x + 32, y), 14, HPos::Left)?;
         x += 56 + 7 * name.chars().count() as i32;
     }

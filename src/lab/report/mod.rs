@@ -5,12 +5,14 @@ pub(crate) mod axes;
 pub mod columns;
 pub mod environment;
 pub mod export;
+pub mod html;
 pub mod plot;
 pub mod profiles;
 pub mod savings;
 pub mod study_file;
+pub mod style;
 pub mod table;
-pub mod units;
+pub use crate::lab::units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
@@ -31,9 +33,9 @@ pub fn tables(records: &[Record]) -> String {
 }
 
 /// Writes `tables.txt`, `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into
-/// `folder`; returns their paths.
+/// `folder`, and the [page](html) made from them and what else is there; returns their paths.
 ///
-/// All are made before the first is written.
+/// All but the page are made before the first is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let records = &study.records;
     let contents = [
@@ -50,5 +52,6 @@ pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Err
         files::write(&path, &bytes)?;
         paths.push(path);
     }
+    paths.push(html::write(folder, study)?);
     Ok(paths)
 }

@@ -6,7 +6,7 @@
 //! and between them there is nothing.
 
 use super::axes::{
-    Area, Drawn, GRID, INK, Scale, color, marker, solver_legend, wrapped, write, write_upwards,
+    Area, Drawn, GRID, INK, Scale, marker, solver_color, solver_legend, wrapped, write, write_upwards,
 };
 use super::units::si_short;
 use crate::engine::world::Order;
@@ -47,7 +47,7 @@ fn draw(records: &[Record], text: &mut String) -> Drawn {
         write(&root, &scene[0].scene, (8, top + 18), 17, HPos::Left)?;
         for (j, axis) in ErrorAxis::ALL.into_iter().enumerate() {
             let corner = (PANEL_WIDTH * j as i32, top + TITLE_HEIGHT);
-            panel(&root, corner, axis, scene, &solvers)?;
+            panel(&root, corner, axis, scene)?;
         }
     }
     root.present()?;
@@ -71,7 +71,7 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
     )
 }
 
-fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record], solvers: &[&str]) -> Drawn {
+fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -> Drawn {
     let curves = curves(records, axis);
     let samples = || curves.iter().flat_map(|c| &c.samples);
     let (left, top) = (corner.0 + LEFT, corner.1);
@@ -100,9 +100,8 @@ fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record], s
         write(area, line, ((left + right) / 2, bottom + 29 + 15 * i as i32), 13, HPos::Center)?;
     }
     for curve in &curves {
-        let solver = solvers.iter().position(|&s| s == curve.solver).unwrap_or(0);
         let at = |time, error| (errors.pixel(error, left, right), times.pixel(time, bottom, top));
-        draw_curve(area, curve, &color(solver), at)?;
+        draw_curve(area, curve, &solver_color(curve.solver), at)?;
     }
     Ok(())
 }

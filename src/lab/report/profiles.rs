@@ -1,6 +1,6 @@
 //! `profiles.svg` and the slices: solvers compared over all scenes.
 
-use super::axes::{Area, Drawn, GRID, INK, Scale, color, solver_legend, write, write_upwards};
+use super::axes::{Area, Drawn, GRID, INK, Scale, solver_color, solver_legend, write, write_upwards};
 use super::table::{finish, table};
 use super::units::{digits, si};
 use crate::lab::error::Error;
@@ -73,7 +73,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
     write_upwards(area, &format!("share of {} scenes", profile.scenes), (x + 14, (top + bottom) / 2), 12)?;
     write(area, "time, in times that of the fastest", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
-    for (i, (_, ratios)) in profile.ratios.iter().enumerate() {
+    for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
         // Steps that coincide stay visible beside each other.
         let shift = 2 * i as i32 - profile.ratios.len() as i32;
         let at = |factor: f64, share: f64| (scale.pixel(factor, left, right), y(share) + shift);
@@ -83,7 +83,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
             line.push(at(ratio, profile.share(i, ratio)));
         }
         line.push((right, line[line.len() - 1].1));
-        area.draw(&PathElement::new(line, color(i).stroke_width(2)))?;
+        area.draw(&PathElement::new(line, solver_color(solver).stroke_width(2)))?;
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ pub mod ranking;
 pub mod record;
 pub mod savings;
 pub mod slices;
+pub mod telling;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;

@@ -1,6 +1,6 @@
 //! Rigid contacts with Baumgarte stabilisation.
 
-use super::Rule;
+use super::{Relaxed, Rule};
 use crate::engine::constraints::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
@@ -27,8 +27,24 @@ impl Baumgarte {
     /// Removes `fraction` of the overlap beyond `slop` (m) in each substep of `h` (s), at
     /// `push_speed` (m/s) at most.
     pub fn rule(fraction: f32, slop: f32, push_speed: f32, h: f32) -> Rule {
+        Rule::Baumgarte(Sweep(Self::new(fraction, slop, push_speed, h)))
+    }
+
+    /// As [`Self::rule`], as it is.
+    pub fn new(fraction: f32, slop: f32, push_speed: f32, h: f32) -> Self {
         let inv_h = 1.0 / h;
-        Rule::Baumgarte(Sweep(Baumgarte { inv_h, rate: fraction * inv_h, slop, push_speed }))
+        Baumgarte { inv_h, rate: fraction * inv_h, slop, push_speed }
+    }
+
+    /// b (m/s) at a separation (m).
+    pub fn bias(&self, separation: f32) -> f32 {
+        -self.line::<f32>(false, separation, 1.0, 0.0)[0]
+    }
+
+    /// As [`Self::rule`], with the factor `relaxation` on what each row asks for.
+    pub fn relaxed(fraction: f32, slop: f32, push_speed: f32, h: f32, relaxation: f32) -> Rule {
+        let rule = Self::new(fraction, slop, push_speed, h);
+        Rule::BaumgarteRelaxed(Sweep(Relaxed { rule, factor: relaxation }))
     }
 }
 

@@ -7,12 +7,14 @@ mod baumgarte;
 mod rigid;
 mod soft;
 mod touching;
+mod variations;
 
 pub use super::sweep::NormalRule;
 pub use baumgarte::Baumgarte;
 pub use rigid::Rigid;
 pub use soft::{Soft, Softness};
 pub use touching::Touching;
+pub use variations::{Frictionless, Relaxed, Turned};
 
 use super::sweep::{Sweep, VelocitySweep};
 
@@ -27,6 +29,12 @@ pub enum Rule {
     Baumgarte(Sweep<Baumgarte>),
     /// [`Touching`]
     Touching(Sweep<Touching>),
+    /// [`Soft`] without friction rows
+    SoftNormal(Sweep<Frictionless<Soft>>),
+    /// [`Soft`] on arms that turn
+    SoftTurned(Sweep<Turned<Soft>>),
+    /// [`Baumgarte`], over- or under-relaxed
+    BaumgarteRelaxed(Sweep<Relaxed<Baumgarte>>),
 }
 
 impl Rule {
@@ -37,6 +45,9 @@ impl Rule {
             Rule::Soft(sweep) => sweep,
             Rule::Baumgarte(sweep) => sweep,
             Rule::Touching(sweep) => sweep,
+            Rule::SoftNormal(sweep) => sweep,
+            Rule::SoftTurned(sweep) => sweep,
+            Rule::BaumgarteRelaxed(sweep) => sweep,
         }
     }
 }

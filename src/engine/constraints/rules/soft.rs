@@ -1,6 +1,6 @@
 //! Soft contacts: implicit springs.
 
-use super::Rule;
+use super::{Frictionless, Rule, Turned};
 use crate::engine::constraints::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
@@ -54,6 +54,28 @@ impl Soft {
     /// As [`Self::new`], as a value.
     pub fn rule(omega: [f32; 2], damping_ratio: f32, push_speed: f32, h: f32) -> Rule {
         Rule::Soft(Sweep(Self::new(omega, damping_ratio, push_speed, h)))
+    }
+
+    /// No springs: a gap may close and no more, overlap is left alone, as under [`super::Rigid`].
+    pub fn without_springs(h: f32) -> Self {
+        Self::baumgarte(0.0, 0.0, h)
+    }
+
+    /// Rigid rows that remove `fraction` of an overlap in each substep of `h` (s), at `push_speed` (m/s)
+    /// at most; no slop.
+    pub fn baumgarte(fraction: f32, push_speed: f32, h: f32) -> Self {
+        let stiff = Softness { bias_rate: fraction / h, mass_scale: 1.0, impulse_scale: 0.0 };
+        Soft { inv_h: 1.0 / h, dynamic: stiff, against_static: stiff, push_speed }
+    }
+
+    /// Without friction rows.
+    pub fn frictionless(self) -> Rule {
+        Rule::SoftNormal(Sweep(Frictionless(self)))
+    }
+
+    /// On arms that turn with their bodies within the step.
+    pub fn turned(self) -> Rule {
+        Rule::SoftTurned(Sweep(Turned(self)))
     }
 }
 

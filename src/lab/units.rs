@@ -4,17 +4,18 @@ use crate::engine::lanes::native_width;
 
 /// `value` of a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
 pub fn si(value: f64, unit: &str) -> String {
-    const PREFIXES: [(f64, &str); 5] = [(1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
+    const PREFIXES: [(f64, &str); 8] =
+        [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
     let size = value.abs();
     if size < 1e-12 {
         return format!("0 {unit}").trim_end().to_string();
     }
-    // A share of one has no milli-ones, and degrees and such are left alone above 1.
+    // A share of one has no milli-ones.
     if unit.is_empty() || unit == "1" {
         return ratio(value);
     }
     // 0.9995 of a prefix would be written 1000 of the next one down.
-    let (scale, prefix) = PREFIXES.into_iter().find(|p| size >= 0.9995 * p.0).unwrap_or(PREFIXES[4]);
+    let (scale, prefix) = PREFIXES.into_iter().find(|p| size >= 0.9995 * p.0).unwrap_or(PREFIXES[7]);
     format!("{} {prefix}{unit}", digits(value / scale))
 }
 
@@ -64,7 +65,7 @@ mod tests {
     fn prefixes_fit_and_do_not_round_to_a_thousand() {
         let metres: Vec<_> =
             [0.0, 1.234, 0.0123, 4.56e-5, 9.996e-4, 2e-13, -3e-9, 5e4].map(|x| si(x, "m")).to_vec();
-        assert_eq!(metres, ["0 m", "1.23 m", "12.3 mm", "45.6 µm", "1.00 mm", "0 m", "-3.00 nm", "50000 m"]);
+        assert_eq!(metres, ["0 m", "1.23 m", "12.3 mm", "45.6 µm", "1.00 mm", "0 m", "-3.00 nm", "50.0 km"]);
         assert_eq!(
             (si(0.00123, ""), si(0.0, ""), si(0.5, "1")),
             ("1.2e-3".into(), "0".into(), "5.0e-1".into())

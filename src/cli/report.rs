@@ -1,0 +1,25 @@
+//! `simpulse report`: the page of a study, from its records.
+
+use super::output::print;
+use crate::lab::error::Error;
+use crate::lab::report::html;
+use crate::lab::report::study_file::StudyFile;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Make the page of a study again, from its records
+///
+/// Reads study.json of the folder, and if they are there verify.json (`simpulse verify --json > DIR/verify.json`) and
+/// the recordings of the study; writes report.html.
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    /// Folder of a study
+    #[arg(value_name = "DIR", default_value = "results")]
+    pub folder: PathBuf,
+}
+
+/// Runs the command.
+pub fn run(args: &ReportArgs) -> Result<ExitCode, Error> {
+    print(&format!("wrote {}\n", html::write(&args.folder, &StudyFile::read(&args.folder)?)?.display()))
+}

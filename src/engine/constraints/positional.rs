@@ -1,0 +1,220 @@
+//! The two passes of position-based dynamics with contacts: bodies are displaced until no point
+//! overlaps and sticking points are where they were, then velocities are corrected once.
+//!
+//! # Displacing
+//!
+//! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse
+//! Δλ = −C/k (kg·m) along n, C = max(s, −v_max h), on arms that have turned; then, if what it needs is
+//! within the cone of its λ, the one along t that takes back its slide d since the substep began,
+//!
+//! ```text
+//! d = h (t·(v_b − v_a) + ω_b (r_b × t) − ω_a (r_a × t)) + the same of all displacements since
+//! ```
+//!
+//! (first order in the turn of one substep). Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
+//! the next point sees it. Records hold λ/h, an impulse (N·s).
+//!
+//! # Velocities
+//!
+//! Afterwards v is what moved the bodies, displacements included. Points that pushed lose their
+//! normal velocity, and as much of their sliding velocity as kinetic friction takes, µ λ/h at most.
+//!
+//! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
+
+use super::batches::{Batches, Segment};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::pass::{Pass, PassInput, PerLane};
+use super::sweep::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
+    over_moving_segments, spin, to_frame, turn, turned, with_arms,
+};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
+
+/// Displaces bodies; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Displace {
+    /// Substep (s).
+    pub h: f32,
+    /// v_max (m/s)
+    pub push_speed: f32,
+    /// The first sweep of a substep: λ starts at zero.
+    pub first: bool,
+}
+
+/// Corrects velocities; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AfterDisplacing;
+
+impl Pass for Displace {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let once = PerLane::of_sweep(layout, true, opposite);
+        // Bodies as they are, and as they were before displacements.
+        PerLane { rows: 2 * once.rows, ..once }
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        let mut store = Displaced { rows: on.rows, before: on.sums };
+        over_moving_segments!(displace, L, F; &mut store, on.batches, *self);
+    }
+}
+
+impl Pass for AfterDisplacing {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, true, opposite)
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        over_moving_segments!(correct, L, F; on.rows, on.batches);
+    }
+}
+
+/// Bodies, and what their motions were before displacements.
+struct Displaced<'a> {
+    rows: &'a mut [BodyRow],
+    before: &'a [BodyRow],
+}
+
+impl RowStore for Displaced<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: crate::engine::lanes::IndexList) {
+        self.rows.assert_rows(index);
+        self.before.assert_rows(index);
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self.rows, index)
+    }
+
+    #[inline(always)]
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        L::scatter_velocity(self.rows, index, velocity);
+    }
+}
+
+#[inline(always)]
+fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
+    store: &mut Displaced<'_>,
+    batches: &mut Batches,
+    segment: &Segment,
+    Displace { h, push_speed, first }: Displace,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let (h, inv_h) = (L::splat(h), L::splat(1.0 / h));
+    let deepest = L::splat(-push_speed) * h;
+    let zero = L::zero();
+    for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
+        let before = BodyPair::<L>::gather::<O, _>(store.before, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let frame =
+            |at: usize, a: &[L; 8], b: &[L; 8]| to_frame::<L, O>([a[at], a[at + 1]], [b[at], b[at + 1]], n);
+        let [mut moved, along_t] = frame(DX, &a, &b);
+        // Slide of the centres since the substep began.
+        let mut slide = h.mul_add(frame(VX, &a, &b)[1], along_t - frame(DX, &before.a, &before.b)[1]);
+        let mut angle = [a[TURN], b[TURN]];
+        let turn_of =
+            |k: usize, row: &[L; 8], old: &[L; 8], angle: [L; 2]| h.mul_add(row[W], angle[k] - old[TURN]);
+        let mut sum = [zero; 2];
+        for p in 0..N::POINTS {
+            let (arm_n, arm_t) =
+                (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+            let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
+            let mut separation = record[layout.at(p, layout.separation)] + moved;
+            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            let [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+            let answer = |arm: [L; 2]| {
+                let mut k = mass_sum;
+                if N::ROTATION {
+                    k = (inertia[1] * arm[1]).mul_add(arm[1], k);
+                    if O::MOVES {
+                        k = (inertia[0] * arm[0]).mul_add(arm[0], k);
+                    }
+                }
+                k
+            };
+            // A point that is not there has no mass.
+            let is_there = record[layout.at(p, layout.normal_mass)];
+            let overlap = is_there.select_positive(-separation.max(deepest).min(zero), zero);
+            let push = is_there.select_positive(overlap / answer(arm_n), zero);
+            let at = layout.at(p, layout.normal_impulse);
+            let old = if first { zero } else { record[at] };
+            let normal = inv_h.mul_add(push, old);
+            record[at] = normal;
+            sum[0] = sum[0] + push;
+            moved = mass_sum.mul_add(push, moved);
+            spin::<L, N, O>(&mut angle, inertia, arm_n, push);
+            if N::FRICTION {
+                let turns = [turn_of(0, &a, &before.a, angle), turn_of(1, &b, &before.b, angle)];
+                let drift = with_arms::<L, N, O>(slide, turns, arm_t);
+                let wanted = is_there.select_positive(-(drift / answer(arm_t)), zero);
+                let at = layout.at(p, layout.tangent_impulse);
+                let old = if first { zero } else { record[at] };
+                let new = inv_h.mul_add(wanted, old);
+                let bound = record[layout.friction] * normal;
+                // Within the cone: bound − |λt| is not negative.
+                let over = new.max(-new) - bound;
+                let held = over.select_positive(zero, normal.select_positive(wanted, zero));
+                record[at] = inv_h.mul_add(held, old);
+                sum[1] = sum[1] + held;
+                slide = mass_sum.mul_add(held, slide);
+                spin::<L, N, O>(&mut angle, inertia, arm_t, held);
+            }
+        }
+        let x = n[0].mul_add(sum[0], n[1] * sum[1]);
+        let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
+        b[DX] = b[INV_MASS].mul_add(x, b[DX]);
+        b[DY] = b[INV_MASS].mul_add(y, b[DY]);
+        L::scatter_delta(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
+        if O::MOVES {
+            a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
+            a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
+            L::scatter_delta(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
+        }
+    });
+}
+
+#[inline(always)]
+fn correct<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+        let mut sum = [L::zero(); 2];
+        for p in 0..N::POINTS {
+            let pushed = record[layout.at(p, layout.normal_impulse)];
+            let arm = arms::<L, N, O>(record, &layout, p, 0);
+            let vn = with_arms::<L, N, O>(along_n, w, arm);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let delta = pushed.select_positive(-(mass * vn), L::zero());
+            sum[0] = sum[0] + delta;
+            along_n = mass_sum.mul_add(delta, along_n);
+            spin::<L, N, O>(&mut w, inertia, arm, delta);
+            if N::FRICTION {
+                let arm = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, w, arm);
+                let bound = record[layout.friction] * pushed;
+                let stop = -(record[layout.at(p, layout.tangent_mass)] * vt);
+                let delta = stop.min(bound).max(-bound);
+                sum[1] = sum[1] + delta;
+                along_t = mass_sum.mul_add(delta, along_t);
+                spin::<L, N, O>(&mut w, inertia, arm, delta);
+            }
+        }
+        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+    });
+}

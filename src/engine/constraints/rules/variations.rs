@@ -1,0 +1,59 @@
+//! Rules made of other rules.
+
+use super::NormalRule;
+use crate::engine::lanes::Lanes;
+
+/// Another rule without friction rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frictionless<R>(pub R);
+
+impl<R: NormalRule> NormalRule for Frictionless<R> {
+    const FRICTION: bool = false;
+    const SEPARATION: bool = R::SEPARATION;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        self.0.line(against_static, separation, mass, old)
+    }
+}
+
+/// Another rule on arms that turn with their bodies within the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turned<R>(pub R);
+
+impl<R: NormalRule> NormalRule for Turned<R> {
+    const FRICTION: bool = R::FRICTION;
+    const SEPARATION: bool = R::SEPARATION;
+    const TURNED: bool = true;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        self.0.line(against_static, separation, mass, old)
+    }
+}
+
+/// Another rule's line c − s v, a part of the way from the old impulse, or beyond: λ + ω (c − s v − λ).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxed<R> {
+    /// The other rule.
+    pub rule: R,
+    /// ω (1)
+    pub factor: f32,
+}
+
+impl<R: NormalRule> NormalRule for Relaxed<R> {
+    const FRICTION: bool = R::FRICTION;
+    const SEPARATION: bool = R::SEPARATION;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        let [constant, slope] = self.rule.line(against_static, separation, mass, old);
+        let factor = L::splat(self.factor);
+        [factor.mul_add(constant - old, old), factor * slope]
+    }
+
+    #[inline(always)]
+    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
+        L::splat(self.factor) * self.rule.tangent_slope(mass)
+    }
+}

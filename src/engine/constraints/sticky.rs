@@ -1,0 +1,221 @@
+//! The sticky sweep: friction holds points at a place, not at a velocity.
+//!
+//! Each point remembers how far it has drifted along the surface since it began to stick, d (m). Its
+//! friction row asks for v_t = −β_t d/h, so that what creeps is brought back; where that takes more than
+//! the cone allows the point slides, and begins to stick anew where it is. Normal rows are those
+//! of [`super::rules::Baumgarte`] without slop. The cone of each point is that of its share of the
+//! manifold's normal impulse, Σ λn/points: a load that shifts from point to point unsticks neither.
+//!
+//! Within a step a point at R r has drifted by
+//!
+//! ```text
+//! t·(Δx_b − Δx_a) + σ_b (r_b × t) − κ_b (r_b × n) − σ_a (r_a × t) + κ_a (r_a × n)
+//! ```
+//!
+//! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. What it drifted before is kept per point.
+//!
+//! Source: `catto2024solver2d` (`solve_tgs_sticky`).
+
+use super::batches::{Batches, Segment, SegmentRecords};
+use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::kept::Kept;
+use super::pass::{Pass, PassInput, PerLane};
+use super::sweep::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_moving_segments, spin,
+    to_frame, turn, with_arms,
+};
+use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+
+/// One sweep; see the [module](self). The solver keeps one float per contact point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StickySweep {
+    /// Substep (s).
+    pub h: f32,
+    /// Share of an overlap that is removed per substep (1); 0 leaves positions alone.
+    pub fraction: f32,
+    /// Fastest speed at which overlap is pushed apart (m/s).
+    pub push_speed: f32,
+    /// β_t: share of a drift that is taken back per substep (1).
+    pub stick: f32,
+    /// Points farther apart than this (m) do not stick.
+    pub reach: f32,
+}
+
+/// Books the drift of the step that ends; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BookDrift {
+    /// As in [`StickySweep`].
+    pub reach: f32,
+}
+
+impl Pass for StickySweep {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let sweep = PerLane::of_sweep(layout, true, opposite);
+        // The drift of each point, and the index that it is found by.
+        PerLane {
+            floats_read: sweep.floats_read + 1 + layout.points,
+            floats_written: sweep.floats_written + layout.points,
+            ..sweep
+        }
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        over_moving_segments!(sweep, L, F; on.rows, on.batches, on.kept, *self);
+    }
+}
+
+impl Pass for BookDrift {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 2 + layout.points * (layout.arms() + 3);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        over_moving_segments!(book, L, F; on.rows, on.batches, on.kept, self.reach);
+    }
+}
+
+/// A number of one point in all lanes, from what is kept.
+#[inline(always)]
+fn load<L: Lanes>(kept: &[f32], contacts: &[u32], p: usize) -> L {
+    let mut value = L::zero();
+    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
+    for (float, &contact) in floats.iter_mut().zip(contacts) {
+        *float = kept[2 * contact as usize + p];
+    }
+    value
+}
+
+/// The other way round, in the first lanes, as many as `contacts`.
+#[inline(always)]
+fn save<L: Lanes>(kept: &mut [f32], contacts: &[u32], p: usize, value: L) {
+    let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
+    for (float, &contact) in floats.iter().zip(contacts) {
+        kept[2 * contact as usize + p] = *float;
+    }
+}
+
+/// Separations and drifts within the step of a batch's points.
+#[inline(always)]
+fn motion<L: Lanes, N: KernelFeatures, O: Opposite>(
+    record: &[L],
+    layout: &Layout,
+    a: &[L; 8],
+    b: &[L; 8],
+) -> [[L; 2]; 2] {
+    let [moved_n, moved_t] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], [record[0], record[1]]);
+    let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+    let mut motion = [[L::zero(); 2]; 2];
+    for (p, motion) in motion.iter_mut().enumerate().take(N::POINTS) {
+        let (arm_n, arm_t) = (arms::<L, N, O>(record, layout, p, 0), arms::<L, N, O>(record, layout, p, 1));
+        let mut separation = record[layout.at(p, layout.separation)] + moved_n;
+        separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+        separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+        let drift = with_arms::<L, N, O>(moved_t, [sine_a, sine_b], arm_t);
+        let drift = with_arms::<L, N, O>(drift, [-versine_a, -versine_b], arm_n);
+        *motion = [separation, drift];
+    }
+    motion
+}
+
+#[inline(always)]
+fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    kept: &mut Kept,
+    StickySweep { h, fraction, push_speed, stick, reach }: StickySweep,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let [inv_h, rate, stick] = [1.0, fraction, stick].map(|x| L::splat(x / h));
+    let (deepest, reach, zero) = (L::splat(-push_speed), L::splat(reach), L::zero());
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    rows.assert_rows(row_a);
+    let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
+    for (batch, (record, (contact, (row_a, row_b)))) in
+        records.chunks_exact_mut(layout.stride).zip(indices).enumerate()
+    {
+        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+        let motion = motion::<L, N, O>(record, &layout, &a, &b);
+        let (mut sum, mut total, mut points) = ([zero; 2], zero, zero);
+        for p in 0..N::POINTS {
+            let separation = motion[p][0];
+            let push = (separation * rate).max(deepest);
+            let bias = separation.select_positive(separation * inv_h, push);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let arm = arms::<L, N, O>(record, &layout, p, 0);
+            let vn = with_arms::<L, N, O>(along_n, w, arm);
+            let at = layout.at(p, layout.normal_impulse);
+            let old = record[at];
+            let new = mass.neg_mul_add(vn + bias, old).max(zero);
+            record[at] = new;
+            total = total + new;
+            points = points + mass.select_positive(L::splat(1.0), zero);
+            let delta = new - old;
+            sum[0] = sum[0] + delta;
+            along_n = mass_sum.mul_add(delta, along_n);
+            spin::<L, N, O>(&mut w, inertia, arm, delta);
+        }
+        if N::FRICTION {
+            let bound = record[layout.friction] * total / points.max(L::splat(1.0));
+            for p in 0..N::POINTS {
+                let [separation, drift] = motion[p];
+                let drifted = load::<L>(kept.points(), contacts, p) + drift;
+                let is_near = |yes: L, no: L| (reach - separation).select_positive(yes, no);
+                let mass = record[layout.at(p, layout.tangent_mass)];
+                let arm = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, w, arm) + is_near(drifted * stick, zero);
+                let at = layout.at(p, layout.tangent_impulse);
+                let old = record[at];
+                let wanted = mass.neg_mul_add(vt, old);
+                let new = wanted.min(bound).max(-bound);
+                record[at] = new;
+                // A point that slides begins to stick anew where it is now.
+                let over = wanted.max(-wanted) - bound;
+                save::<L>(kept.points(), contacts, p, over.select_positive(-drift, drifted - drift));
+                let delta = new - old;
+                sum[1] = sum[1] + delta;
+                along_t = mass_sum.mul_add(delta, along_t);
+                spin::<L, N, O>(&mut w, inertia, arm, delta);
+            }
+        }
+        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+    }
+}
+
+#[inline(always)]
+fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    kept: &mut Kept,
+    reach: f32,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    rows.assert_rows(row_a);
+    let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
+    for (batch, (record, (contact, (row_a, row_b)))) in
+        records.chunks_exact(layout.stride).zip(indices).enumerate()
+    {
+        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+        let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let motion = motion::<L, N, O>(record, &layout, &a, &b);
+        for (p, [separation, drift]) in motion.into_iter().enumerate().take(N::POINTS) {
+            let drifted = load::<L>(kept.points(), contacts, p) + drift;
+            let near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
+            save::<L>(kept.points(), contacts, p, near);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Constraints of other types than contacts, which join passes, colours and batches.
+//!
+//! A type says which bodies its constraints are on and brings its own kernel. Its constraints are
+//! coloured together with the contacts, so that the lanes of a colour push different bodies
+//! whatever they are of, and every pass of a solver runs over both: within a colour the other types
+//! come first, then the contacts. No solver knows which types there are.
+
+use super::batches::Batches;
+use super::order::SweepOrder;
+use super::pass::PassWidth;
+use crate::engine::clock::Phase;
+use crate::engine::lanes::BodyRow;
+use std::fmt;
+
+/// A pass over the constraints of one type.
+pub struct TypeInput<'a> {
+    /// What the pass is for: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
+    /// feedback), [`Phase::Relax`] (without), [`Phase::Position`] or [`Phase::Store`].
+    pub phase: Phase,
+    /// Substep (s).
+    pub h: f32,
+    /// Lanes that the pass runs at.
+    pub width: PassWidth,
+    /// One row per body, and an inert one at the end.
+    pub rows: &'a mut [BodyRow],
+    /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
+    pub batches: &'a mut Batches,
+}
+
+/// A type of constraint between two bodies.
+pub trait ConstraintType: fmt::Debug {
+    /// Bodies a and b of each constraint; b is dynamic.
+    fn ends(&self) -> &[[u32; 2]];
+
+    /// Lane vectors of a record.
+    fn stride(&self) -> usize;
+
+    /// Runs one pass. Every width is to give the same bits.
+    fn run(&mut self, on: TypeInput<'_>);
+}
+
+/// A type and the lanes of its constraints.
+#[derive(Debug)]
+pub struct Joined {
+    /// The type.
+    pub kind: Box<dyn ConstraintType>,
+    /// Coloured batches at the width of the step.
+    pub(super) lanes: Batches,
+    /// What is solved one after the other.
+    pub(super) serial: Batches,
+}
+
+impl Joined {
+    /// A type that no lanes have been assigned for.
+    pub fn new(kind: Box<dyn ConstraintType>) -> Self {
+        Joined { kind, lanes: Batches::default(), serial: Batches::default() }
+    }
+
+    pub(super) fn arrange(&mut self, order: SweepOrder) {
+        self.lanes.arrange(order);
+        self.serial.arrange(order);
+    }
+}

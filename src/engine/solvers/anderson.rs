@@ -1,0 +1,147 @@
+//! Anderson acceleration of Gauss–Seidel: from the last few sweeps the combination is taken that
+//! would have changed least.
+//!
+//! **Source.** `walker2011`, section 2; the sweeps are those of [`super::pgs`].
+//!
+//! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
+//! last sweep is not extrapolated, so that impulses end within their bounds.
+//!
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors in natural
+//! order, not in lanes.
+//!
+//! **Fails when** iterations are few, or contacts open and close: the combination is right for a
+//! linear sweep, and a clamp is a corner in it.
+//!
+//! # The method
+//!
+//! With g_k = sweep(λ_k) and f_k = g_k − λ_k, the γ that makes |f_k − ΔF γ| least, ΔF being the last
+//! differences of f and ΔG of g, gives
+//!
+//! ```text
+//! λ_{k+1} = g_k − ΔG γ
+//! ```
+//!
+//! γ comes from the normal equations of at most 5 unknowns in `f64`, their diagonal raised by a
+//! billionth.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, System, dense};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "anderson",
+    source: "walker2011",
+    summary: "Gauss–Seidel sweeps, extrapolated from the last few of them",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "baumgarte",
+            unit: "",
+            default: BAUMGARTE,
+            range: [0.0, 1.0],
+            meaning: "share of the overlap that is removed per step",
+            trials: &[],
+        },
+        Parameter {
+            name: "depth",
+            unit: "",
+            default: 3.0,
+            range: [1.0, 5.0],
+            meaning: "earlier sweeps that an extrapolation sees",
+            trials: &[1.0, 3.0, 5.0],
+        },
+    ],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    step,
+};
+
+/// Most earlier sweeps.
+const DEPTH: usize = 5;
+/// Part of the trace that is added to the diagonal of the normal equations (1).
+const RIDGE: f64 = 1e-9;
+/// Growth of |f|² at which history is forgotten (1).
+const GROWTH: f64 = 4.0;
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let depth = passes.parameter(1) as usize;
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        let [mut begin, mut swept, mut change, mut last_swept] = [(); 4].map(|_| passes.vector());
+        let mut changes: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
+        let mut images: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
+        passes.with_system(Phase::Solve, |system| system.impulses(&mut begin));
+        // Sweeps seen since the last start, and |f|² of the last one.
+        let (mut seen, mut last) = (0_usize, f64::INFINITY);
+        for k in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
+            if k + 1 == budget.velocity_iterations {
+                break;
+            }
+            passes.with_system(Phase::Solve, |system| {
+                system.impulses(&mut swept);
+                let at = seen % depth;
+                // Differences: of f against the last one, which `change` still is, and of g.
+                for (i, g) in swept.iter().enumerate() {
+                    for axis in 0..2 {
+                        let f = g[axis] - begin[i][axis];
+                        changes[at][i][axis] = f - change[i][axis];
+                        images[at][i][axis] = g[axis] - last_swept[i][axis];
+                        change[i][axis] = f;
+                    }
+                }
+                last_swept.clone_from(&swept);
+                let square = System::dot(&change, &change);
+                let is_first = seen == 0 || square > GROWTH * last;
+                (seen, last) = (if is_first { 1 } else { seen + 1 }, square);
+                // The first sweep has nothing to be a difference of: its place is taken again.
+                let columns = (seen - 1).min(depth);
+                begin.clone_from(&swept);
+                if is_first {
+                    seen = 1;
+                    return;
+                }
+                let place = |j: usize| (at + depth - j) % depth;
+                let mut gram = [0.0; DEPTH * DEPTH];
+                let mut right = [0.0; DEPTH];
+                for i in 0..columns {
+                    right[i] = System::dot(&changes[place(i)], &change);
+                    for j in 0..columns {
+                        gram[i * columns + j] = System::dot(&changes[place(i)], &changes[place(j)]);
+                    }
+                }
+                let trace: f64 = (0..columns).map(|i| gram[i * columns + i]).sum();
+                (0..columns).for_each(|i| gram[i * columns + i] += RIDGE * trace);
+                if !dense::solve(&mut gram[..columns * columns], &mut right[..columns], 0.0) {
+                    return;
+                }
+                for (j, gamma) in right[..columns].iter().enumerate() {
+                    let gamma = *gamma as f32;
+                    for (b, d) in begin.iter_mut().zip(&images[place(j)]) {
+                        *b = [b[0] - gamma * d[0], b[1] - gamma * d[1]];
+                    }
+                }
+                system.set_impulses(&begin);
+                swept.iter_mut().zip(&begin).for_each(|(s, b)| *s = [b[0] - s[0], b[1] - s[1]]);
+                system.apply(&swept);
+            });
+        }
+        passes.give_back(images);
+        passes.give_back(changes);
+        passes.give_back([begin, swept, change, last_swept]);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,146 @@
+//! Accelerated projected gradients on the convex relaxation of friction: Nesterov's method on
+//! ½ λᵀ K λ + bᵀ λ with every λ in its cone.
+//!
+//! **Source.** `mazhar2015`, algorithm of section 4; `anitescu2006` (the relaxation).
+//!
+//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a
+//! cone stays one. Gradients at extrapolated points are extrapolated, as the problem is linear.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over
+//! vectors, one more for each step that was too long. They go point by point, not in lanes.
+//!
+//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of
+//! sliding. (A clamp of friction by the normal impulse has no such effect and no convex problem.) And
+//! when iterations are few, since its error falls by the square of their number, however few contacts
+//! there are.
+//!
+//! # The method
+//!
+//! ```text
+//! λ⁺ = Π(y − D g(y)/L),   θ⁺ = (√(θ⁴ + 4θ²) − θ²)/2,   y⁺ = λ⁺ + θ(1 − θ)/(θ² + θ⁺) (λ⁺ − λ)
+//! ```
+//!
+//! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. Where
+//! g·(λ⁺ − λ) > 0 momentum is dropped.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, System, cone};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "apgd",
+    source: "mazhar2015",
+    summary: "accelerated projected gradients on the convex relaxation: lifts off while sliding",
+    budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[
+        (Law::Converges, "to the convex relaxation, which is another law"),
+        (Law::Rest, "gradients spread a load more slowly than sweeps"),
+    ],
+    step,
+};
+
+/// L shrinks by this factor per iteration, so that one steep place does not slow all that follow (1).
+const FORGET: f64 = 0.9;
+/// Doublings of L in one iteration.
+const DOUBLINGS: usize = 20;
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        let [mut bias, mut mass, mut now, mut next, mut y] = [(); 5].map(|_| passes.vector());
+        let [mut g_now, mut g_next, mut g_y, mut step] = [(); 4].map(|_| passes.vector());
+        passes.with_system(Phase::Solve, |system| {
+            system.gaps_and_friction(&mut bias);
+            bias.iter_mut().for_each(|b| b[0] = rule.bias(b[0]));
+            system.effective_masses(&mut mass);
+            system.impulses(&mut now);
+            gradient(system, &bias, &mut g_now);
+            y.clone_from(&now);
+            g_y.clone_from(&g_now);
+        });
+        let (mut theta, mut steepness) = (1.0_f64, 1.0_f64);
+        for _ in 0..budget.velocity_iterations {
+            passes.with_system(Phase::Solve, |system| {
+                for _ in 0..DOUBLINGS {
+                    for i in 0..y.len() {
+                        let scale = mass[i][0] / steepness as f32;
+                        let point = [0, 1].map(|axis| y[i][axis] - scale * g_y[i][axis]);
+                        next[i] = cone::project(point, bias[i][1]);
+                        step[i] = [0, 1].map(|axis| next[i][axis] - now[i][axis]);
+                    }
+                    system.apply(&step);
+                    gradient(system, &bias, &mut g_next);
+                    let (mut curve, mut length) = (0.0, 0.0);
+                    for i in 0..y.len() {
+                        for axis in 0..2 {
+                            let d = f64::from(next[i][axis]) - f64::from(y[i][axis]);
+                            curve += d * (f64::from(g_next[i][axis]) - f64::from(g_y[i][axis]));
+                            length += if mass[i][0] > 0.0 { d * d / f64::from(mass[i][0]) } else { 0.0 };
+                        }
+                    }
+                    if curve <= steepness * length * (1.0 + 1e-5) {
+                        break;
+                    }
+                    // Velocities back to those of `now`.
+                    step.iter_mut().for_each(|s| *s = [-s[0], -s[1]]);
+                    system.apply(&step);
+                    steepness *= 2.0;
+                    next.clone_from(&now);
+                    g_next.clone_from(&g_now);
+                }
+                let square = theta * theta;
+                let theta_next = 0.5 * ((square * square + 4.0 * square).sqrt() - square);
+                let mut beta = (theta * (1.0 - theta) / (square + theta_next)) as f32;
+                theta = theta_next;
+                step.iter_mut()
+                    .zip(next.iter().zip(&now))
+                    .for_each(|(s, (a, b))| *s = [a[0] - b[0], a[1] - b[1]]);
+                if System::dot(&g_y, &step) > 0.0 {
+                    (beta, theta) = (0.0, 1.0);
+                }
+                for i in 0..y.len() {
+                    for axis in 0..2 {
+                        y[i][axis] = next[i][axis] + beta * (next[i][axis] - now[i][axis]);
+                        g_y[i][axis] = g_next[i][axis] + beta * (g_next[i][axis] - g_now[i][axis]);
+                    }
+                }
+                std::mem::swap(&mut now, &mut next);
+                std::mem::swap(&mut g_now, &mut g_next);
+                steepness *= FORGET;
+                system.set_impulses(&now);
+            });
+            passes.count_sweep(2);
+            passes.iteration_done();
+        }
+        passes.give_back([bias, mass, now, next, y]);
+        passes.give_back([g_now, g_next, g_y, step]);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}
+
+/// J v + b, b along n alone.
+fn gradient(system: &mut System<'_>, bias: &[[f32; 2]], to: &mut Vec<[f32; 2]>) {
+    system.relative_velocities(to);
+    to.iter_mut().zip(bias).for_each(|(g, b)| g[0] += b[0]);
+}

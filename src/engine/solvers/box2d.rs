@@ -1,0 +1,90 @@
+//! What Box2D 3.2 does: soft contacts in substeps, friction in the relaxing sweeps alone.
+//!
+//! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
+//!
+//! **Departures.** Bounces are this crate's ([`crate::engine::constraints::restitution`]), which
+//! keep energy; Box2D gives back e times the speed of approach. Manifolds are always found anew; Box2D
+//! keeps one whose bodies hardly moved. The order is that of this crate's colours.
+//!
+//! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
+//! without friction and `relax_iterations` rigid ones with it.
+//!
+//! **Fails when** [`super::soft_step`] does, and what slides or sticks is less accurate: in a substep
+//! friction sees the normal velocities that the springs left, once.
+
+use super::{Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::params::{
+    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, MAX_PUSH_SPEED, Parameter,
+    Parameters,
+};
+use std::f32::consts::TAU;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "box2d",
+    source: "catto2024box2d",
+    summary: "soft contacts in substeps, friction while relaxing only: Box2D 3.2",
+    budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: MAX_PUSH_SPEED,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h).frictionless();
+    let rigid = Rigid::rule(h);
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &soft);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.sweep(Phase::Relax, &rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

@@ -1,0 +1,303 @@
+//! Newton's method on the contact law itself: the impulses of a step are solved for, not approached.
+//! For scenes of some dozens of contact points.
+//!
+//! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search,
+//! proximal outer loop).
+//!
+//! **Departures.** Contacts with more supports than a body needs make the linear problem singular. So Newton solves
+//! a proximal problem: ε D (λ − λ₀) is added to the relative velocities, λ₀ being the impulses
+//! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
+//! Overlap is pushed apart as in [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
+//! finds nothing better, and in scenes with more than `largest` points, they are the answer.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps; then, for m
+//! points, a matrix of 4m² entries and up to 30 factorisations of 16m³/3 operations in `f64`, one
+//! lane. On a column of boxes it loses to sweeps of the same accuracy above some 40 points.
+//!
+//! **Fails when** there are many points (a factorisation grows by m³), and where friction lets a point
+//! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
+//!
+//! # The method
+//!
+//! Each point is open, sticking or slipping by the sign of what its natural map clips, with ρ = 1/K_ii:
+//!
+//! ```text
+//! open   λn − ρn un ≤ 0                           λn = λt = 0
+//! stick  |λt − ρt ut| < µ (λn − ρn un)            un = 0, ut = 0
+//! slip   otherwise, s = sign(λt − ρt ut)          un = 0, λt = s µ λn
+//! ```
+//!
+//! In fixed states the law is linear, u = K λ + b. A step goes towards the solution of those states as
+//! far as the residual of the natural map falls.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::system::{Pair, PointRows};
+use crate::engine::constraints::{Passes, System, dense};
+use crate::engine::lanes::BodyRow;
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "direct",
+    source: "alart1991",
+    summary: "Newton's method on the contact law, for small scenes; else sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "baumgarte",
+            unit: "",
+            default: BAUMGARTE,
+            range: [0.0, 1.0],
+            meaning: "share of the overlap that is removed per step",
+            trials: &[],
+        },
+        Parameter {
+            name: "largest",
+            unit: "",
+            default: 100.0,
+            range: [0.0, 2000.0],
+            meaning: "contact points up to which Newton's method is tried",
+            trials: &[],
+        },
+    ],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[
+        (Law::NoAllocation, "matrices are as large as the scene"),
+        (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
+    ],
+    step,
+};
+
+/// ε: shift of the unit diagonal (1).
+const SHIFT: f64 = 1e-7;
+/// Newton steps.
+const STEPS: usize = 30;
+/// Halvings of a step before Newton gives up.
+const HALVINGS: usize = 8;
+/// Residual, relative to the largest impulse, at which the law is solved.
+const TOLERANCE: f64 = 1e-10;
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let sweep = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let largest = passes.parameter(1) as usize;
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &sweep);
+            passes.iteration_done();
+        }
+        if passes.points() <= largest {
+            passes.with_system(Phase::Solve, |system| solve(system, &rule));
+        }
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}
+
+/// Replaces impulses and velocities by those of Newton's method, if it finds better ones.
+fn solve(system: &mut System<'_>, rule: &Baumgarte) {
+    let [mut impulses, mut velocities, mut surfaces] = [(); 3].map(|_| Vec::new());
+    system.impulses(&mut impulses);
+    system.relative_velocities(&mut velocities);
+    system.gaps_and_friction(&mut surfaces);
+    velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
+    let points: Vec<PointRows> = system.point_rows().collect();
+    let problem = Problem::new(system.rows(), points, &impulses, &velocities, &surfaces);
+    let Some(solved) = problem.solve() else { return };
+    let mut delta = vec![[0.0; 2]; impulses.len()];
+    for (i, point) in problem.points.iter().enumerate() {
+        let normal = solved[2 * i].max(0.0) as f32;
+        let bound = surfaces[point.at][1] * normal;
+        let new = [normal, (solved[2 * i + 1] as f32).min(bound).max(-bound)];
+        delta[point.at] = [0, 1].map(|axis| new[axis] - impulses[point.at][axis]);
+        impulses[point.at] = new;
+    }
+    system.set_impulses(&impulses);
+    system.apply(&delta);
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Open,
+    Stick,
+    /// λt = this times λn.
+    Slip(f64),
+}
+
+/// The law of a step around the impulses that the sweeps left. Entry 2i of a vector is the normal one
+/// of point i, 2i + 1 the tangential one.
+struct Problem {
+    points: Vec<PointRows>,
+    friction: Vec<f64>,
+    /// λ₀ (N·s)
+    start: Vec<f64>,
+    /// u there, the bias included (m/s).
+    velocity: Vec<f64>,
+    /// K, by rows (1/kg).
+    matrix: Vec<f64>,
+}
+
+impl Problem {
+    fn new(
+        rows: &[BodyRow],
+        points: Vec<PointRows>,
+        impulses: &[Pair],
+        velocities: &[Pair],
+        surfaces: &[Pair],
+    ) -> Self {
+        let flat = |v: &[Pair]| points.iter().flat_map(|p| v[p.at].map(f64::from)).collect::<Vec<_>>();
+        let n = 2 * points.len();
+        let mut matrix = vec![0.0; n * n];
+        // J of a point on one of its bodies, along u: ±u and ± r × u.
+        let row = |p: &PointRows, side: usize, axis: usize| {
+            let sign = if side == 0 { -1.0 } else { 1.0 };
+            let [x, y] = p.axes[axis];
+            [x, y, p.arms[axis][side]].map(|j| sign * f64::from(j))
+        };
+        for (i, p) in points.iter().enumerate() {
+            for (j, q) in points.iter().enumerate() {
+                for (side, body) in p.bodies.into_iter().enumerate() {
+                    let Some(other) = q.bodies.into_iter().position(|b| b == body) else { continue };
+                    let Some(mass) = rows.get(body as usize) else { continue };
+                    let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
+                    for axis in 0..2 {
+                        for along in 0..2 {
+                            let (a, b) = (row(p, side, axis), row(q, other, along));
+                            let k: f64 = (0..3).map(|c| a[c] * inverse[c] * b[c]).sum();
+                            matrix[(2 * i + axis) * n + 2 * j + along] += k;
+                        }
+                    }
+                }
+            }
+        }
+        let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
+        Problem { friction, start: flat(impulses), velocity: flat(velocities), matrix, points }
+    }
+
+    fn diagonal(&self, i: usize) -> f64 {
+        self.matrix[i * (self.start.len() + 1)]
+    }
+
+    /// Impulses that solve the law better than the start, if Newton finds any.
+    fn solve(&self) -> Option<Vec<f64>> {
+        let mut impulses = self.start.clone();
+        let mut arguments = self.arguments(&impulses);
+        let first = self.merit(&impulses, &arguments);
+        let mut now = first;
+        for _ in 0..STEPS {
+            if now <= self.goal(&impulses) {
+                break;
+            }
+            let Some(target) = self.solve_states(&self.states(&arguments)) else { break };
+            let mut fraction = 1.0;
+            let better = (0..HALVINGS).find_map(|_| {
+                let blend = |(l, t): (&f64, &f64)| l + fraction * (t - l);
+                let trial: Vec<f64> = impulses.iter().zip(&target).map(blend).collect();
+                let arguments = self.arguments(&trial);
+                let merit = self.merit(&trial, &arguments);
+                // The directional derivative of the merit along a Newton step is −2 merit.
+                let accepted = merit <= (1.0 - 2e-4 * fraction) * now;
+                fraction *= 0.5;
+                accepted.then_some((trial, arguments, merit))
+            });
+            let Some(step) = better else { break };
+            (impulses, arguments, now) = step;
+        }
+        (now < first).then_some(impulses)
+    }
+
+    /// λ − (u + ε D (λ − λ₀))/D, row by row.
+    fn arguments(&self, impulses: &[f64]) -> Vec<f64> {
+        let n = impulses.len();
+        let change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
+        let argument = |i: usize| {
+            let row = &self.matrix[i * n..(i + 1) * n];
+            let u = self.velocity[i] + row.iter().zip(&change).map(|(k, c)| k * c).sum::<f64>();
+            impulses[i] - u / self.diagonal(i) - SHIFT * change[i]
+        };
+        (0..n).map(argument).collect()
+    }
+
+    /// Energy-weighted square of the natural map, Σ K_ii r_i² (J).
+    fn merit(&self, impulses: &[f64], arguments: &[f64]) -> f64 {
+        let one = |i: usize| {
+            let (normal, tangent) = (arguments[2 * i].max(0.0), arguments[2 * i + 1]);
+            let bound = self.friction[i] * normal;
+            let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent.max(-bound).min(bound)];
+            self.diagonal(2 * i) * r[0] * r[0] + self.diagonal(2 * i + 1) * r[1] * r[1]
+        };
+        (0..self.points.len()).map(one).sum()
+    }
+
+    /// The merit of residuals that are rounding beside these impulses.
+    fn goal(&self, impulses: &[f64]) -> f64 {
+        let one = |(i, l): (usize, &f64)| self.diagonal(i) * l * l;
+        TOLERANCE * TOLERANCE * impulses.iter().enumerate().map(one).sum::<f64>()
+    }
+
+    fn states(&self, arguments: &[f64]) -> Vec<State> {
+        let one = |i: usize| {
+            let (normal, tangent, friction) = (arguments[2 * i], arguments[2 * i + 1], self.friction[i]);
+            if normal <= 0.0 {
+                State::Open
+            } else if tangent.abs() < friction * normal {
+                State::Stick
+            } else {
+                State::Slip(friction.copysign(tangent))
+            }
+        };
+        (0..self.points.len()).map(one).collect()
+    }
+
+    /// The impulses at which the rows that the states name are at rest; none if that is singular.
+    fn solve_states(&self, states: &[State]) -> Option<Vec<f64>> {
+        let n = self.start.len();
+        let is_unknown = |i: usize| match states[i / 2] {
+            State::Open => false,
+            State::Slip(_) => i % 2 == 0,
+            State::Stick => true,
+        };
+        let unknowns: Vec<usize> = (0..n).filter(|&i| is_unknown(i)).collect();
+        let slope = |i: usize| match states[i / 2] {
+            State::Slip(slope) => slope,
+            _ => 0.0,
+        };
+        let scale = |i: usize| 1.0 / self.diagonal(i).sqrt();
+        let m = unknowns.len();
+        let (mut a, mut b) = (vec![0.0; m * m], vec![0.0; m]);
+        for (r, &i) in unknowns.iter().enumerate() {
+            let row = &self.matrix[i * n..(i + 1) * n];
+            for (c, &j) in unknowns.iter().enumerate() {
+                // A slipping point acts along n + s µ t.
+                let along = row[j] + if j % 2 == 0 { slope(j) * row[j + 1] } else { 0.0 };
+                a[r * m + c] = scale(i) * along * scale(j);
+            }
+            a[r * m + r] += SHIFT;
+            let from_start: f64 = row.iter().zip(&self.start).map(|(k, l)| k * l).sum();
+            b[r] = scale(i) * (from_start - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
+        }
+        if !dense::solve(&mut a, &mut b, 1e-14) {
+            return None;
+        }
+        let mut impulses = vec![0.0; n];
+        for (&i, y) in unknowns.iter().zip(&b) {
+            impulses[i] = y * scale(i);
+        }
+        for i in (0..n).step_by(2) {
+            if let State::Slip(slope) = states[i / 2] {
+                impulses[i + 1] = slope * impulses[i];
+            }
+        }
+        Some(impulses)
+    }
+}

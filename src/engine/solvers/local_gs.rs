@@ -1,0 +1,74 @@
+//! Sequential impulses with several local iterations at each contact before the next one.
+//!
+//! The rows of a contact share its bodies and are coupled more strongly than contacts are. Solving
+//! them again while they are at hand makes each contact right by itself, and costs no other contact's
+//! memory. [`super::pgs_ngs_block`] solves the two normal rows exactly; local iterations bring
+//! friction along.
+//!
+//! **Source.** `acary2018` (block Gauss–Seidel with a local solver); otherwise [`super::pgs`].
+//!
+//! **Departures.** A colour is swept several times in a row, which is the same, as its contacts share
+//! no body that moves.
+//!
+//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps.
+//!
+//! **Fails when** loads must travel far: that needs sweeps over all contacts.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "local_gs",
+    source: "acary2018",
+    summary: "sequential impulses, each contact several times in a row",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "baumgarte",
+            unit: "",
+            default: BAUMGARTE,
+            range: [0.0, 1.0],
+            meaning: "share of the overlap that is removed per step",
+            trials: &[],
+        },
+        Parameter {
+            name: "local_iterations",
+            unit: "",
+            default: 2.0,
+            range: [1.0, 100.0],
+            meaning: "times that each contact is solved before the next one",
+            trials: &[1.0, 2.0, 4.0],
+        },
+    ],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "4 sweeps over all contacts are too few for tall stacks and large mass ratios")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let local = SweepOrder::Local(passes.parameter(1) as u32);
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.set_order(SweepOrder::Forward);
+        passes.warm_start();
+        passes.set_order(local);
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
+        }
+        passes.set_order(SweepOrder::Forward);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

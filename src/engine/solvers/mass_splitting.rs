@@ -1,0 +1,109 @@
+//! Jacobi on split bodies: a body with n contacts becomes n copies of an n-th of its mass, each contact
+//! has its own two copies, and after a sweep the copies of a body are brought together at their
+//! mean velocity.
+//!
+//! Copies share nothing, so that all contacts can be solved at once; and the mean of velocities
+//! that are each right cannot overshoot as the sum of [`super::jacobi`] does.
+//!
+//! **Source.** `tonge2012`, sections 4 and 5.
+//!
+//! **Departures.** Within a contact rows are solved one after the other. Overlap is pushed apart by the
+//! soft rows of [`super::soft_step`], which the source does not have.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start, 2 passes for the masses; `velocity_iterations`
+//! soft sweeps and `relax_iterations` rigid ones, each of which gathers bodies twice as
+//! [`super::jacobi`] does.
+//!
+//! **Fails when** sweeps are few: it converges always and slowly, as each contact sees the n-th part
+//! of a mass.
+//!
+//! # Why it converges
+//!
+//! With J split by contacts, the sweep minimises the sum of all contacts' energies over copies that
+//! were equal before it; the mean is the projection on equal copies in the norm of their masses,
+//! n (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is kept: copies get Δλ/(m/n) each,
+//! a body the mean, Σ Δλ/m.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::jacobi::JacobiRule;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::params::{
+    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, MAX_PUSH_SPEED, Parameter, Parameters,
+};
+use std::f32::consts::TAU;
+
+/// A soft contact's frequency is capped at this fraction of the substep rate (1).
+const HERTZ_FRACTION: f32 = 1.0 / 3.0;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "mass_splitting",
+    source: "tonge2012",
+    summary: "all contacts at once, each with a part of its bodies' masses",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 4, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most a third of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: MAX_PUSH_SPEED,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "12 slow sweeps are too few for stacks")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let soft = JacobiRule::Soft(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
+    let rigid = JacobiRule::Rigid(Rigid::new(h));
+    passes.build_graph();
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        sweeps(passes, Phase::Solve, soft, budget.velocity_iterations);
+        passes.integrate_positions();
+        sweeps(passes, Phase::Relax, rigid, budget.relax_iterations);
+        passes.end_substep(substep);
+    }
+}
+
+/// Sweeps on split bodies.
+fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: JacobiRule, times: u32) {
+    passes.scale_masses(phase, |body, graph| graph.edges_of(body).len().max(1) as f32);
+    for _ in 0..times {
+        passes.jacobi_sweep(phase, rule, 1.0);
+        if phase == Phase::Solve {
+            passes.iteration_done();
+        }
+    }
+    passes.restore_masses(phase);
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

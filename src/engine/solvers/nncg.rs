@@ -1,0 +1,95 @@
+//! Nonsmooth nonlinear conjugate gradients: what a sweep changes is taken for a gradient, and the
+//! direction of the last step is followed further as the Fletcher–Reeves method does.
+//!
+//! **Source.** `silcowitz2010`, algorithm 1; the sweeps are those of [`super::pgs`].
+//!
+//! **Departures.** Sweeps are symmetric pairs, as conjugate gradients want of a preconditioner. The last
+//! iteration does not go on beyond its sweeps, so that impulses end within their bounds.
+//!
+//! **Cost.** That of [`super::pgs`] with two sweeps an iteration; between iterations impulses are
+//! read, replaced and applied, 3 passes over vectors in natural order, not in lanes.
+//!
+//! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
+//! left is Gauss–Seidel.
+//!
+//! # The method
+//!
+//! ```text
+//! r = sweep(λ) − λ,   β = |r|²/|r_last|² (0 if above 1),   λ ← sweep(λ) + β p,   p ← r + β p
+//! ```
+//!
+//! v follows by M⁻¹Jᵀ β p. The next sweep brings λ back to its bounds.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, SweepOrder, System};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "nncg",
+    source: "silcowitz2010",
+    summary: "conjugate gradients around symmetric sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        let [mut last, mut swept, mut direction] = [(); 3].map(|_| passes.vector());
+        passes.with_system(Phase::Solve, |system| system.impulses(&mut last));
+        let mut previous = f64::INFINITY;
+        for k in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.set_order(SweepOrder::Reverse);
+            passes.sweep(Phase::Solve, &rule);
+            passes.set_order(SweepOrder::Forward);
+            passes.iteration_done();
+            if k + 1 == budget.velocity_iterations {
+                break;
+            }
+            passes.with_system(Phase::Solve, |system| {
+                system.impulses(&mut swept);
+                // From here on `last` is r, then what is added to λ.
+                last.iter_mut().zip(&swept).for_each(|(l, s)| *l = [s[0] - l[0], s[1] - l[1]]);
+                let square = System::dot(&last, &last);
+                let beta = if square <= previous && square > 0.0 { (square / previous) as f32 } else { 0.0 };
+                previous = square;
+                for ((r, p), s) in last.iter_mut().zip(&mut direction).zip(&mut swept) {
+                    for axis in 0..2 {
+                        let step = beta * p[axis];
+                        p[axis] = r[axis] + step;
+                        s[axis] += step;
+                        r[axis] = step;
+                    }
+                }
+                system.set_impulses(&swept);
+                system.apply(&last);
+                std::mem::swap(&mut last, &mut swept);
+            });
+        }
+        passes.give_back([last, swept, direction]);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,68 @@
+//! Sequential impulses on rigid velocities, then nonlinear Gauss–Seidel on positions: overlap is
+//! never turned into velocity.
+//!
+//! **Source.** `catto2024solver2d`, `solve_pgs_ngs`.
+//!
+//! **Departures.** Gaps are closed and no more (speculative contacts), which the source's rigid rows do
+//! not know. Normal rows come before friction rows, as in [`super::pgs`]; the source has them the
+//! other way round.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and
+//! `position_iterations` position sweeps.
+//!
+//! **Fails when** the sweeps are too few for the height of a stack, as those of [`super::pgs`]: what
+//! they leave over is kept as velocity, and two position sweeps take little of it back.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Rigid;
+use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "pgs_ngs",
+    source: "catto2024solver2d",
+    summary: "sequential impulses without position feedback; nonlinear position sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 2 },
+    uses: Uses { velocity: true, relax: false, position: true },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "correction",
+        unit: "",
+        default: 0.2,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that a position sweep removes",
+        trials: &[],
+    }],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rigid = Rigid::rule(passes.h());
+    let positions = PositionSweep {
+        fraction: passes.parameter(0),
+        slop: LINEAR_SLOP,
+        max_correction: MAX_POSITION_CORRECTION,
+        turned: true,
+    };
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rigid);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.position_iterations {
+            passes.position_sweep(positions);
+        }
+        passes.end_substep(substep);
+    }
+}

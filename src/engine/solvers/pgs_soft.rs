@@ -1,0 +1,85 @@
+//! Sequential impulses on soft contacts, and sweeps without the springs after the positions.
+//!
+//! **Source.** `catto2024solver2d`, `solve_pgs_soft`; the rows are those of [`super::soft_step`].
+//!
+//! **Departures.** None in the schedule. Contacts with static and kinematic bodies are twice as stiff,
+//! as in the source.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and, after
+//! the positions, `relax_iterations` rigid ones.
+//!
+//! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them, and at
+//! a third of the step rate a spring is as soft as 20 Hz.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, Parameter, Parameters};
+use std::f32::consts::TAU;
+
+/// A soft contact's frequency is capped at this fraction of the substep rate (1).
+const HERTZ_FRACTION: f32 = 1.0 / 3.0;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "pgs_soft",
+    source: "catto2024solver2d",
+    summary: "sequential impulses on soft contacts, then relaxing sweeps, without substeps",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most a third of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: 2.0,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let soft = Soft::rule(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let rigid = Rigid::rule(h);
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &soft);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.sweep(Phase::Relax, &rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

@@ -1,0 +1,74 @@
+//! Gauss–Seidel in an order that is drawn anew for every sweep.
+//!
+//! A fixed order pushes the same way sweep after sweep, so that its error has a direction: a stack leans
+//! towards the side that is solved first. A random one has none.
+//!
+//! **Source.** `cottle1992` (the splitting); otherwise [`super::pgs`].
+//!
+//! **Departures.** Colours are taken in random order, and contacts only where they are solved one by
+//! one. The seed is the same in every step, so that a step is a function of its state and all widths
+//! give the same bits.
+//!
+//! **Cost.** That of [`super::pgs`], and a sort of colours (in natural order: of contacts) per sweep;
+//! in natural order records are visited out of the order of memory.
+//!
+//! **Fails when** [`super::pgs`] does: news travel no further.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "random_order",
+    source: "cottle1992",
+    summary: "sequential impulses, in another order each sweep",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "baumgarte",
+            unit: "",
+            default: BAUMGARTE,
+            range: [0.0, 1.0],
+            meaning: "share of the overlap that is removed per step",
+            trials: &[],
+        },
+        Parameter {
+            name: "seed",
+            unit: "",
+            default: 1.0,
+            range: [0.0, 16777215.0],
+            meaning: "the orders are drawn from this",
+            trials: &[],
+        },
+    ],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let seed = u64::from(passes.parameter(1).to_bits()) << 32;
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.set_order(SweepOrder::Forward);
+        passes.warm_start();
+        for k in 0..budget.velocity_iterations {
+            passes.set_order(SweepOrder::Random(seed + u64::from(substep * budget.velocity_iterations + k)));
+            passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
+        }
+        passes.set_order(SweepOrder::Forward);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,92 @@
+//! What rapier does by default: soft contacts in substeps, the two normal rows of a contact solved
+//! together, and stabilising sweeps with friction.
+//!
+//! **Source.** `crozet2025rapier` (2D, version 0.35); the pair of rows is that of
+//! [`super::pgs_ngs_block`] with soft rows on its diagonal.
+//!
+//! **Departures.** A stiffness clamp of an eighth of the substep rate is kept, which rapier leaves to
+//! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a
+//! thousandth of the product of their diagonal go row by row; rapier takes a hundredth. Bounces are
+//! this crate's. The order is that of this crate's colours.
+//!
+//! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft block sweeps
+//! without friction and `relax_iterations` rigid block sweeps with it.
+//!
+//! **Fails when** [`super::soft_step`] does: the block couples two points, not two contacts.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Frictionless, Rigid, Soft};
+use crate::engine::params::{
+    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, MAX_PUSH_SPEED, Parameter,
+    Parameters,
+};
+use std::f32::consts::TAU;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "rapier",
+    source: "crozet2025rapier",
+    summary: "soft contacts in substeps, both points at once, friction while stabilising: rapier",
+    budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: MAX_PUSH_SPEED,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let soft = Frictionless(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
+    let rigid = Rigid::new(h);
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.block_sweep(Phase::Solve, soft);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.block_sweep(Phase::Relax, rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

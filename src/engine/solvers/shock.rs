@@ -1,0 +1,79 @@
+//! Sequential impulses, then shock propagation: a last sweep from the ground upwards in which whatever
+//! a level stands on cannot move.
+//!
+//! The contact graph has levels: what touches the ground is on the first, what touches that on the
+//! second. If the body below cannot move, one sweep of a level makes its contacts right, and so one
+//! sweep over all levels a whole stack.
+//!
+//! **Source.** `guendelman2003`, section 7; otherwise [`super::pgs`].
+//!
+//! **Departures.** Levels are distances from the nearest body that does not move, not the strongly
+//! connected parts of a graph of who rests on whom. The source propagates shocks through contacts
+//! and not through collisions; here both are one.
+//!
+//! **Cost.** That of [`super::pgs`], then per level one pass over bodies and, over its contacts,
+//! three passes: effective masses, a sweep, effective masses. Contacts are grouped by level and
+//! colour, so that low levels fill few lanes.
+//!
+//! **Fails when** loads on the ground matter: the impulse of the last sweep takes no weight off the
+//! bodies above, and the bodies below do not feel it. Momentum is lost to them. Everything seems lighter
+//! from below, a lever tips over the wrong way, and what swings is damped.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "shock",
+    source: "guendelman2003",
+    summary: "sequential impulses, then a sweep from the ground up over immovable bodies",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
+    softness: None,
+    by_levels: true,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[
+        (Law::Momentum, "in the last sweep bodies below do not answer"),
+        (Law::Converges, "the last sweep solves another problem"),
+    ],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
+        }
+        for level in 1..passes.levels() {
+            passes.set_order(SweepOrder::Level(level));
+            // The world and what hangs free of it have no level that is below another.
+            passes.scale_masses(
+                Phase::Solve,
+                |body, graph| if graph.levels()[body] < level { 0.0 } else { 1.0 },
+            );
+            passes.sweep(Phase::Solve, &rule);
+            passes.restore_masses(Phase::Solve);
+        }
+        passes.set_order(SweepOrder::Forward);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,62 @@
+//! Symmetric Gauss–Seidel: every sweep over the contacts is followed by one in reverse order.
+//!
+//! A forward sweep carries news upwards through a stack within one sweep, and downwards by one contact a
+//! sweep; a symmetric pair carries them both ways.
+//!
+//! **Source.** `cottle1992` (splittings of a linear complementarity problem); otherwise [`super::pgs`].
+//!
+//! **Departures.** Colours are taken in reverse, and within a contact rows keep their order: the
+//! splitting is symmetric by contacts, not by rows.
+//!
+//! **Cost.** That of [`super::pgs`]; an iteration is two sweeps.
+//!
+//! **Fails when** [`super::pgs`] does. In natural order a column converges twice as fast per
+//! iteration, which is no gain per sweep; colours carry news by one contact a sweep either way.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "symmetric_gs",
+    source: "cottle1992",
+    summary: "sequential impulses, forward and back again",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: false, position: false },
+    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
+    parameters: &[Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    }],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.set_order(SweepOrder::Reverse);
+            passes.sweep(Phase::Solve, &rule);
+            passes.set_order(SweepOrder::Forward);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

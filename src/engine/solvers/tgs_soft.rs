@@ -1,0 +1,86 @@
+//! Soft contacts in substeps whose Jacobians follow the bodies: anchors turn within the step.
+//!
+//! **Source.** `catto2024solver2d`, `solve_tgs_soft`. It differs from [`super::soft_step`] in the
+//! arms alone: those of the start of the step, turned by what each body has turned since.
+//!
+//! **Departures.** Effective masses stay those of the start of the step, as in the source. The
+//! direction n of a contact stays, too.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and
+//! `relax_iterations` rigid ones. As Jacobians move, impulses are applied again by a pass over
+//! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it.
+//!
+//! **Fails when** [`super::soft_step`] does. What it gains shows where bodies turn by more than some
+//! degrees within a step; what it costs, always.
+
+use super::{Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::Soft;
+use crate::engine::params::{
+    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, Parameter, Parameters,
+};
+use std::f32::consts::TAU;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "tgs_soft",
+    source: "catto2024solver2d",
+    summary: "soft contacts in substeps; anchors turn with their bodies within the step",
+    budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "contact_hertz",
+            unit: "Hz",
+            default: CONTACT_HERTZ,
+            range: [1e-3, 1e6],
+            meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
+            trials: &[15.0, 30.0, 60.0, 120.0],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: 4.0,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+    ],
+    softness: Some(angular_frequencies),
+    by_levels: false,
+    kept: KeptSize { per_point: 0, per_body: 0 },
+    breaks: &[],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h).turned();
+    let rigid = Soft::without_springs(h).turned();
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start_turned();
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &soft);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.sweep(Phase::Relax, &rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
+    [omega, 2.0 * omega]
+}
+
+fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
+    frequencies(parameters[0], h)
+}

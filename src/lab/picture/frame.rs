@@ -1,0 +1,179 @@
+//! One instant of a world, for pictures and recordings.
+
+use crate::engine::bodies::BodyKind;
+use crate::engine::contacts::pair_key;
+use crate::engine::shapes::Shape;
+use crate::engine::world::World;
+use crate::lab::metrics::overlaps::Overlaps;
+use glam::{DVec2, Vec2};
+
+/// What does not change while a world runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// Where frames have their origin (m): that of the first body, so that far from the world's
+    /// origin nothing is rounded away.
+    pub origin: [f64; 2],
+    /// How each body moves.
+    pub kinds: Vec<BodyKind>,
+    /// Body of each shape, and the shape in the frame of that body's centre of mass.
+    pub shapes: Vec<(u32, Shape)>,
+    /// Step (s).
+    pub dt: f64,
+}
+
+impl Stage {
+    /// Of a world whose bodies have all been added.
+    pub fn of(world: &World) -> Self {
+        let bodies = &world.bodies;
+        let origin = if bodies.is_empty() { [0.0; 2] } else { bodies.center(0) };
+        let shapes = world.shape_body.iter().copied().zip(world.shapes.iter().copied()).collect();
+        Stage { origin, kinds: bodies.kind.clone(), shapes, dt: f64::from(world.settings.dt) }
+    }
+}
+
+/// A point where two shapes touch or nearly do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TouchPoint {
+    /// Bodies a and b; impulses act on b.
+    pub bodies: [u32; 2],
+    /// From the origin of the stage (m).
+    pub at: [f64; 2],
+    /// Unit normal from a to b.
+    pub normal: [f32; 2],
+    /// Gap along it (m); negative is overlap.
+    pub separation: f32,
+    /// Normal and tangential impulse of the last step (N·s); the tangent is the normal turned by
+    /// −90°.
+    pub impulse: [f32; 2],
+}
+
+impl TouchPoint {
+    /// The impulse on body b (N·s).
+    pub fn impulse_vector(&self) -> [f64; 2] {
+        let [[nx, ny], [normal, tangent]] = [self.normal, self.impulse].map(|v| v.map(f64::from));
+        [nx * normal + ny * tangent, ny * normal - nx * tangent]
+    }
+}
+
+/// Where everything is after a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// Centre of mass from the stage's origin (m), and angle in (−π, π] (rad), by body.
+    pub poses: Vec<[f64; 3]>,
+    /// Points of contact where the bodies are now; those with an impulse of the last step that
+    /// have parted since, too.
+    pub points: Vec<TouchPoint>,
+}
+
+impl Frame {
+    /// Of the world as it is. Impulses are there while `Settings::record_impulses` is on.
+    pub fn of(world: &World, stage: &Stage, overlaps: Option<&mut Overlaps>) -> Self {
+        let bodies = &world.bodies;
+        let origin = DVec2::from(stage.origin);
+        let pose = |i: usize| {
+            let at = DVec2::from(bodies.center(i)) - origin;
+            [at.x, at.y, f64::from(bodies.angle(i))]
+        };
+        let poses: Vec<[f64; 3]> = (0..bodies.len()).map(pose).collect();
+        let points = overlaps.map_or_else(Vec::new, |overlaps| touch_points(world, &poses, overlaps));
+        Frame { poses, points }
+    }
+
+    /// The deepest overlap at any point (m).
+    pub fn deepest(&self) -> f64 {
+        self.points.iter().map(|p| -f64::from(p.separation)).fold(0.0, f64::max)
+    }
+}
+
+/// Points by present geometry, with the impulses of the last step where the same features touched.
+fn touch_points(world: &World, poses: &[[f64; 3]], overlaps: &mut Overlaps) -> Vec<TouchPoint> {
+    let mut points = Vec::new();
+    let mut contacts = world.contacts.iter().peekable();
+    let from = |body: u32, anchor: Vec2| {
+        let [x, y, _] = poses[body as usize];
+        [x + f64::from(anchor.x), y + f64::from(anchor.y)]
+    };
+    let part = |points: &mut Vec<TouchPoint>, contact: &crate::engine::contacts::Contact, found: &[u32]| {
+        for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
+            if !found.contains(&point.feature_id) && impulse != [0.0; 2] {
+                points.push(TouchPoint {
+                    bodies: [contact.body_a, contact.body_b],
+                    at: from(contact.body_b, point.anchor_b),
+                    normal: contact.manifold.normal.to_array(),
+                    separation: 0.0,
+                    impulse,
+                });
+            }
+        }
+    };
+    // Pairs and contacts ascend alike.
+    overlaps.find(world, |[a, b], manifold| {
+        while let Some(contact) = contacts.next_if(|c| c.key() < pair_key(a, b)) {
+            part(&mut points, contact, &[]);
+        }
+        let known = contacts.next_if(|c| c.key() == pair_key(a, b));
+        let bodies = [a, b].map(|shape| world.shape_body[shape as usize]);
+        let mut found = Vec::new();
+        for point in manifold.points() {
+            found.push(point.feature_id);
+            let own = known.map(|c| (c.manifold, c.step_impulse));
+            let impulse = own.and_then(|(old, impulses)| {
+                old.points().iter().position(|p| p.feature_id == point.feature_id).map(|i| impulses[i])
+            });
+            points.push(TouchPoint {
+                bodies,
+                at: from(bodies[1], point.anchor_b),
+                normal: manifold.normal.to_array(),
+                separation: point.separation,
+                impulse: impulse.unwrap_or_default(),
+            });
+        }
+        if let Some(contact) = known {
+            part(&mut points, contact, &found);
+        }
+    });
+    contacts.for_each(|contact| part(&mut points, contact, &[]));
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::{DEFAULT, find};
+    use crate::engine::world::Settings;
+    use crate::lab::scenes;
+
+    fn frame(name: &str, steps: u32) -> (Stage, Frame) {
+        let settings = Settings { record_impulses: true, ..Settings::new(find(DEFAULT).unwrap()) };
+        let mut world = scenes::load(name).unwrap().scene.build(settings).unwrap();
+        for _ in 0..steps {
+            world.step().unwrap();
+        }
+        let stage = Stage::of(&world);
+        let frame = Frame::of(&world, &stage, Some(&mut Overlaps::default()));
+        (stage, frame)
+    }
+
+    #[test]
+    fn a_stack_at_rest_carries_itself() {
+        let (stage, frame) = frame("stack:3", 240);
+        assert_eq!((stage.kinds.len(), frame.poses.len(), frame.points.len()), (4, 4, 6));
+        // 1 kg each under 10 m/s²: 30, 20 and 10 N, for 1/60 s, upwards.
+        for (below, load) in [(0, 30.0), (1, 20.0), (2, 10.0)] {
+            let on = frame.points.iter().filter(|p| p.bodies[0] == below);
+            let sum = on.map(|p| p.impulse_vector()).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
+            assert!((sum[1] * 60.0 / load - 1.0).abs() < 0.02 && sum[0].abs() < 1e-3, "{sum:?}");
+        }
+        assert!((0.0..0.02).contains(&frame.deepest()), "{}", frame.deepest());
+        // Points are where the boxes are.
+        assert!(frame.points.iter().all(|p| (p.at[0] - frame.poses[1][0]).abs() < 0.51));
+    }
+
+    #[test]
+    fn poses_are_relative_to_the_first_body() {
+        let (stage, frame) = frame("far_stack:4", 1);
+        assert!(stage.origin[0].abs() > 1e3 || stage.origin[1].abs() > 1e3, "{:?}", stage.origin);
+        assert!(frame.poses.iter().all(|p| p[0].abs() < 100.0), "{:?}", frame.poses);
+        assert_eq!(frame.poses[0][..2], [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,128 @@
+//! Frames of a simulation as pictures: what was drawn where, then SVG or PNG.
+//!
+//! ```text
+//! World ──► Stage, Frame ──► Picture ──┬─► svg
+//!            [`frame`]       [`draw`]  └─► raster ─► png
+//! ```
+
+pub mod draw;
+pub mod frame;
+pub mod letters;
+pub mod outline;
+pub mod png;
+pub mod raster;
+pub mod svg;
+
+/// Red, green, blue and opacity, of 255.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Color(pub u8, pub u8, pub u8, pub u8);
+
+impl Color {
+    /// Opaque, from `0xrrggbb`.
+    pub const fn rgb(value: u32) -> Self {
+        Color((value >> 16) as u8, (value >> 8) as u8, value as u8, 255)
+    }
+
+    /// The colour at `share` of the way to another, in [0, 1].
+    pub fn towards(self, other: Color, share: f64) -> Self {
+        let share = share.clamp(0.0, 1.0);
+        let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+        Color(mix(self.0, other.0), mix(self.1, other.1), mix(self.2, other.2), mix(self.3, other.3))
+    }
+}
+
+/// Where a text is anchored at its point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// At its left end.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+/// Something drawn; lengths in pixels, y downwards.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Item {
+    /// A closed outline.
+    Polygon {
+        /// Its vertices.
+        points: Vec<[f64; 2]>,
+        /// Inside.
+        fill: Option<Color>,
+        /// Border and its width.
+        stroke: Option<(Color, f64)>,
+        /// Shown while the pointer is over it; empty for none.
+        title: String,
+    },
+    /// A stroke with round ends.
+    Line {
+        /// From.
+        from: [f64; 2],
+        /// To.
+        to: [f64; 2],
+        /// Its colour.
+        color: Color,
+        /// Its width.
+        width: f64,
+    },
+    /// A filled disc.
+    Disc {
+        /// Its centre.
+        at: [f64; 2],
+        /// Its radius.
+        radius: f64,
+        /// Its colour.
+        color: Color,
+        /// Shown while the pointer is over it; empty for none.
+        title: String,
+    },
+    /// One line of text on its baseline.
+    Text {
+        /// The anchor.
+        at: [f64; 2],
+        /// Height of the letters' body.
+        size: f64,
+        /// Which end is at the anchor.
+        anchor: Anchor,
+        /// Its colour.
+        color: Color,
+        /// The letters.
+        text: String,
+    },
+}
+
+/// What is drawn, from back to front.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Width and height (pixels).
+    pub size: [u32; 2],
+    /// Drawn first.
+    pub background: Color,
+    /// In the order in which they are drawn.
+    pub items: Vec<Item>,
+}
+
+impl Picture {
+    /// An empty picture.
+    pub fn new(size: [u32; 2], background: Color) -> Self {
+        Picture { size, background, items: Vec::new() }
+    }
+
+    /// A stroke.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color, width: f64) {
+        self.items.push(Item::Line { from, to, color, width });
+    }
+
+    /// A text.
+    pub fn text(&mut self, at: [f64; 2], size: f64, anchor: Anchor, color: Color, text: impl Into<String>) {
+        self.items.push(Item::Text { at, size, anchor, color, text: text.into() });
+    }
+
+    /// A filled rectangle.
+    pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: Color) {
+        let points = vec![[x, y], [x + width, y], [x + width, y + height], [x, y + height]];
+        self.items.push(Item::Polygon { points, fill: Some(fill), stroke: None, title: String::new() });
+    }
+}

@@ -1,0 +1,412 @@
+"use strict";
+// Plays the recordings of every `.replay` on the page, all of one replay at the same time.
+// `#t=1.5&play=1&zoom=2` in the address sets the first replay's time (s), whether it plays, and its zoom.
+(() => {
+  const RAMP = [[243, 245, 248], [253, 228, 160], [245, 155, 75], [204, 61, 51], [107, 16, 48]];
+  const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+
+  const ramp = (share) => {
+    const place = Math.min(Math.max(share, 0), 1) * (RAMP.length - 1);
+    const i = Math.min(Math.floor(place), RAMP.length - 2);
+    const mix = RAMP[i].map((v, k) => Math.round(v + (place - i) * (RAMP[i + 1][k] - v)));
+    return `rgb(${mix})`;
+  };
+
+  const si = (value, unit) => {
+    if (!(Math.abs(value) > 0)) return `0 ${unit}`;
+    if (!unit) return value.toExponential(1).replace("e+", "e").replace("-", "−");
+    const [scale, prefix] = PREFIXES.find(([s]) => Math.abs(value) >= 0.9995 * s) || PREFIXES[PREFIXES.length - 1];
+    return `${(value / scale).toPrecision(3)} ${prefix}${unit}`;
+  };
+
+  // The file as it is described in src/lab/recording/mod.rs.
+  async function decode(base64) {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const view = new DataView(bytes.buffer);
+    const magic = String.fromCharCode(...bytes.slice(0, 7));
+    if (magic !== "SIMPREC" || view.getUint32(8, true) !== 1) throw new Error("not a recording of version 1");
+    const stream = new Blob([bytes.slice(16)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const payload = new Uint8Array(await new Response(stream).arrayBuffer());
+    if (payload.length !== view.getUint32(12, true)) throw new Error("the recording is damaged");
+    const data = new DataView(payload.buffer);
+    const start = 4 + data.getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(payload.slice(4, start)));
+    let at = start;
+    const unsigned = () => {
+      let value = 0, factor = 1, byte;
+      do {
+        byte = payload[at++];
+        value += (byte & 127) * factor;
+        factor *= 128;
+      } while (byte > 127);
+      return value;
+    };
+    const signed = () => {
+      const value = unsigned();
+      return value % 2 ? -(value + 1) / 2 : value / 2;
+    };
+    const bits = new DataView(new ArrayBuffer(4));
+    const half = () => {
+      bits.setUint32(0, data.getUint16(at, true) * 65536);
+      at += 2;
+      return bits.getFloat32(0);
+    };
+    const { quantum, frames: count, kinds, contacts, curves } = header;
+    const bodies = kinds.length, last = new Float64Array(3 * bodies), frames = [];
+    for (let f = 0; f < count; f++) {
+      for (let k = 0; k < 3 * bodies; k++) last[k] += signed();
+      const poses = new Float64Array(3 * bodies);
+      for (let i = 0; i < bodies; i++) {
+        poses[3 * i] = last[i] * quantum;
+        poses[3 * i + 1] = last[bodies + i] * quantum;
+        poses[3 * i + 2] = last[2 * bodies + i] * 2 * Math.PI / 2 ** 20;
+      }
+      const points = [];
+      let x = 0, y = 0;
+      for (let n = contacts ? unsigned() : 0; n > 0; n--) {
+        const a = unsigned(), b = unsigned();
+        x += signed();
+        y += signed();
+        const angle = unsigned() * 2 * Math.PI / 65536;
+        const separation = signed() * quantum, normal = half(), tangent = half();
+        const [nx, ny] = [Math.cos(angle), Math.sin(angle)];
+        points.push({
+          a, b, x: x * quantum, y: y * quantum, nx, ny, separation,
+          ix: nx * normal + ny * tangent, iy: ny * normal - nx * tangent,
+        });
+      }
+      const values = curves.map(() => {
+        at += 4;
+        return data.getFloat32(at - 4, true);
+      });
+      frames.push({ poses, points, values });
+    }
+    return { ...header, frames, span: header.dt * header.every };
+  }
+
+  const element = (tag, attributes, parent) => {
+    const made = Object.assign(document.createElement(tag), attributes);
+    if (parent) parent.append(made);
+    return made;
+  };
+
+  // Corners of what moves at the start.
+  function bounds(recordings) {
+    const box = [Infinity, Infinity, -Infinity, -Infinity];
+    for (const { shapes, kinds, frames } of recordings) {
+      const any = kinds.includes("d") || kinds.includes("k");
+      for (const { body, points, radius } of shapes) {
+        if (any && kinds[body] === "s") continue;
+        const [x, y, angle] = frames[0].poses.subarray(3 * body, 3 * body + 3);
+        const [c, s] = [Math.cos(angle), Math.sin(angle)];
+        for (const [u, v] of points) {
+          const [px, py] = [x + c * u - s * v, y + s * u + c * v];
+          box[0] = Math.min(box[0], px - radius);
+          box[1] = Math.min(box[1], py - radius);
+          box[2] = Math.max(box[2], px + radius);
+          box[3] = Math.max(box[3], py + radius);
+        }
+      }
+    }
+    return box.every(Number.isFinite) ? box : [-1, -1, 1, 1];
+  }
+
+  const median = (list) => list.sort((a, b) => a - b)[Math.floor(list.length / 2)] || 1;
+
+  function start(root, recordings) {
+    const panels = [...root.querySelectorAll("figure")].map((figure, i) => ({
+      recording: recordings[i],
+      scene: figure.querySelector(".scene"),
+      curves: figure.querySelector(".curves"),
+      color: getComputedStyle(figure).getPropertyValue("--own"),
+    }));
+    const end = Math.max(...recordings.map((r) => (r.frames.length - 1) * r.span));
+    const tick = Math.min(...recordings.map((r) => r.span));
+    const box = bounds(recordings);
+    const largest = (of) => Math.max(...recordings.flatMap((r) => r.frames.map((f) => Math.max(0, ...f.points.map(of)))));
+    const deepest = largest((p) => -p.separation);
+    const size = median(recordings[0].shapes.filter((s) => recordings[0].kinds[s.body] !== "s").map((s) => {
+      const xs = s.points.map((p) => p[0]), ys = s.points.map((p) => p[1]);
+      const extent = (list) => 2 * s.radius + Math.max(...list) - Math.min(...list);
+      return Math.sqrt(extent(xs) * extent(ys));
+    }));
+    const thickness = median(recordings[0].shapes.filter((s) => recordings[0].kinds[s.body] !== "s").map((s) => {
+      const at = s.points, n = at.length;
+      // Across the first edge; a segment or a point has its radius only.
+      const [ux, uy] = n > 2 ? [at[1][0] - at[0][0], at[1][1] - at[0][1]] : [1, 0];
+      const depths = n > 2 ? at.map(([x, y]) => Math.abs(ux * (y - at[0][1]) - uy * (x - at[0][0])) / Math.hypot(ux, uy)) : [0];
+      return 2 * s.radius + Math.min(Math.max(...depths), n > 2 ? Math.hypot(ux, uy) : 0);
+    }));
+    // Arrows compare with what the median frame carries; an impact is cut at three bodies' widths.
+    const carried = median(recordings.flatMap((r) => r.frames.map((f) => Math.max(0, ...f.points.map((p) => Math.hypot(p.ix, p.iy))))).filter((v) => v > 0));
+    const state = { time: 0, playing: false, speed: 1, zoom: 1, x: 0, y: 0, forces: true, depths: true };
+
+    const frameOf = (r) => Math.min(Math.floor(state.time / r.span + 1e-6), r.frames.length - 1);
+
+    function fit(canvas) {
+      const ratio = window.devicePixelRatio || 1;
+      const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+      if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+        canvas.width = Math.round(w * ratio);
+        canvas.height = Math.round(h * ratio);
+      }
+      const context = canvas.getContext("2d");
+      context.setTransform(ratio, 0, 0, ratio, 0, 0);
+      context.clearRect(0, 0, w, h);
+      return [context, w, h];
+    }
+
+    const scaleOf = (w, h) => 0.86 * state.zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), h / Math.max(box[3] - box[1], 1e-9));
+
+    function drawScene({ recording, scene }) {
+      const [c, w, h] = fit(scene);
+      if (!(w > 0)) return;
+      const scale = scaleOf(w, h);
+      const cx = 0.5 * (box[0] + box[2]) + state.x, cy = 0.5 * (box[1] + box[3]) + state.y;
+      const px = (x) => 0.5 * w + scale * (x - cx), py = (y) => 0.5 * h - scale * (y - cy);
+      const { poses, points } = recording.frames[frameOf(recording)];
+      const depth = new Float64Array(recording.kinds.length);
+      for (const p of points) {
+        depth[p.a] = Math.max(depth[p.a], -p.separation);
+        depth[p.b] = Math.max(depth[p.b], -p.separation);
+      }
+      c.lineJoin = "round";
+      const thin = thickness * scale < 3;
+      c.lineWidth = Math.min(Math.max(0.03 * size * scale, 0.5), 1.2);
+      for (const { body, points: corners, radius } of recording.shapes) {
+        const [x, y, angle] = poses.subarray(3 * body, 3 * body + 3);
+        const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+        const at = corners.map(([u, v]) => [px(x + cos * u - sin * v), py(y + sin * u + cos * v)]);
+        const r = radius * scale;
+        const kind = recording.kinds[body];
+        // What is too thin for an inside shows its colour on its border.
+        const bare = kind === "d" && state.depths && deepest > 0;
+        c.strokeStyle = bare && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * depth[body] / deepest) : "#52606d";
+        c.fillStyle = kind === "s" ? "#d3d8de" : kind === "k" ? "#d9d2e9" : state.depths && deepest > 0 ? ramp(depth[body] / deepest) : "#e3ebf5";
+        c.beginPath();
+        if (at.length === 1) {
+          c.arc(at[0][0], at[0][1], r, 0, 2 * Math.PI);
+          c.moveTo(at[0][0], at[0][1]);
+          c.lineTo(at[0][0] + r * cos, at[0][1] - r * sin);
+        } else if (radius > 0) {
+          // Around the vertices of the core, an arc at each; y points down, so clockwise here.
+          const n = at.length;
+          at.forEach(([vx, vy], i) => {
+            const [qx, qy] = at[(i + 1) % n], [ox, oy] = at[(i + n - 1) % n];
+            const normal = (ax, ay, bx, by) => Math.atan2(bx - ax, -(by - ay));
+            c.arc(vx, vy, r, normal(ox, oy, vx, vy), normal(vx, vy, qx, qy), true);
+          });
+          c.closePath();
+        } else {
+          at.forEach(([vx, vy], i) => (i ? c.lineTo(vx, vy) : c.moveTo(vx, vy)));
+          c.closePath();
+        }
+        c.fill();
+        c.stroke();
+      }
+      if (state.forces) {
+        const unit = 1.1 * size * scale / carried;
+        for (const p of points) {
+          const [x, y] = [px(p.x), py(p.y)];
+          const cut = Math.min(1, 3 * size * scale / Math.max(unit * Math.hypot(p.ix, p.iy), 1e-9));
+          const [dx, dy] = [unit * cut * p.ix, -unit * cut * p.iy];
+          const length = Math.hypot(dx, dy);
+          const dot = Math.min(Math.max(0.05 * size * scale, 0.6), 3);
+          c.fillStyle = "#1f2933";
+          c.fillRect(x - dot, y - dot, 2 * dot, 2 * dot);
+          if (length < 1.5) continue;
+          const head = Math.min(6, 0.5 * length), [u, v] = [dx / length, dy / length];
+          const [hx, hy] = [x + dx - head * u, y + dy - head * v];
+          c.strokeStyle = c.fillStyle = "#0072b2";
+          c.lineWidth = Math.min(1.4, 0.6 + 0.02 * size * scale);
+          c.beginPath();
+          c.moveTo(x, y);
+          c.lineTo(hx, hy);
+          c.stroke();
+          c.beginPath();
+          c.moveTo(x + dx, y + dy);
+          c.lineTo(hx - 0.4 * head * v, hy + 0.4 * head * u);
+          c.lineTo(hx + 0.4 * head * v, hy - 0.4 * head * u);
+          c.fill();
+        }
+      }
+      // A bar of a round length.
+      const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
+      const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
+      c.fillStyle = "rgba(255,255,255,.8)";
+      c.fillRect(6, h - 30, metres * scale + 12, 26);
+      c.strokeStyle = c.fillStyle = "#1f2933";
+      c.lineWidth = 1.5;
+      c.beginPath();
+      c.moveTo(12, h - 14);
+      c.lineTo(12, h - 10);
+      c.lineTo(12 + metres * scale, h - 10);
+      c.lineTo(12 + metres * scale, h - 14);
+      c.stroke();
+      c.font = "11px system-ui, sans-serif";
+      c.fillText(si(metres, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
+    }
+
+    // Limits of each curve over all recordings, so that panels compare.
+    const ranges = recordings[0].curves.map((_, k) => {
+      const values = recordings.flatMap((r) => r.frames.slice(1).map((f) => f.values[k] || 0)).filter((v) => v > 0);
+      const high = Math.max(1e-30, ...values);
+      return [Math.max(Math.min(high, ...values), 1e-5 * high), high * 1.3];
+    });
+
+    function drawCurves({ recording, curves, color }) {
+      const [c, w, h] = fit(curves);
+      if (!(w > 0)) return;
+      const row = h / Math.max(recording.curves.length, 1), left = 6, right = w - 6;
+      const across = (t) => left + (right - left) * t / Math.max(end, 1e-9);
+      const now = frameOf(recording);
+      c.font = "11px system-ui, sans-serif";
+      recording.curves.forEach(({ name, unit }, k) => {
+        const [low, high] = ranges[k], top = k * row + 16, bottom = (k + 1) * row - 4;
+        const up = (v) => bottom - (bottom - top) * Math.log(Math.max(v, low) / low) / Math.log(high / low);
+        c.strokeStyle = "#e4e7eb";
+        c.lineWidth = 1;
+        c.beginPath();
+        for (let d = Math.ceil(Math.log10(low)); d <= Math.log10(high); d++) {
+          c.moveTo(left, up(10 ** d));
+          c.lineTo(right, up(10 ** d));
+        }
+        c.stroke();
+        c.strokeStyle = color;
+        c.lineWidth = 1.6;
+        c.beginPath();
+        recording.frames.forEach((f, i) => i && (i > 1 ? c.lineTo(across(i * recording.span), up(f.values[k])) : c.moveTo(across(i * recording.span), up(f.values[k]))));
+        c.stroke();
+        c.fillStyle = "#1f2933";
+        c.textAlign = "left";
+        c.fillText(name, left, top - 4);
+        c.textAlign = "right";
+        c.fillText(`${si(recording.frames[now].values[k], unit)}   (log, to ${si(high / 1.3, unit)})`, right, top - 4);
+        c.beginPath();
+        c.arc(across(now * recording.span), up(recording.frames[now].values[k]), 3, 0, 7);
+        c.fill();
+      });
+      c.strokeStyle = "#1f2933";
+      c.lineWidth = 1;
+      c.beginPath();
+      c.moveTo(across(state.time), 0);
+      c.lineTo(across(state.time), h);
+      c.stroke();
+    }
+
+    const controls = element("div", { className: "controls" }, root);
+    const button = (label, title, act) => element("button", { type: "button", textContent: label, title, onclick: act }, controls);
+    const back = button("←", "one step back (←)", () => step(-1));
+    const play = button("▶", "play or pause (space)", () => toggle());
+    const forth = button("→", "one step on (→)", () => step(1));
+    back.className = "back";
+    play.className = "play";
+    forth.className = "forth";
+    const slider = element("input", { type: "range", min: 0, max: Math.round(end / tick), step: 1, value: 0 }, controls);
+    slider.setAttribute("aria-label", "time");
+    const output = element("output", {}, controls);
+    const speed = element("select", { className: "speed", title: "speed" }, controls);
+    for (const times of [0.1, 0.25, 0.5, 1, 2, 4]) element("option", { value: times, textContent: `${times}×`, selected: times === 1 }, speed);
+    const box2 = (label, name) => {
+      const wrap = element("label", {}, controls);
+      element("input", { type: "checkbox", checked: true, className: name, onchange: (e) => { state[name] = e.target.checked; draw(); } }, wrap);
+      wrap.append(` ${label}`);
+    };
+    if (recordings.some((r) => r.contacts)) {
+      box2("impulses", "forces");
+      box2(`penetration (to ${si(deepest, "m")})`, "depths");
+    }
+    button("fit", "whole scene", () => { Object.assign(state, { zoom: 1, x: 0, y: 0 }); draw(); }).className = "fit";
+
+    function draw() {
+      panels.forEach((panel) => { drawScene(panel); drawCurves(panel); });
+      const index = Math.round(state.time / tick);
+      slider.value = index;
+      output.textContent = `${state.time.toFixed(3)} s of ${end.toFixed(2)} s · step ${Math.round(state.time / recordings[0].dt)}`;
+      play.textContent = state.playing ? "▮▮" : "▶";
+    }
+    function seek(time) {
+      state.time = Math.min(Math.max(time, 0), end);
+      draw();
+    }
+    function step(by) {
+      state.playing = false;
+      seek((Math.round(state.time / tick) + by) * tick);
+    }
+    let before = 0;
+    function run(now) {
+      if (!state.playing) return;
+      seek(state.time + state.speed * Math.min((now - before) / 1000, 0.1));
+      before = now;
+      if (state.time >= end) state.playing = false;
+      draw();
+      requestAnimationFrame(run);
+    }
+    function toggle() {
+      state.playing = !state.playing;
+      if (state.playing && state.time >= end) state.time = 0;
+      if (state.playing) {
+        before = performance.now();
+        requestAnimationFrame(run);
+      }
+      draw();
+    }
+    slider.oninput = () => { state.playing = false; seek(slider.value * tick); };
+    speed.onchange = () => { state.speed = Number(speed.value); };
+    root.tabIndex = 0;
+    root.addEventListener("keydown", (e) => {
+      if (e.target.tagName === "SELECT" || (e.target.tagName === "INPUT" && e.key !== " ")) return;
+      const act = { " ": toggle, ArrowLeft: () => step(-1), ArrowRight: () => step(1), Home: () => seek(0), End: () => seek(end) }[e.key];
+      if (act && e.target.tagName !== "BUTTON") { act(); e.preventDefault(); }
+    });
+    for (const { scene, curves } of panels) {
+      scene.addEventListener("wheel", (e) => {
+        e.preventDefault();
+        const [w, h] = [scene.clientWidth, scene.clientHeight];
+        const [x, y] = [e.offsetX - 0.5 * w, 0.5 * h - e.offsetY];
+        const old = scaleOf(w, h);
+        state.zoom = Math.min(Math.max(state.zoom * Math.exp(-0.0015 * e.deltaY), 0.02), 1e5);
+        // What is under the pointer stays there.
+        const now = scaleOf(w, h);
+        state.x += x / old - x / now;
+        state.y += y / old - y / now;
+        draw();
+      }, { passive: false });
+      scene.addEventListener("pointerdown", (e) => scene.setPointerCapture(e.pointerId));
+      scene.addEventListener("pointermove", (e) => {
+        if (!e.buttons) return;
+        const scale = scaleOf(scene.clientWidth, scene.clientHeight);
+        state.x -= e.movementX / scale;
+        state.y += e.movementY / scale;
+        draw();
+      });
+      curves.addEventListener("pointerdown", (e) => {
+        state.playing = false;
+        seek(end * (e.offsetX - 6) / Math.max(curves.clientWidth - 12, 1));
+      });
+    }
+    new ResizeObserver(draw).observe(root);
+    draw();
+    return { state, seek, step, toggle, draw, end, tick, recordings };
+  }
+
+  async function load() {
+    const parameters = new URLSearchParams(location.hash.slice(1));
+    for (const [i, root] of [...document.querySelectorAll(".replay")].entries()) {
+      try {
+        const scripts = [...root.querySelectorAll("figure > script")];
+        root.player = start(root, await Promise.all(scripts.map((s) => decode(s.textContent))));
+        root.player.seek(root.dataset.start * root.player.end);
+        if (i > 0) continue;
+        const number = (name, or) => (Number.isFinite(parseFloat(parameters.get(name))) ? parseFloat(parameters.get(name)) : or);
+        root.player.state.zoom = Math.max(number("zoom", 1), 0.02);
+        root.player.seek(number("t", root.player.state.time));
+        if (parameters.get("play") === "1") root.player.toggle();
+      } catch (error) {
+        element("p", { className: "failed", textContent: `This replay cannot be played: ${error.message}` }, root);
+      }
+      root.dataset.ready = "1";
+    }
+  }
+  load();
+})();

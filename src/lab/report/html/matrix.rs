@@ -1,0 +1,125 @@
+//! The matrix of `simpulse verify`, coloured by margin.
+
+use super::scale::number;
+use crate::lab::picture::Color;
+use crate::lab::picture::svg::escaped;
+use serde::Deserialize;
+use serde_json::Value;
+
+/// `verify.json` as far as the page needs it.
+#[derive(Debug, Deserialize)]
+pub struct Matrix {
+    cases: Vec<Case>,
+    results: Vec<Outcome>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Case {
+    case: String,
+    what: String,
+    required: bool,
+}
+
+#[derive(Debug, Deserialize)]
+struct Outcome {
+    case: String,
+    solver: String,
+    passed: Option<bool>,
+    /// A number, or the word for an infinite one.
+    #[serde(default)]
+    margin: Value,
+    #[serde(default)]
+    reason: Option<String>,
+    #[serde(default)]
+    measured: Value,
+    #[serde(default)]
+    truth: Value,
+    #[serde(default)]
+    tolerance: Value,
+}
+
+/// Blue within the tolerance, red beyond it, pale at its edge: distinct with any colour vision.
+const WITHIN: [Color; 2] = [Color::rgb(0x4393c3), Color::rgb(0xe3eff6)];
+const BEYOND: [Color; 2] = [Color::rgb(0xfde0d0), Color::rgb(0xb2182b)];
+
+/// The colour of a margin, and whether white letters are read better on it.
+fn shade(margin: f64, passed: bool) -> (String, bool) {
+    let ([from, to], share) = match passed {
+        true => (WITHIN, margin.clamp(0.0, 1.0)),
+        // A thousand times the tolerance is the darkest.
+        false => (BEYOND, margin.max(1.0).log10() / 3.0),
+    };
+    let Color(r, g, b, _) = from.towards(to, share);
+    let light = 0.3 * f64::from(r) + 0.6 * f64::from(g) + 0.1 * f64::from(b);
+    (format!("#{r:02x}{g:02x}{b:02x}"), light < 130.0)
+}
+
+fn margin_of(outcome: &Outcome) -> f64 {
+    outcome.margin.as_f64().unwrap_or(f64::INFINITY)
+}
+
+fn word(value: &Value) -> String {
+    value.as_f64().map_or_else(|| value.as_str().unwrap_or("–").to_string(), number)
+}
+
+/// The matrix as a table.
+pub fn matrix(matrix: &Matrix) -> String {
+    let mut solvers: Vec<&str> = Vec::new();
+    for outcome in &matrix.results {
+        if !solvers.contains(&outcome.solver.as_str()) {
+            solvers.push(&outcome.solver);
+        }
+    }
+    let mut text = String::from("<table class=\"numbers matrix\"><thead><tr><th>case<th>what");
+    for solver in &solvers {
+        text += &format!("<th><span>{}</span>", escaped(solver));
+    }
+    text += "</tr></thead><tbody>\n";
+    for case in &matrix.cases {
+        let star = if case.required { "*" } else { "" };
+        text += &format!("<tr><th>{}{star}<td class=\"what\">{}", escaped(&case.case), escaped(&case.what));
+        for solver in &solvers {
+            let found = matrix.results.iter().find(|o| o.case == case.case && o.solver == *solver);
+            text += &match found.map(|o| (o, o.passed)) {
+                Some((o, Some(passed))) => {
+                    let margin = margin_of(o);
+                    let (color, white) = shade(margin, passed);
+                    let ink = if white { ";color:#fff" } else { "" };
+                    let sign = if passed { "" } else { "✗ " };
+                    let shown = if margin.is_finite() { short(margin) } else { "∞".into() };
+                    let title = match &o.reason {
+                        Some(reason) => reason.clone(),
+                        None => {
+                            format!(
+                                "measured {}, truth {} ± {}",
+                                word(&o.measured),
+                                word(&o.truth),
+                                word(&o.tolerance)
+                            )
+                        }
+                    };
+                    format!(
+                        "<td style=\"background:{color}{ink}\" title=\"{}\">{sign}{shown}",
+                        escaped(&title)
+                    )
+                }
+                _ => "<td class=\"none\">n/a".into(),
+            };
+        }
+        text += "</tr>\n";
+    }
+    text + "</tbody></table>\n<p class=\"soft\">A cell is the distance to the truth in tolerances: up to 1 passes, \
+            ✗ fails. * is required of the default solver.</p>\n"
+}
+
+/// Two digits.
+fn short(margin: f64) -> String {
+    match margin {
+        0.0 => "0".into(),
+        m if m < 0.01 => "&lt; .01".into(),
+        m if m < 10.0 => format!("{m:.2}"),
+        m if m < 1000.0 => format!("{m:.0}"),
+        m if m < 9950.0 => format!("{:.1}k", 1e-3 * m),
+        m => number(m),
+    }
+}

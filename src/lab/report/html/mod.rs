@@ -1,0 +1,388 @@
+//! `report.html`: a study on one page that needs no network, made from its records alone.
+//!
+//! ```text
+//! study.json ──► StudyFile ──► words, overview, precision, sections ─┐
+//! verify.json ──► Matrix ───────────────────────────────────────────┼─► page
+//! replay-*.rec ──► recording::page::fragment ───────────────────────┘
+//! ```
+
+mod matrix;
+mod overview;
+mod panel;
+mod precision;
+mod scale;
+mod sections;
+mod setting;
+mod words;
+
+use crate::lab::error::Error;
+use crate::lab::files;
+use crate::lab::picture::svg::escaped;
+use crate::lab::recording::Header;
+use crate::lab::recording::page::{MOST, Panel, SCRIPT, STYLE, fragment};
+use crate::lab::recording::read::read_file;
+use crate::lab::report::study_file::StudyFile;
+use crate::lab::report::style::Style;
+use crate::lab::study::curve::solvers_of;
+use matrix::Matrix;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Name of the page in the folder of a study.
+pub const NAME: &str = "report.html";
+
+/// Name of the recording number `i` of a study.
+fn recording_name(i: usize) -> String {
+    format!("replay-{}.rec", i + 1)
+}
+
+/// Replaces the recordings of a study's folder; returns their paths.
+pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<PathBuf>, Error> {
+    let mut paths = Vec::new();
+    for i in 0..MOST {
+        let path = folder.join(recording_name(i));
+        match recordings.get(i) {
+            Some(bytes) => {
+                files::write(&path, bytes)?;
+                paths.push(path);
+            }
+            None if path.exists() => std::fs::remove_file(&path).map_err(Error::io(&path))?,
+            None => {}
+        }
+    }
+    Ok(paths)
+}
+
+/// Writes the page of a study into its folder, with what is there of `verify.json` and recordings;
+/// returns its path.
+///
+/// Errors: files there that are not what their names say.
+pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
+    let matrix_path = folder.join("verify.json");
+    let matrix: Option<Matrix> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
+    let mut recordings = Vec::new();
+    for path in (0..MOST).map(|i| folder.join(recording_name(i))).filter(|p| p.exists()) {
+        let (bytes, recording) = read_file(&path)?;
+        recordings.push((bytes, recording.header));
+    }
+    let path = folder.join(NAME);
+    files::write(&path, page(study, matrix.as_ref(), &recordings).as_bytes())?;
+    Ok(path)
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    let text = std::fs::read(path).map_err(Error::io(path))?;
+    serde_json::from_slice(&text).map_err(|e| Error::Format { path: path.into(), message: e.to_string() })
+}
+
+/// The whole page.
+fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]) -> String {
+    let (records, solvers) = (&study.records[..], solvers_of(&study.records));
+    let scenes = setting::scenes(records);
+    let e = &study.environment;
+    let mut text = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
+         </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{STYLE}</style>\n</head>\n<body>\n\
+         <h1>Which contact solver, how fast, and how wrong?</h1>\n\
+         <p class=\"soft\">{} scenes, {} solvers, {} settings · {}, {} lanes native · simpulse {}</p>\n",
+        include_str!("page.css"),
+        scenes.len(),
+        solvers.len(),
+        records.len(),
+        escaped(&e.cpu),
+        e.native_lanes,
+        escaped(&e.version),
+    );
+    if !study.caution().is_empty() {
+        text += &format!("<p class=\"bad\">{}</p>\n", escaped(&study.caution()));
+    }
+    let mut contents: Vec<(&str, &str)> = Vec::new();
+    let mut body = String::new();
+    let mut section = |id: &'static str, title: &'static str, lead: &str, content: String| {
+        contents.push((id, title));
+        body += &format!("<section id=\"{id}\">\n<h2>{title}</h2>\n");
+        if !lead.is_empty() {
+            body += &format!("<p>{lead}</p>\n");
+        }
+        body += &content;
+        body += "</section>\n";
+    };
+    section("answer", "The answer", "", words::answer(records, study.settings["steps"].as_u64()));
+    section(
+        "overview",
+        "Speed against error over all scenes",
+        "Small marks: every solver and budget on every scene, in colours, at its fastest lane width. Large marks: \
+         the geometric mean of a budget over the scenes on which it holds, from the smallest budget to the \
+         largest. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
+        overview::overview(records),
+    );
+    if !recordings.is_empty() {
+        let scene = escaped(&recordings[0].1.scene);
+        let lead = format!(
+            "{scene} separates the solvers more than any other scene that is small enough to play. Bodies are \
+             coloured by their deepest overlap; arrows are impulses."
+        );
+        let panels: Vec<Panel> = recordings
+            .iter()
+            .cloned()
+            .map(|(bytes, header)| Panel { bytes, color: Style::of(&header.solver).color.into(), header })
+            .collect();
+        section("replay", "Replay of the most telling scene", &lead, fragment(&panels, 0.6));
+    }
+    let mut by_scene = panel::legend(&solvers);
+    for scene in scenes {
+        let name = &scene[0].scene;
+        by_scene += &format!(
+            "<h3 id=\"{}\">{} <span class=\"soft\">{} bodies</span></h3>\n{}",
+            words::anchor(name),
+            escaped(name),
+            scene[0].bodies,
+            precision::scene(scene)
+        );
+    }
+    section(
+        "scenes",
+        "Scene by scene",
+        "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. \
+         Beside it stand its budget (substeps · sweeps) and its lanes. Bars are the quartiles of its blocks of steps. \
+         The grey line is the front: settings that no other beats in time and error. The shaded side is within the \
+         scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
+        by_scene,
+    );
+    let legend = || panel::legend(&solvers);
+    section(
+        "profiles",
+        "Performance profiles",
+        "The share of scenes that a solver solves within a factor of the fastest. Upper left is better.",
+        legend() + &sections::profiles(records),
+    );
+    section(
+        "lanes",
+        "Lanes",
+        "Each solver at its standard budget, coloured: how many times faster than one lane, and how many lanes \
+         hold a contact.",
+        legend() + &sections::lanes(records),
+    );
+    section(
+        "phases",
+        "Time per phase",
+        "Each solver at its standard budget and fastest lane width (budget@lanes); ✗ where it does not hold.",
+        sections::phases(records),
+    );
+    section(
+        "iterations",
+        "Iterations against error",
+        "Sweeps over all constraints, of every kind, that a step takes; settings that hold, coloured.",
+        legend() + &sections::iterations(records),
+    );
+    let cases = match matrix {
+        Some(found) => matrix::matrix(found),
+        None => "<p>Not run. <code>simpulse verify --json &gt; DIR/verify.json</code> and then \
+                 <code>simpulse report DIR</code> put it here.</p>\n"
+            .into(),
+    };
+    section("verify", "Hard cases whose truth is known", "", cases);
+    section("machine", "Machine, settings and command", "", machine(study));
+    text += "<nav>";
+    for (id, title) in &contents {
+        text += &format!("<a href=\"#{id}\">{title}</a> ");
+    }
+    text += "</nav>\n";
+    text += &body;
+    if !recordings.is_empty() {
+        text += &format!("<script>\n{SCRIPT}</script>\n");
+    }
+    text + "</body>\n</html>\n"
+}
+
+fn machine(study: &StudyFile) -> String {
+    let e = &study.environment;
+    let rows = [
+        ("processor", format!("{}, {} in use", e.cpu, e.processors)),
+        ("system", format!("{} on {}", e.architecture, e.system)),
+        ("compiler", e.compiler.clone()),
+        ("instructions", e.target_features.join(" ")),
+        ("native lanes", e.native_lanes.to_string()),
+        ("version", e.version.clone()),
+        ("command", command(&study.settings)),
+    ];
+    let mut text = String::from("<table class=\"facts\"><tbody>\n");
+    for (name, value) in rows {
+        let value = escaped(&value);
+        let value = if name == "command" { format!("<code>{value}</code>") } else { value };
+        text += &format!("<tr><th>{name}<td>{value}</tr>\n");
+    }
+    let settings = serde_json::to_string_pretty(&study.settings).unwrap_or_default();
+    text + &format!(
+        "</tbody></table>\n<details><summary>Every setting</summary>\n<pre>{}</pre></details>\n",
+        escaped(&settings)
+    )
+}
+
+/// The command line that repeats a study with these settings.
+fn command(settings: &Value) -> String {
+    let plain = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
+    let list = |v: &Value| v.as_array().map_or_else(Vec::new, |a| a.iter().map(plain).collect::<Vec<_>>());
+    let mut words = vec!["simpulse study".to_string()];
+    let mut option = |name: &str, values: Vec<String>| {
+        if !values.is_empty() {
+            words.push(format!("--{name} {}", values.join(",")));
+        }
+    };
+    // What a quick study shortens has no option of its own.
+    let quick = settings["timing_steps"].as_u64().is_some_and(|n| n < 100);
+    option("scenes", list(&settings["scenes"]));
+    let solvers = settings["solvers"]
+        .as_array()
+        .map_or_else(Vec::new, |a| a.iter().map(|s| plain(&s["name"])).collect());
+    option("solvers", solvers);
+    option("lanes", list(&settings["lanes"]));
+    option("orders", list(&settings["orders"]));
+    for name in ["substeps", "velocity_iterations", "relax_iterations", "position_iterations"] {
+        option(&name.replace('_', "-"), list(&settings["budgets"][name]));
+    }
+    let set = settings["set"].as_array().map_or_else(Vec::new, |a| {
+        a.iter().map(|o| format!("{}={}", plain(&o["name"]), plain(&o["value"]))).collect()
+    });
+    option("set", set);
+    let units = [("penetration", "m"), ("residual", ""), ("truth", "")];
+    let given = |(name, unit): &(&str, &str)| {
+        settings["tolerance"][name].as_f64().map(|v| format!("{name}={v}{unit}"))
+    };
+    option("tolerance", units.iter().filter_map(given).collect());
+    for name in ["steps", "repeats", "seed"] {
+        let value = &settings[name];
+        option(name, if value.is_u64() { vec![value.to_string()] } else { Vec::new() });
+    }
+    if quick {
+        words.insert(1, "--quick".into());
+    }
+    words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes::tolerance::Tolerances;
+    use crate::lab::study::record::tests::{failed, fell, record};
+    use crate::lab::study::{Record, StudyPlan, TruthError, mark_fronts};
+
+    fn records() -> Vec<Record> {
+        let truth = TruthError { quantity: "load of <ground>", unit: "N", expected: 100.0, error: Some(2e3) };
+        let soft = |substeps, time, error| Record {
+            solver: "soft_step",
+            truth: Some(truth),
+            speed_up: Some(3.0),
+            tolerances: Tolerances::standard().percent(1e7),
+            ..record(8, substeps, time, error)
+        };
+        let mut records = vec![
+            record(8, 1, 10.0, 0.1),
+            record(8, 2, 20.0, 0.001),
+            record(1, 2, 60.0, 0.001),
+            fell(8, 4, 5.0, 0.0),
+            failed(8),
+            soft(1, 12.0, 0.05),
+            soft(2, 25.0, 0.002),
+        ];
+        mark_fronts(&mut records);
+        records
+    }
+
+    fn read(records: &[Record]) -> StudyFile {
+        StudyFile::new(&StudyPlan::quick(), records.to_vec(), vec!["arch".into()])
+    }
+
+    /// Every element that is opened is closed, in order; cells and rows may close themselves.
+    fn is_balanced(page: &str) -> bool {
+        let mut open: Vec<&str> = Vec::new();
+        let optional = ["th", "td", "tr", "meta", "link", "input"];
+        for part in page.split('<').skip(1) {
+            let Some((tag, _)) = part.split_once('>') else { continue };
+            let name = tag.trim_start_matches('/').split([' ', '\n', '/']).next().unwrap_or("");
+            if optional.contains(&name) || tag.starts_with('!') || tag.ends_with('/') {
+                continue;
+            }
+            if tag.starts_with('/') {
+                if open.pop() != Some(name) {
+                    return false;
+                }
+            } else {
+                open.push(name);
+            }
+        }
+        open.is_empty()
+    }
+
+    #[test]
+    fn the_page_says_everything_and_loads_nothing() {
+        let study = read(&records());
+        let page = page(&study, None, &[]);
+        for part in [
+            "PARTIAL: without arch",
+            "ranks first: it is good enough on",
+            "fell at step 100",
+            "blew up at step 7",
+            "performance profiles",
+            "lanes filled",
+            "time per phase",
+            "sweeps of a step",
+            "deepest penetration",
+            "load of &lt;ground&gt;",
+            "2 kN",
+            "simpulse study --quick --scenes",
+            "media print",
+            "simpulse verify --json &gt;",
+        ] {
+            assert!(page.to_lowercase().contains(&part.to_lowercase()), "{part}");
+        }
+        for outside in ["http://", "https://", "src=", "@import", "NaN", "<ground>"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        assert!(is_balanced(&page));
+    }
+
+    #[test]
+    fn a_solver_looks_the_same_alone_and_among_others() {
+        let all = records();
+        let alone: Vec<Record> = all.iter().filter(|r| r.solver == "soft_step").cloned().collect();
+        let Style { color, .. } = Style::of("soft_step");
+        for records in [&all[..], &alone] {
+            let page = page(&read(records), None, &[]);
+            assert!(page.contains(&panel::legend(&["soft_step"])[18..]), "legend");
+            assert!(page.contains(&format!("stroke=\"{color}\"")));
+        }
+        assert_ne!(Style::of("pgs"), Style::of("soft_step"));
+    }
+
+    #[test]
+    fn the_matrix_is_coloured_by_margin() {
+        let json = r#"{"cases":[{"case":"A1","what":"slides","required":true}],"results":[
+            {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"truth":1,"tolerance":2},
+            {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
+            {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
+        let text = matrix::matrix(&serde_json::from_str(json).unwrap());
+        assert!(
+            text.contains("A1*") && text.contains(">0.50") && text.contains("✗ ∞") && text.contains("n/a")
+        );
+        assert!(text.contains("background:#93c1dd"), "{text}");
+    }
+
+    #[test]
+    fn what_is_no_matrix_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("verify.json"), "{\"cases\": 3}").unwrap();
+        let message = write(folder.path(), &read(&records())).unwrap_err().to_string();
+        assert!(message.contains("verify.json") && !message.contains('\n'), "{message}");
+    }
+
+    #[test]
+    fn old_recordings_go_when_new_ones_come() {
+        let folder = tempfile::tempdir().unwrap();
+        write_recordings(folder.path(), &[vec![1], vec![2]]).unwrap();
+        let paths = write_recordings(folder.path(), &[vec![3]]).unwrap();
+        assert_eq!(paths, [folder.path().join("replay-1.rec")]);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,125 @@
+//! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
+//! tolerances of each scene.
+
+use super::panel::{Frame, Labels, Panel, legend};
+use super::scale::{Scale, number};
+use super::setting::{Setting, fastest, scenes};
+use crate::lab::report::style::Style;
+use crate::lab::study::Record;
+use crate::lab::study::curve::solvers_of;
+
+/// A setting on a scene.
+struct Dot<'a> {
+    entry: &'a Record,
+    /// Time in times that of the fastest that holds there.
+    slower: f64,
+    /// Which of the solver's budgets.
+    budget: usize,
+}
+
+/// Errors this much within tolerance are as good as none.
+const LEAST: f64 = 1e-3;
+/// Errors this much beyond it are as good as any.
+const MOST: f64 = 1e4;
+
+fn dots(records: &[Record]) -> Vec<Dot<'_>> {
+    let mut dots = Vec::new();
+    for scene in scenes(records) {
+        let entries: Vec<&Record> = fastest(scene).into_iter().filter(|e| !e.is_natural()).collect();
+        let holding = entries.iter().filter(|e| e.broke().is_none());
+        let least = holding.filter_map(|e| e.time()).fold(f64::INFINITY, f64::min);
+        if !least.is_finite() {
+            continue;
+        }
+        for solver in solvers_of(records) {
+            let own = entries.iter().filter(|e| e.solver == solver);
+            for (budget, entry) in own.enumerate() {
+                dots.extend(entry.time().map(|time| Dot { entry, slower: time / least, budget }));
+            }
+        }
+    }
+    dots
+}
+
+fn mean(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v.ln()).sum::<f64>() / values.len().max(1) as f64).exp()
+}
+
+/// The plot with its legend.
+pub fn overview(records: &[Record]) -> String {
+    let dots = dots(records);
+    if dots.is_empty() {
+        return "<p>No setting holds on any scene.</p>\n".into();
+    }
+    let wrong = |e: &Record| e.worst().map(|x| x.clamp(LEAST, MOST));
+    let x = Scale::log(dots.iter().filter_map(|d| wrong(d.entry)).chain([0.1, 10.0]), "");
+    let y = Scale::log(dots.iter().map(|d| d.slower).chain([1.0, 3.0]), "×");
+    let frame = Frame {
+        size: [980.0, 560.0],
+        title: "",
+        names: [
+            "largest error, in the tolerance of its scene (1 = just within)",
+            "time of a step, in times that of the fastest setting that holds",
+        ],
+        band: true,
+    };
+    let mut panel = Panel::new(&frame, x, y);
+    panel.shade_left(1.0);
+    panel.upright(1.0, "tolerance", "tolerance of the scene");
+    let [left, top, ..] = panel.sides();
+    panel.write([left + 10.0, top + 18.0], "note", "within tolerance");
+    for dot in &dots {
+        let e = dot.entry;
+        let title =
+            format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.words(), number(dot.slower));
+        match wrong(e) {
+            Some(x) => {
+                let title = format!("{title}, error {} tolerances", number(x));
+                panel.marker(panel.at(x, dot.slower), 2.6, e.solver, false, true, &title);
+            }
+            None => {
+                let title = format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its truth".into()));
+                let place = Style::of(e.solver).marker as usize as f64 / 7.0;
+                panel.marker(panel.in_band(dot.slower, place), 2.6, e.solver, false, true, &title);
+            }
+        }
+    }
+    let (mut labels, mut names) = (Labels::default(), Vec::new());
+    for solver in solvers_of(records) {
+        let mut line = Vec::new();
+        let own: Vec<&Dot> = dots.iter().filter(|d| d.entry.solver == solver).collect();
+        for budget in 0..=own.iter().map(|d| d.budget).max().unwrap_or(0) {
+            let all = own.iter().filter(|d| d.budget == budget);
+            let held: Vec<(f64, f64)> =
+                all.clone().filter_map(|d| wrong(d.entry).map(|x| (x, d.slower))).collect();
+            if held.is_empty() {
+                continue;
+            }
+            let (xs, ys): (Vec<f64>, Vec<f64>) = held.iter().copied().unzip();
+            let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
+            let (held_on, of) = (held.len(), all.clone().count());
+            let title = format!(
+                "{solver}, {name}: holds on {} of {} scenes; there {} tolerances and {}× in the mean",
+                held_on,
+                of,
+                number(mean(&xs)),
+                number(mean(&ys))
+            );
+            line.push((panel.at(mean(&xs), mean(&ys)), title, format!("{solver} {held_on}/{of}")));
+        }
+        let at: Vec<[f64; 2]> = line.iter().map(|l| l.0).collect();
+        panel.line(&at, "curve", Style::of(solver).color);
+        for (i, (at, title, _)) in line.iter().enumerate() {
+            labels.block(*at, 6.0 + 1.5 * i as f64);
+            panel.marker(*at, 6.0 + 1.5 * i as f64, solver, false, false, title);
+        }
+        names.extend(line.pop().map(|(at, _, name)| (at, name)));
+    }
+    for (at, name) in names {
+        if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides())
+        {
+            panel.write(place, "dot-name", &name);
+        }
+    }
+    legend(&solvers_of(records)) + &panel.finish()
+}

@@ -1,0 +1,238 @@
+//! A plot: a frame with a grid and ticks, and marks within it, as inline SVG.
+
+use super::scale::Scale;
+use crate::lab::picture::svg::{escaped, points, px};
+use crate::lab::report::style::Style;
+
+/// Width of the band for what has no place on the axis (pixels).
+const BAND: f64 = 34.0;
+
+/// An SVG being written.
+pub struct Panel {
+    text: String,
+    left: f64,
+    top: f64,
+    right: f64,
+    bottom: f64,
+    x: Scale,
+    y: Scale,
+}
+
+/// What a panel looks like.
+pub struct Frame<'a> {
+    /// Width and height (pixels).
+    pub size: [f64; 2],
+    /// Over it.
+    pub title: &'a str,
+    /// Names of the axes.
+    pub names: [&'a str; 2],
+    /// A band at the right for what failed.
+    pub band: bool,
+}
+
+impl Panel {
+    /// Draws the frame.
+    pub fn new(frame: &Frame, x: Scale, y: Scale) -> Panel {
+        let [width, height] = frame.size;
+        let (left, top, bottom) = (70.0, if frame.title.is_empty() { 10.0 } else { 30.0 }, height - 46.0);
+        let right = width - 12.0 - if frame.band { BAND } else { 0.0 };
+        let title = escaped(frame.title);
+        let mut text = format!(
+            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}, {} against {}\">\n\
+             <text class=\"title\" x=\"{left}\" y=\"18\">{title}</text>\n",
+            escaped(frame.names[1]),
+            escaped(frame.names[0])
+        );
+        let across = |v: f64| px(left + x.share(v) * (right - left));
+        let up = |v: f64| px(bottom - y.share(v) * (bottom - top));
+        let mut grid = String::new();
+        for (v, _) in &x.ticks {
+            grid += &format!("M{} {}V{}", across(*v), px(top), px(bottom));
+        }
+        for (v, _) in &y.ticks {
+            grid += &format!("M{} {}H{}", px(left), up(*v), px(right));
+        }
+        text += &format!("<path class=\"grid\" d=\"{grid}\"/>\n");
+        let mut ticks = String::new();
+        for v in &x.minor {
+            ticks += &format!("M{} {}v-3", across(*v), px(bottom));
+        }
+        for v in &y.minor {
+            ticks += &format!("M{} {}h3", px(left), up(*v));
+        }
+        let (w, h) = (px(right - left), px(bottom - top));
+        text += &format!(
+            "<path class=\"frame\" d=\"{ticks}\"/>\n\
+             <rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{w}\" height=\"{h}\"/>\n",
+            px(left),
+            px(top)
+        );
+        for (v, label) in &x.ticks {
+            text +=
+                &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", across(*v), px(bottom + 15.0));
+        }
+        for (v, label) in &y.ticks {
+            text += &format!(
+                "<text class=\"y\" x=\"{}\" y=\"{}\" dy=\".35em\">{label}</text>",
+                px(left - 5.0),
+                up(*v)
+            );
+        }
+        let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
+        text += &format!(
+            "\n<text class=\"name\" x=\"{middle}\" y=\"{}\">{}</text>\n\
+             <text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
+            px(height - 10.0),
+            escaped(frame.names[0]),
+            escaped(frame.names[1])
+        );
+        if frame.band {
+            text += &format!(
+                "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{h}\"/>\n\
+                 <text class=\"x\" x=\"{}\" y=\"{}\">fails</text>\n",
+                px(right + 2.0),
+                px(top),
+                px(BAND - 2.0),
+                px(right + 0.5 * BAND),
+                px(bottom + 15.0)
+            );
+        }
+        Panel { text, left, top, right, bottom, x, y }
+    }
+
+    /// Where values are (pixels).
+    pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let across = self.left + self.x.share(x) * (self.right - self.left);
+        [across, self.bottom - self.y.share(y) * (self.bottom - self.top)]
+    }
+
+    /// Where something that failed is drawn, `place` in [0, 1] across the band.
+    pub fn in_band(&self, y: f64, place: f64) -> [f64; 2] {
+        let [_, down] = self.at(self.x.low, y);
+        [self.right + 8.0 + place * (BAND - 14.0), down]
+    }
+
+    /// A broken line through pixels.
+    pub fn line(&mut self, at: &[[f64; 2]], class: &str, color: &str) {
+        if at.len() > 1 {
+            self.text +=
+                &format!("<polyline class=\"{class}\" points=\"{}\" stroke=\"{color}\"/>\n", points(at));
+        }
+    }
+
+    /// An upright line at x, over the height of the frame.
+    pub fn upright(&mut self, x: f64, class: &str, title: &str) {
+        let [across, _] = self.at(x, self.y.low);
+        self.text += &format!(
+            "<path class=\"{class}\" d=\"M{} {}V{}\"><title>{}</title></path>\n",
+            px(across),
+            px(self.top),
+            px(self.bottom),
+            escaped(title)
+        );
+    }
+
+    /// Everything left of x within the frame.
+    pub fn shade_left(&mut self, x: f64) {
+        let [across, _] = self.at(x, self.y.low);
+        self.text += &format!(
+            "<rect class=\"good\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
+            px(self.left),
+            px(self.top),
+            px(across - self.left),
+            px(self.bottom - self.top)
+        );
+    }
+
+    /// From one y to another at x.
+    pub fn bar(&mut self, x: f64, ys: [f64; 2], color: &str) {
+        let [[a, b], [_, c]] = ys.map(|y| self.at(x, y));
+        self.text +=
+            &format!("<path class=\"bar\" stroke=\"{color}\" d=\"M{} {}V{}\"/>\n", px(a), px(b), px(c));
+    }
+
+    /// A solver's marker, `r` pixels; hollow for natural order.
+    pub fn marker(&mut self, at: [f64; 2], r: f64, solver: &str, hollow: bool, faint: bool, title: &str) {
+        let Style { color, marker } = Style::of(solver);
+        let fill = if hollow { "#fff" } else { color };
+        let faint = if faint { " class=\"faint\"" } else { "" };
+        self.text += &format!(
+            "<path{faint} d=\"{}\" fill=\"{fill}\" stroke=\"{color}\" stroke-width=\"1.3\"><title>{}</title></path>\n",
+            marker.path(at, r),
+            escaped(title)
+        );
+    }
+
+    /// Text at pixels.
+    pub fn write(&mut self, [x, y]: [f64; 2], class: &str, text: &str) {
+        self.text +=
+            &format!("<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n", px(x), px(y), escaped(text));
+    }
+
+    /// The frame's sides (pixels): left, top, right, bottom.
+    pub fn sides(&self) -> [f64; 4] {
+        [self.left, self.top, self.right, self.bottom]
+    }
+
+    /// The whole element.
+    pub fn finish(self) -> String {
+        self.text + "</svg>\n"
+    }
+}
+
+/// Labels beside points, where there is room.
+#[derive(Default)]
+pub struct Labels {
+    taken: Vec<[f64; 4]>,
+}
+
+impl Labels {
+    /// Where the left end of a label's baseline goes, `width` pixels wide and `size` high, beside a
+    /// point of radius `r`; none where every place is taken.
+    pub fn place(
+        &mut self,
+        [x, y]: [f64; 2],
+        r: f64,
+        [width, size]: [f64; 2],
+        [left, top, right, bottom]: [f64; 4],
+    ) -> Option<[f64; 2]> {
+        let (near, far) = (x + r + 2.0, x - r - 2.0 - width);
+        let corners = [
+            [near, y - 2.0],
+            [near, y + size],
+            [far, y - 2.0],
+            [far, y + size],
+            [x - 0.5 * width, y - r - 3.0],
+            [x - 0.5 * width, y + r + size],
+        ];
+        let own = corners.into_iter().find(|&[u, v]| {
+            let inside = u > left && u + width < right && v - size > top && v < bottom;
+            let free = |t: &[f64; 4]| u > t[2] || u + width < t[0] || v - size > t[3] || v < t[1];
+            inside && self.taken.iter().all(free)
+        });
+        self.block([x, y], r);
+        let [u, v] = own?;
+        self.taken.push([u, v - size, u + width, v]);
+        own
+    }
+
+    /// Keeps labels off a point of radius `r`.
+    pub fn block(&mut self, [x, y]: [f64; 2], r: f64) {
+        self.taken.push([x - r, y - r, x + r, y + r]);
+    }
+}
+
+/// The markers of solvers with their names.
+pub fn legend(solvers: &[&str]) -> String {
+    let mut text = String::from("<p class=\"legend\">");
+    for solver in solvers {
+        let Style { color, marker } = Style::of(solver);
+        text += &format!(
+            "<span><svg viewBox=\"0 0 26 14\"><path d=\"M1 7H25\" stroke=\"{color}\" stroke-width=\"2\"/>\
+             <path d=\"{}\" fill=\"{color}\"/></svg>{}</span> ",
+            marker.path([13.0, 7.0], 5.0),
+            escaped(solver)
+        );
+    }
+    text + "</p>\n"
+}

@@ -1,0 +1,109 @@
+//! What a page asks of a record.
+
+use crate::engine::world::Order;
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis};
+use crate::lab::study::{Record, answer};
+use crate::lab::units::lanes;
+
+/// Questions to a setting, which is a record at its fastest lane width.
+pub trait Setting {
+    /// Time of a step (s).
+    fn time(&self) -> Option<f64>;
+    /// An error that can be drawn on a logarithmic axis.
+    fn drawn(&self, axis: ErrorAxis) -> Option<f64>;
+    /// The most that an error may be.
+    fn tolerance(&self, axis: ErrorAxis) -> Option<f64>;
+    /// Whether no other setting beats it in time and in that error.
+    fn on_front(&self, axis: ErrorAxis) -> bool;
+    /// What went wrong, and when; none if the run holds.
+    fn broke(&self) -> Option<String>;
+    /// Whether it has no colours.
+    fn is_natural(&self) -> bool;
+    /// The largest of its errors in their tolerances; none if it does not hold, or missed its truth.
+    fn worst(&self) -> Option<f64>;
+    /// Budget and order or width in words.
+    fn words(&self) -> String;
+    /// The same in few letters.
+    fn label(&self) -> String;
+}
+
+impl Setting for Record {
+    fn time(&self) -> Option<f64> {
+        self.lap.as_ref().map(|lap| 1e-9 * lap.median_ns)
+    }
+
+    fn drawn(&self, axis: ErrorAxis) -> Option<f64> {
+        axis.of(self).map(|error| error.max(ERROR_FLOOR))
+    }
+
+    fn tolerance(&self, axis: ErrorAxis) -> Option<f64> {
+        match axis {
+            ErrorAxis::Penetration => Some(self.tolerances.penetration.value),
+            ErrorAxis::Law => Some(self.tolerances.residual.value),
+            ErrorAxis::Truth => self.tolerances.truth.as_ref().map(|t| t.value),
+        }
+    }
+
+    fn on_front(&self, axis: ErrorAxis) -> bool {
+        match axis {
+            ErrorAxis::Penetration => self.front.penetration,
+            ErrorAxis::Law => self.front.law,
+            ErrorAxis::Truth => self.front.truth,
+        }
+    }
+
+    fn broke(&self) -> Option<String> {
+        let step = self.broken.map(|b| b.step).or(self.failure.map(|f| f.step));
+        self.mark().zip(step).map(|(mark, step)| format!("{} at step {step}", mark.word()))
+    }
+
+    fn is_natural(&self) -> bool {
+        self.order == Order::Natural
+    }
+
+    fn worst(&self) -> Option<f64> {
+        Some(self.excess()).filter(|x| x.is_finite())
+    }
+
+    fn words(&self) -> String {
+        match self.is_natural() {
+            true => format!("{}, natural order", self.budget_text),
+            false => format!("{}, {}", self.budget_text, lanes(self.lanes)),
+        }
+    }
+
+    fn label(&self) -> String {
+        let numbers: Vec<&str> = self.budget_text.split(' ').filter(|w| w.parse::<u32>().is_ok()).collect();
+        let width = if self.is_natural() { "nat".into() } else { self.lanes.to_string() };
+        format!("{}@{width}", numbers.join("·"))
+    }
+}
+
+/// The records of each scene.
+pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
+    records.chunk_by(|a, b| a.scene == b.scene).collect()
+}
+
+/// Every setting of a scene at its fastest width; those that failed, at any.
+pub fn fastest(scene: &[Record]) -> Vec<&Record> {
+    let mut kept: Vec<&Record> = Vec::new();
+    for record in scene {
+        match kept.iter_mut().find(|k| answer::same(k, record)) {
+            Some(other) => {
+                if record.time().unwrap_or(f64::INFINITY) < other.time().unwrap_or(f64::INFINITY) {
+                    *other = record;
+                }
+            }
+            None => kept.push(record),
+        }
+    }
+    kept
+}
+
+/// Of each solver the setting in the middle of its budgets, coloured where there is such a run.
+pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
+    let own: Vec<&Record> = fastest(scene).into_iter().filter(|r| r.solver == solver).collect();
+    let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.is_natural()).collect();
+    let own = if colored.is_empty() { own } else { colored };
+    own.get(own.len() / 2).copied()
+}

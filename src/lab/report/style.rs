@@ -1,0 +1,142 @@
+//! A colour and a marker per solver, the same in every plot, whatever else is in it.
+//!
+//! Eight colours that differ with any colour vision (Okabe and Ito, yellow darkened for lines on
+//! white) times eight markers. A solver's place in [`VARIANTS`] decides; neighbours differ in both,
+//! and sixty-four solvers differ in one of them.
+
+use crate::engine::solvers::VARIANTS;
+use crate::lab::picture::Color;
+
+const COLORS: [&str; 8] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222", "#8a7f00"];
+
+/// How a solver is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Style {
+    /// CSS colour.
+    pub color: &'static str,
+    /// Shape of its marker.
+    pub marker: Marker,
+}
+
+/// The shape of a marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Marker {
+    /// ●
+    Disc,
+    /// ■
+    Square,
+    /// ▲
+    Triangle,
+    /// ◆
+    Diamond,
+    /// ▼
+    Wedge,
+    /// ✚
+    Plus,
+    /// ⬟
+    Pentagon,
+    /// ✖
+    Cross,
+}
+
+const MARKERS: [Marker; 8] = [
+    Marker::Disc,
+    Marker::Square,
+    Marker::Triangle,
+    Marker::Diamond,
+    Marker::Wedge,
+    Marker::Plus,
+    Marker::Pentagon,
+    Marker::Cross,
+];
+
+impl Style {
+    /// Of the solver of this name; one that this program does not have gets one by its letters.
+    pub fn of(solver: &str) -> Style {
+        let known = VARIANTS.iter().position(|v| v.name == solver);
+        let place = known.unwrap_or_else(|| solver.bytes().fold(7, |sum, b| (sum * 31 + b as usize) % 64));
+        Style::at(place)
+    }
+
+    /// The colour as numbers.
+    pub fn rgb(self) -> Color {
+        Color::rgb(u32::from_str_radix(&self.color[1..], 16).unwrap_or_default())
+    }
+
+    fn at(place: usize) -> Style {
+        Style { color: COLORS[place % 8], marker: MARKERS[(place + place / 8) % 8] }
+    }
+}
+
+impl Marker {
+    /// The shape as an SVG path around a point; `r` is half its width.
+    pub fn path(self, [x, y]: [f64; 2], r: f64) -> String {
+        use crate::lab::picture::svg::px;
+        let polygon = |corners: &[[f64; 2]]| {
+            let at = |[u, v]: &[f64; 2]| format!("{} {}", px(x + r * u), px(y + r * v));
+            let corners: Vec<String> = corners.iter().map(at).collect();
+            format!("M{}Z", corners.join("L"))
+        };
+        match self {
+            Marker::Disc => {
+                let (left, d, r) = (px(x - r), px(2.0 * r), px(r));
+                format!("M{left} {y}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", y = px(y))
+            }
+            Marker::Square => polygon(&[[-0.88, -0.88], [0.88, -0.88], [0.88, 0.88], [-0.88, 0.88]]),
+            Marker::Triangle => polygon(&[[0.0, -1.15], [1.1, 0.8], [-1.1, 0.8]]),
+            Marker::Diamond => polygon(&[[0.0, -1.25], [1.1, 0.0], [0.0, 1.25], [-1.1, 0.0]]),
+            Marker::Wedge => polygon(&[[0.0, 1.15], [1.1, -0.8], [-1.1, -0.8]]),
+            Marker::Plus => polygon(&[
+                [-0.36, -1.1],
+                [0.36, -1.1],
+                [0.36, -0.36],
+                [1.1, -0.36],
+                [1.1, 0.36],
+                [0.36, 0.36],
+                [0.36, 1.1],
+                [-0.36, 1.1],
+                [-0.36, 0.36],
+                [-1.1, 0.36],
+                [-1.1, -0.36],
+                [-0.36, -0.36],
+            ]),
+            Marker::Pentagon => {
+                polygon(&[[0.0, -1.1], [1.05, -0.34], [0.65, 0.89], [-0.65, 0.89], [-1.05, -0.34]])
+            }
+            Marker::Cross => polygon(&[
+                [-1.0, -0.6],
+                [-0.6, -1.0],
+                [0.0, -0.4],
+                [0.6, -1.0],
+                [1.0, -0.6],
+                [0.4, 0.0],
+                [1.0, 0.6],
+                [0.6, 1.0],
+                [0.0, 0.4],
+                [-0.6, 1.0],
+                [-1.0, 0.6],
+                [-0.4, 0.0],
+            ]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixty_four_solvers_look_different_and_neighbours_in_both() {
+        for i in 0..64 {
+            assert!((0..i).all(|j| Style::at(i) != Style::at(j)), "{i}");
+            let (a, b) = (Style::at(i), Style::at(i + 1));
+            assert!(a.color != b.color && a.marker != b.marker, "{i}");
+        }
+        let styles: Vec<Style> = VARIANTS.iter().map(|v| Style::of(v.name)).collect();
+        assert!((0..styles.len()).all(|i| !styles[..i].contains(&styles[i])));
+        assert_eq!(Style::at(0).rgb(), Color(0x00, 0x72, 0xb2, 255));
+        // One that is not here keeps its own, too.
+        assert_eq!(Style::of("somebody_elses"), Style::of("somebody_elses"));
+    }
+}

@@ -1,0 +1,133 @@
+//! The scene that tells solvers apart the most, and recordings of it.
+
+use super::answer::Answer;
+use super::curve::solvers_of;
+use super::{Cell, Record, StudyPlan, settings};
+use crate::engine::lanes::LaneWidth;
+use crate::engine::world::{Order, Settings, World};
+use crate::lab::error::Error;
+use crate::lab::recording::record::{Caption, Recorder};
+use crate::lab::scenes::Loaded;
+use crate::lab::scenes::holds::Watch;
+use crate::lab::units::lanes;
+use std::cmp::Reverse;
+
+/// Runs side by side.
+const MOST: usize = 4;
+/// A page should open at once: bodies of a scene that is played, and frames of a recording.
+const LARGEST: usize = 300;
+const FRAMES: u32 = 300;
+
+/// The runs to play: of the scene on which as many solvers hold as fail, the cheapest setting within
+/// tolerance or nearest to it, then those that broke, then others that hold; each of another solver.
+/// Empty where nothing was run in colours on a small scene.
+pub fn telling(records: &[Record]) -> Vec<&Record> {
+    let mut best: (usize, usize, Vec<&Record>) = Default::default();
+    for scene in records.chunk_by(|a, b| a.scene == b.scene).filter(|s| s[0].bodies <= LARGEST) {
+        let solvers = solvers_of(scene);
+        let colored = || scene.iter().filter(|r| r.order == Order::Colored);
+        let own = |solver: &'static str| colored().filter(move |r| r.solver == solver);
+        let fails = |solver: &&'static str| own(solver).any(|r| !r.holds());
+        let holds = |solver: &&'static str| own(solver).any(|r| r.holds());
+        let contrast =
+            solvers.iter().filter(|s| fails(s)).count().min(solvers.iter().filter(|s| holds(s)).count());
+        let mut chosen: Vec<&Record> = Vec::new();
+        let answer = Answer::of(scene);
+        let first = answer.as_ref().and_then(|a| {
+            a.good
+                .iter()
+                .copied()
+                .find(|r| r.order == Order::Colored)
+                .or(a.nearest.filter(|r| r.order == Order::Colored))
+        });
+        chosen.extend(first);
+        let mut broken: Vec<&Record> = colored().filter(|r| !r.holds() && r.failure.is_none()).collect();
+        broken.sort_by_key(|r| (r.broken.map_or(0, |b| b.step), Reverse(r.lanes)));
+        let mut others: Vec<&Record> = colored().filter(|r| r.holds()).collect();
+        others.sort_by(|a, b| a.excess().total_cmp(&b.excess()).then(b.lanes.cmp(&a.lanes)));
+        // The worst, the next worst, and then who holds best.
+        for (list, limit) in [(&broken, MOST - 1), (&others, MOST), (&broken, MOST)] {
+            for record in list {
+                if chosen.len() < limit && chosen.iter().all(|c| c.solver != record.solver) {
+                    chosen.push(record);
+                }
+            }
+        }
+        if !chosen.is_empty() && (contrast, scene[0].bodies) > (best.0, best.1) {
+            best = (contrast, scene[0].bodies, chosen);
+        }
+    }
+    best.2
+}
+
+/// Runs the most telling scene again and records it; the bytes of files. A run that blows up is
+/// recorded up to there.
+pub fn recordings(plan: &StudyPlan, records: &[Record]) -> Result<Vec<Vec<u8>>, Error> {
+    telling(records).into_iter().map(|record| recording(plan, record)).collect()
+}
+
+fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
+    let (mut name, mut loaded) = ("", None);
+    for given in &plan.scenes {
+        let opened = plan.open(given)?;
+        if opened.scene.name == record.scene {
+            (name, loaded) = (given.as_str(), Some(opened));
+        }
+    }
+    let solver = plan.solvers.iter().find(|v| v.name == record.solver).copied();
+    let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
+        return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
+    };
+    let cell = Cell { scene: 0, name, solver, budget: record.budget };
+    let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
+    let own = settings(plan, &cell, record.order, width);
+    let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
+    let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
+    let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
+    let mut recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
+    let mut watch = Watch::new(&world, demands);
+    for _ in 0..scene.steps {
+        if let Err(divergence) = world.step() {
+            return recorder.finish(&format!("blew up at step {}", divergence.step));
+        }
+        watch.observe(&world);
+        recorder.add(&world)?;
+    }
+    recorder.finish(&watch.broken().map_or("holds".to_string(), |broken| broken.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::recording::read::read;
+    use crate::lab::study::record::tests::{fell, record};
+
+    #[test]
+    fn the_scene_with_the_most_contrast_is_told() {
+        let on = |scene: &str, solver: &'static str, record: Record| Record {
+            scene: scene.into(),
+            solver,
+            ..record
+        };
+        let records = [
+            on("calm", "a", record(8, 1, 1.0, 0.0)),
+            on("calm", "b", record(8, 1, 1.0, 0.0)),
+            on("split", "a", record(8, 1, 1.0, 1e-3)),
+            on("split", "b", fell(8, 1, 1.0, 0.0)),
+            on("split", "c", record(8, 1, 1.0, 1.0)),
+            Record { bodies: 9999, ..on("large", "a", record(8, 1, 1.0, 0.0)) },
+        ];
+        let chosen: Vec<_> = telling(&records).iter().map(|r| (r.scene.as_str(), r.solver)).collect();
+        assert_eq!(chosen, [("split", "a"), ("split", "b"), ("split", "c")]);
+        assert!(telling(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_recording_is_of_the_run_that_was_chosen() {
+        let plan = StudyPlan { scenes: vec!["stack:2".into()], steps: Some(20), ..StudyPlan::default() };
+        let files = recordings(&plan, &[record(4, 1, 1.0, 1e-3)]).unwrap();
+        let found = read(&files[0]).unwrap();
+        assert_eq!((found.header.solver.as_str(), found.frames.len()), ("pgs", 21));
+        assert_eq!(found.header.setting, "1 sub, 4 lanes");
+    }
+}

@@ -1,0 +1,35 @@
+//! Pictures, recordings and pages as a user meets them; pages in a real browser where there is one.
+
+mod browser;
+mod files;
+mod replay;
+mod report;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs the program in a folder.
+fn simpulse(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()
+}
+
+/// Runs it; it must succeed. Returns standard output.
+fn succeeds(folder: &Path, args: &[&str]) -> String {
+    let output = simpulse(folder, args);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs it; it must refuse in one line that has these parts, and leave no file.
+fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
+    let count = || std::fs::read_dir(folder).unwrap().count();
+    let before = count();
+    let output = simpulse(folder, args);
+    let message = String::from_utf8_lossy(&output.stderr).to_string();
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
+    assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{args:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{args:?}: '{part}' is not in: {message}");
+    }
+    assert_eq!(count(), before, "{args:?}");
+}

@@ -1,0 +1,89 @@
+//! The page of a study.
+
+use crate::browser::{count, drive, or_skip, screenshot};
+use crate::{refused, succeeds};
+use std::path::Path;
+
+fn study(folder: &Path) {
+    let scenes = "stack:3,card_house,incline_slip";
+    let args =
+        ["study", "--scenes", scenes, "--lanes", "1,8", "--steps", "60", "--repeats", "1", "--out", "r"];
+    succeeds(folder, &args);
+}
+
+#[test]
+fn the_page_is_made_again_from_the_records() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    study(path);
+    let page = path.join("r/report.html");
+    let first = std::fs::read_to_string(&page).unwrap();
+    assert!(first.contains("id=\"scene-stack-3\"") && first.contains("class=\"replay\""));
+    assert!(first.contains("Not run. <code>simpulse verify"));
+    std::fs::remove_file(&page).unwrap();
+    succeeds(path, &["report", "r"]);
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), first);
+    let matrix = succeeds(path, &["verify", "--cases", "B2", "--json"]);
+    std::fs::write(path.join("r/verify.json"), matrix).unwrap();
+    succeeds(path, &["report", "r"]);
+    let with = std::fs::read_to_string(&page).unwrap();
+    assert!(with.contains("B2.box") && with.contains("background:#") && !with.contains("Not run."));
+    refused(path, &["report", "nowhere"], &["nowhere/study.json"]);
+    std::fs::write(path.join("r/study.json"), "[]").unwrap();
+    refused(path, &["report", "r"], &["study.json"]);
+}
+
+#[test]
+fn the_page_is_whole_in_a_browser() {
+    let Some(browser) = or_skip("the_page_is_whole_in_a_browser") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path());
+    let page = folder.path().join("r/report.html");
+    let found = drive(
+        &browser,
+        &page,
+        "",
+        r#"
+        const plots = [...document.querySelectorAll("svg[role=img]")];
+        const outside = [];
+        for (const svg of plots) {
+            const [, , w, h] = svg.getAttribute("viewBox").split(" ").map(Number);
+            for (const text of svg.querySelectorAll("text")) {
+                if (text.getAttribute("transform") || text.classList.contains("dot-name")) continue;
+                const b = text.getBBox();
+                if (b.x < -1 || b.y < -1 || b.x + b.width > w + 1 || b.y + b.height > h + 1) outside.push(text.textContent);
+            }
+        }
+        const player = document.querySelector(".replay").player;
+        player.step(5);
+        return {
+            plots: plots.length, outside, empty: plots.filter((s) => s.getBoundingClientRect().height < 40).length,
+            titles: document.querySelectorAll("svg title").length,
+            links: [...document.querySelectorAll("nav a, th a")].filter((a) => !document.querySelector(a.getAttribute("href"))).length,
+            wide: document.body.scrollWidth - document.body.clientWidth,
+            time: player.state.time, tick: player.tick,
+        };
+        "#,
+    );
+    assert_eq!(found["errors"], serde_json::json!([]), "{found}");
+    for (name, value) in
+        [("outside", serde_json::json!([])), ("empty", 0.into()), ("links", 0.into()), ("wide", 0.into())]
+    {
+        assert_eq!(found[name], value, "{name}: {found}");
+    }
+    // One over all, three or two by scene, three profiles, two of lanes, phases, two of iterations.
+    assert!(found["plots"].as_u64().unwrap() >= 25 && found["titles"].as_u64().unwrap() > 300, "{found}");
+    let ratio = found["time"].as_f64().unwrap() / found["tick"].as_f64().unwrap();
+    assert!((ratio - 5.0).abs() < 1e-6, "{found}");
+
+    let pixels = screenshot(&browser, &page, "", [1300, 2000]);
+    // The shaded side within tolerance, the band of failures, and marks of pgs.
+    for (what, color, least) in [
+        ("within", [0xea, 0xf5, 0xf0], 20_000),
+        ("band", [0xf3, 0xe3, 0xdc], 3000),
+        ("pgs", [0xd5, 0x5e, 0x00], 100),
+    ] {
+        let found = count(&pixels, color);
+        assert!(found >= least, "{what}: {found} pixels");
+    }
+}
