@@ -50,10 +50,11 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "circle_pile:500",
 ];
 
-/// Solvers that are compared where none are named: one or two of every family. All others of
+/// Solvers that are compared where none are named: sequential impulses without and with position sweeps,
+/// accelerated, in parallel, in substeps, of positions, of energies, and soft. All others of
 /// [`VARIANTS`](crate::engine::solvers::VARIANTS) run when they are named, or with `all`.
-pub const DEFAULT_SOLVERS: [&str; 6] =
-    ["projection", "pgs", "pgs_ngs_block", "jacobi", "tgs_ngs", "soft_step"];
+pub const DEFAULT_SOLVERS: [&str; 8] =
+    ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "avbd", "soft_step"];
 
 /// The rows of [`DEFAULT_SOLVERS`].
 pub fn default_solvers() -> Vec<&'static Variant> {
