@@ -267,7 +267,8 @@ mod tests {
             read(&file(&header, frames).unwrap()).unwrap_err()
         };
         assert!(read(&file(&good, frames).unwrap()).is_ok());
-        let liars: [(&dyn Fn(&mut Header), &str); 9] = [
+        type Lie<'a> = &'a dyn Fn(&mut Header);
+        let liars: [(Lie, &str); 9] = [
             (&|h| h.frames = 0, "no frames"),
             (&|h| h.frames = u32::MAX, "no room"),
             (&|h| h.frames -= 1, "after its last frame"),
