@@ -64,7 +64,10 @@ pub struct Workspace {
 }
 
 /// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
-pub struct Watch(pub Box<dyn FnMut(u32, &mut System<'_>)>);
+pub struct Watch(pub Box<Observer>);
+
+/// Is given the number of an iteration and the problem after it.
+pub type Observer = dyn FnMut(u32, &mut System<'_>);
 
 impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

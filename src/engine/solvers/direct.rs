@@ -293,7 +293,7 @@ impl Problem {
         let n = self.start.len();
         let is_unknown = |i: usize| match states[i / 2] {
             State::Open => false,
-            State::Slip(_) => i % 2 == 0,
+            State::Slip(_) => i.is_multiple_of(2),
             State::Stick => true,
         };
         let unknowns: Vec<usize> = (0..n).filter(|&i| is_unknown(i)).collect();
