@@ -55,7 +55,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["scene", "arhc", "--json"], &["'arch'"]),
         (
             &["run", "stack:2", "--solver", "softstep"],
-            &["'softstep'", "'soft_step'", "[possible values: projection, pgs,"],
+            &["'softstep'", "'soft_step'", "[possible values: projection, pgs, "],
         ),
         (&["run", "stack:2", "--lanes", "5"], &["lanes", "5", "1, 4, 8, 16"]),
         (&["converge", "stack:2", "--lanes", "3"], &["lanes", "3", "1, 4, 8, 16"]),

@@ -11,6 +11,7 @@ mod metrics;
 mod profile;
 mod scenes;
 mod schema;
+mod solver2d;
 mod solver_rules;
 mod truth;
 mod verify;

@@ -123,6 +123,8 @@ fn schema_and_reading_agree_on_every_member() {
         json!(0),
         json!(1),
         json!(1.5),
+        json!(1e-12),
+        json!(20_000_000),
         json!(1e-3),
         json!(100),
         json!(1e39),

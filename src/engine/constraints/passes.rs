@@ -64,7 +64,10 @@ pub struct Workspace {
 }
 
 /// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
-pub struct Watch(pub Box<dyn FnMut(u32, &mut System<'_>)>);
+pub struct Watch(pub Box<Observer>);
+
+/// Is given the number of an iteration and the problem after it.
+pub type Observer = dyn FnMut(u32, &mut System<'_>);
 
 impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -561,13 +564,18 @@ impl<'a> Passes<'a> {
         self.count
     }
 
+    /// Says which law was solved, where no sweep did: that of this one.
+    pub fn solves(&mut self, sweep: &dyn VelocitySweep) {
+        if self.work.observe {
+            self.work.last_rule = Some(ObservedRule::of(sweep, &self.work.rows));
+        }
+    }
+
     /// Counts a velocity sweep, and keeps its rule where that is asked for.
     fn solved(&mut self, sweep: &dyn VelocitySweep) {
         let friction = self.input.features.friction && sweep.has_friction();
         self.count_sweep(if friction { 2 } else { 1 });
-        if self.work.observe {
-            self.work.last_rule = Some(ObservedRule::of(sweep, &self.work.rows));
-        }
+        self.solves(sweep);
     }
 
     fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Workspace)) {

@@ -11,8 +11,8 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times
 //! 2·`linear_steps` + 3 passes over vectors. They go point by point, not in lanes.
 //!
-//! **Fails when** ρ suits other scenes: it decides how fast λ and z agree against how fast they move. It
-//! reaches moderate accuracy in dozens of iterations, and high accuracy in none that a frame has.
+//! **Fails when** ρ suits other scenes: it decides how fast λ and z agree against how fast they move. A
+//! pyramid of 15 boxes takes it 70 iterations to a residual of 10⁻⁴ and 170 to 10⁻⁶.
 //!
 //! # The method
 //!
@@ -28,6 +28,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::sweep::Sweep;
 use crate::engine::constraints::{Passes, System, cone};
 use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
@@ -68,10 +69,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[
-        (Law::Converges, "stalls at moderate accuracy within the iterations that are tried"),
-        (Law::Rest, "20 iterations are too few for tall stacks"),
-    ],
+    breaks: &[(Law::Rest, "20 iterations are too few for tall stacks")],
     step,
 };
 
@@ -135,6 +133,7 @@ fn step(passes: &mut Passes<'_>) {
             }
             system.apply(&step);
         });
+        passes.solves(&Sweep(rule));
         passes.give_back([bias, stiffness, lambda, z, w]);
         passes.give_back([u, right, direction, image, step]);
         passes.integrate_positions();

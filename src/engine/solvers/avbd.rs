@@ -138,7 +138,7 @@ fn begin(blocks: &mut Blocks<'_>, h: f32, keep: f32, keep_penalty: f32) {
             kept[NORMAL] *= keep;
             kept[TANGENT] *= keep;
             for k in [NORMAL_PENALTY, TANGENT_PENALTY] {
-                kept[k] = (kept[k] * keep_penalty).max(PENALTY[0]).min(PENALTY[1]);
+                kept[k] = (kept[k] * keep_penalty).clamp(PENALTY[0], PENALTY[1]);
             }
         }
     }
@@ -208,12 +208,14 @@ fn descend(blocks: &mut Blocks<'_>, h: f32, alpha: f32) {
                 let penalties = [kept[NORMAL_PENALTY], kept[TANGENT_PENALTY]];
                 // A row at its bound keeps its stiffness: without it a body would go past where the row
                 // takes hold again, and back, for ever.
-                for axis in 0..if blocks.friction { 2 } else { 1 } {
+                for (axis, penalty) in
+                    penalties.into_iter().enumerate().take(if blocks.friction { 2 } else { 1 })
+                {
                     let mut jacobian = rows.jacobian[side][axis].map(f64::from);
                     if inv_inertia <= 0.0 {
                         jacobian[2] = 0.0;
                     }
-                    let (force, penalty) = (f64::from(rows.force[axis]), f64::from(penalties[axis]));
+                    let (force, penalty) = (f64::from(rows.force[axis]), f64::from(penalty));
                     for i in 0..3 {
                         right[i] += jacobian[i] * force;
                         for j in 0..3 {
@@ -225,9 +227,7 @@ fn descend(blocks: &mut Blocks<'_>, h: f32, alpha: f32) {
         }
         if dense::solve(&mut matrix, &mut right, 0.0) {
             let row = &mut blocks.rows[body];
-            for k in 0..3 {
-                row.delta[k] += right[k] as f32;
-            }
+            row.delta.iter_mut().zip(right).for_each(|(delta, change)| *delta += change as f32);
         }
     }
 }

@@ -10,9 +10,12 @@
 //! Overlap is pushed apart as in [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
 //! finds nothing better, and in scenes with more than `largest` points, they are the answer.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps; then, for m
-//! points, a matrix of 4m² entries and up to 30 factorisations of 16m³/3 operations in `f64`, one
-//! lane. On a column of boxes it loses to sweeps of the same accuracy above some 40 points.
+//! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then, for m points, a matrix of
+//! 4m² entries and up to `velocity_iterations` factorisations of 16m³/3 operations in `f64`, one lane.
+//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 27, 85, 250 and 890 µs where
+//! eight sweeps take 4 to 9 µs. Sweeps of moderate accuracy are always cheaper; sweeps of
+//! [`super::anderson`] from a cold start to a residual of 10⁻⁴ take 60, 96 and 319 µs for 10, 20 and 40
+//! boxes, so that it loses to those, too, from some 40 points on.
 //!
 //! **Fails when** there are many points (a factorisation grows by m³), and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
@@ -44,7 +47,7 @@ pub static SOLVER: Variant = Variant {
     name: "direct",
     source: "alart1991",
     summary: "Newton's method on the contact law, for small scenes; else sweeps",
-    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+    budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     uses: Uses { velocity: true, relax: false, position: false },
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
@@ -54,6 +57,14 @@ pub static SOLVER: Variant = Variant {
             default: BAUMGARTE,
             range: [0.0, 1.0],
             meaning: "share of the overlap that is removed per step",
+            trials: &[],
+        },
+        Parameter {
+            name: "sweeps",
+            unit: "",
+            default: 8.0,
+            range: [0.0, 1000.0],
+            meaning: "sweeps before Newton's method",
             trials: &[],
         },
         Parameter {
@@ -77,8 +88,6 @@ pub static SOLVER: Variant = Variant {
 
 /// ε: shift of the unit diagonal (1).
 const SHIFT: f64 = 1e-7;
-/// Newton steps.
-const STEPS: usize = 30;
 /// Halvings of a step before Newton gives up.
 const HALVINGS: usize = 8;
 /// Residual, relative to the largest impulse, at which the law is solved.
@@ -88,42 +97,90 @@ fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
     let sweep = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
-    let largest = passes.parameter(1) as usize;
+    let [sweeps, largest] = [1, 2].map(|i| passes.parameter(i) as usize);
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
-        for _ in 0..budget.velocity_iterations {
+        for _ in 0..sweeps {
             passes.sweep(Phase::Solve, &sweep);
-            passes.iteration_done();
         }
-        if passes.points() <= largest {
-            passes.with_system(Phase::Solve, |system| solve(system, &rule));
+        let is_small = passes.points() <= largest;
+        let begin = |system: &mut System<'_>| is_small.then(|| Newton::new(system, &rule));
+        let mut newton = passes.with_system(Phase::Solve, begin);
+        for _ in 0..budget.velocity_iterations {
+            if let Some(newton) = &mut newton {
+                passes.with_system(Phase::Solve, |system| newton.step(system));
+            }
+            passes.iteration_done();
         }
         passes.integrate_positions();
         passes.end_substep(substep);
     }
 }
 
-/// Replaces impulses and velocities by those of Newton's method, if it finds better ones.
-fn solve(system: &mut System<'_>, rule: &Baumgarte) {
-    let [mut impulses, mut velocities, mut surfaces] = [(); 3].map(|_| Vec::new());
-    system.impulses(&mut impulses);
-    system.relative_velocities(&mut velocities);
-    system.gaps_and_friction(&mut surfaces);
-    velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
-    let points: Vec<PointRows> = system.point_rows().collect();
-    let problem = Problem::new(system.rows(), points, &impulses, &velocities, &surfaces);
-    let Some(solved) = problem.solve() else { return };
-    let mut delta = vec![[0.0; 2]; impulses.len()];
-    for (i, point) in problem.points.iter().enumerate() {
-        let normal = solved[2 * i].max(0.0) as f32;
-        let bound = surfaces[point.at][1] * normal;
-        let new = [normal, (solved[2 * i + 1] as f32).min(bound).max(-bound)];
-        delta[point.at] = [0, 1].map(|axis| new[axis] - impulses[point.at][axis]);
-        impulses[point.at] = new;
+/// Newton's method on its way.
+struct Newton {
+    problem: Problem,
+    impulses: Vec<f64>,
+    arguments: Vec<f64>,
+    merit: f64,
+    /// Nothing better is found any more.
+    done: bool,
+    /// What the records hold, and the friction of each point.
+    written: Vec<Pair>,
+    surfaces: Vec<Pair>,
+    delta: Vec<Pair>,
+}
+
+impl Newton {
+    fn new(system: &mut System<'_>, rule: &Baumgarte) -> Self {
+        let [mut written, mut velocities, mut surfaces] = [(); 3].map(|_| Vec::new());
+        system.impulses(&mut written);
+        system.relative_velocities(&mut velocities);
+        system.gaps_and_friction(&mut surfaces);
+        velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
+        let points: Vec<PointRows> = system.point_rows().collect();
+        let problem = Problem::new(system.rows(), points, &written, &velocities, &surfaces);
+        let impulses = problem.start.clone();
+        let arguments = problem.arguments(&impulses);
+        let merit = problem.merit(&impulses, &arguments);
+        let delta = vec![[0.0; 2]; written.len()];
+        Newton { problem, impulses, arguments, merit, done: false, written, surfaces, delta }
     }
-    system.set_impulses(&impulses);
-    system.apply(&delta);
+
+    /// One step as far as the residual falls; impulses and velocities follow.
+    fn step(&mut self, system: &mut System<'_>) {
+        let problem = &self.problem;
+        self.done |= self.merit <= problem.goal(&self.impulses);
+        let target = if self.done { None } else { problem.solve_states(&problem.states(&self.arguments)) };
+        let mut fraction = 1.0;
+        let better = target.and_then(|target| {
+            (0..HALVINGS).find_map(|_| {
+                let blend = |(l, t): (&f64, &f64)| l + fraction * (t - l);
+                let trial: Vec<f64> = self.impulses.iter().zip(&target).map(blend).collect();
+                let arguments = problem.arguments(&trial);
+                let merit = problem.merit(&trial, &arguments);
+                // The directional derivative of the merit along a Newton step is −2 merit.
+                let accepted = merit <= (1.0 - 2e-4 * fraction) * self.merit;
+                fraction *= 0.5;
+                accepted.then_some((trial, arguments, merit))
+            })
+        });
+        let Some(better) = better else {
+            self.done = true;
+            return;
+        };
+        (self.impulses, self.arguments, self.merit) = better;
+        for (i, point) in self.problem.points.iter().enumerate() {
+            let (at, normal) = (point.at, self.impulses[2 * i].max(0.0) as f32);
+            let bound = self.surfaces[at][1] * normal;
+            let new = [normal, (self.impulses[2 * i + 1] as f32).min(bound).max(-bound)];
+            self.delta[at] = [0, 1].map(|axis| new[axis] - self.written[at][axis]);
+            self.written[at] = new;
+        }
+        system.set_impulses(&self.written);
+        system.apply(&self.delta);
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -188,34 +245,6 @@ impl Problem {
         self.matrix[i * (self.start.len() + 1)]
     }
 
-    /// Impulses that solve the law better than the start, if Newton finds any.
-    fn solve(&self) -> Option<Vec<f64>> {
-        let mut impulses = self.start.clone();
-        let mut arguments = self.arguments(&impulses);
-        let first = self.merit(&impulses, &arguments);
-        let mut now = first;
-        for _ in 0..STEPS {
-            if now <= self.goal(&impulses) {
-                break;
-            }
-            let Some(target) = self.solve_states(&self.states(&arguments)) else { break };
-            let mut fraction = 1.0;
-            let better = (0..HALVINGS).find_map(|_| {
-                let blend = |(l, t): (&f64, &f64)| l + fraction * (t - l);
-                let trial: Vec<f64> = impulses.iter().zip(&target).map(blend).collect();
-                let arguments = self.arguments(&trial);
-                let merit = self.merit(&trial, &arguments);
-                // The directional derivative of the merit along a Newton step is −2 merit.
-                let accepted = merit <= (1.0 - 2e-4 * fraction) * now;
-                fraction *= 0.5;
-                accepted.then_some((trial, arguments, merit))
-            });
-            let Some(step) = better else { break };
-            (impulses, arguments, now) = step;
-        }
-        (now < first).then_some(impulses)
-    }
-
     /// λ − (u + ε D (λ − λ₀))/D, row by row.
     fn arguments(&self, impulses: &[f64]) -> Vec<f64> {
         let n = impulses.len();
@@ -264,7 +293,7 @@ impl Problem {
         let n = self.start.len();
         let is_unknown = |i: usize| match states[i / 2] {
             State::Open => false,
-            State::Slip(_) => i % 2 == 0,
+            State::Slip(_) => i.is_multiple_of(2),
             State::Stick => true,
         };
         let unknowns: Vec<usize> = (0..n).filter(|&i| is_unknown(i)).collect();
