@@ -34,10 +34,10 @@ use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
 use crate::lab::reference::ContactProblem;
+use crate::lab::reference::baseline::gauss_seidel_rate;
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::rates;
 use crate::lab::reference::residual::{Summary, Target, contact_residuals, natural_map};
-use crate::lab::reference::spectral::gauss_seidel_rate;
 use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
@@ -61,8 +61,8 @@ pub struct Options {
     pub overrides: Vec<Override>,
     /// Timing rounds; none for no times.
     pub rounds: u32,
-    /// Find the exact rate of Gauss–Seidel, which may take seconds.
-    pub exact_rate: bool,
+    /// Measure the rate of Gauss–Seidel in `f64`, which may take seconds.
+    pub baseline: bool,
 }
 
 impl Default for Options {
@@ -74,7 +74,7 @@ impl Default for Options {
             width: native_width(),
             overrides: Vec::new(),
             rounds: 15,
-            exact_rate: true,
+            baseline: true,
         }
     }
 }
@@ -148,8 +148,8 @@ pub struct Report {
     pub has_warm_start: bool,
     /// Lanes in coloured order.
     pub lanes: usize,
-    /// Exact factor per sweep of Gauss–Seidel near its solution; none where it does not come to one, or
-    /// no error outlives a sweep.
+    /// Factor per sweep of Gauss–Seidel in `f64` ([`gauss_seidel_rate`]); none where it comes to no solution, or
+    /// too fast.
     pub gauss_seidel_rate: Option<f64>,
     /// See [`TOLERANCES`].
     pub tolerances: [f64; TOLERANCES.len()],
@@ -242,7 +242,7 @@ pub fn converge_watched(
         certificate: reference.map(|r| r.certificate),
         has_warm_start,
         lanes: options.width.lanes(),
-        gauss_seidel_rate: options.exact_rate.then(|| gauss_seidel_rate(problem)).flatten(),
+        gauss_seidel_rate: options.baseline.then(|| gauss_seidel_rate(problem)).flatten(),
         tolerances: TOLERANCES,
         curves,
     })

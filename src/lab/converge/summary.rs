@@ -7,7 +7,7 @@ use crate::engine::lanes::native_width;
 /// Places in [`TOLERANCES`] of the two that are told.
 const TOLD: [usize; 2] = [1, 3];
 
-/// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the exact rate of
+/// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of
 /// Gauss–Seidel. Whole schedules in coloured order.
 pub fn text(report: &Report) -> String {
     let own: Vec<&Curve> = report
@@ -38,7 +38,7 @@ pub fn text(report: &Report) -> String {
             list.join("; ")
         );
     }
-    text + &exact(report, &own)
+    text + &baseline(report, &own)
 }
 
 /// Sweeps to a tolerance.
@@ -81,13 +81,15 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
 }
 
 /// Measured rates beside that of Gauss–Seidel.
-fn exact(report: &Report, curves: &[&Curve]) -> String {
-    let Some(exact) = report.gauss_seidel_rate else {
-        return "Gauss-Seidel has no rate here: it comes to no solution, or at once.\n".into();
+fn baseline(report: &Report, curves: &[&Curve]) -> String {
+    let Some(rate) = report.gauss_seidel_rate else {
+        return "Gauss-Seidel in f64 has no rate here: it comes to no solution, or at once.\n".into();
     };
-    let sweeps = |tolerance: f64| (tolerance.ln() / exact.ln()).ceil();
-    let mut text = format!("Gauss-Seidel's exact rate, that of its slowest error, is {exact:.4} per sweep");
-    if exact < 1.0 {
+    let sweeps = |tolerance: f64| (tolerance.ln() / rate.ln()).ceil();
+    let mut text = format!(
+        "Gauss-Seidel in f64, in the problem's order and from zero, ends in a rate of {rate:.4} per sweep"
+    );
+    if rate < 1.0 {
         text += &format!(", {:.0} sweeps for 1e-2 and {:.0} for 1e-4", sweeps(1e-2), sweeps(1e-4));
     }
     let measured: Vec<String> = curves

@@ -5,11 +5,12 @@
 //! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
 //! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
 //! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by
-//! hand, [`rates`] measures convergence in iterations and in the step size, and [`spectral`] computes that
-//! of Gauss–Seidel.
+//! hand, [`rates`] measures convergence in iterations and in the step size, [`baseline`] that of
+//! Gauss–Seidel.
 //!
 //! Nothing here knows the simulation's own solvers, so that it can judge them.
 
+pub mod baseline;
 pub mod certify;
 pub mod dense;
 pub mod frozen;
@@ -23,7 +24,6 @@ pub mod rates;
 pub mod residual;
 mod scale;
 pub mod sparse;
-pub mod spectral;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
