@@ -51,10 +51,10 @@ pub const DEFAULT_SCENES: [&str; 11] = [
 ];
 
 /// Solvers that are compared where none are named: sequential impulses without and with position sweeps,
-/// accelerated, in parallel, in substeps, of positions, of energies, and soft. All others of
+/// accelerated, in parallel, in substeps, of positions, and soft; all of them fast. All others of
 /// [`VARIANTS`](crate::engine::solvers::VARIANTS) run when they are named, or with `all`.
-pub const DEFAULT_SOLVERS: [&str; 8] =
-    ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "avbd", "soft_step"];
+pub const DEFAULT_SOLVERS: [&str; 7] =
+    ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "soft_step"];
 
 /// The rows of [`DEFAULT_SOLVERS`].
 pub fn default_solvers() -> Vec<&'static Variant> {
