@@ -238,18 +238,17 @@ mod tests {
         for length in (0..bytes.len()).step_by(7).chain([bytes.len() - 1]) {
             assert!(read(&bytes[..length]).is_err(), "{length}");
         }
-        // zlib's checksum sees every change of the payload. A few bits of the stream change nothing in it:
-        // how hard it was compressed, codes that are not used.
-        let whole = read(&bytes);
-        let mut harmless = 0;
-        for at in 0..bytes.len() {
+        // zlib's checksum sees every change of the payload. A few bits of the compressed text have no
+        // meaning: how hard it was compressed, and what fills its last byte.
+        let whole = format!("{:?}", read(&bytes));
+        let harmless = (0..bytes.len()).filter(|&at| {
             let mut bad = bytes.clone();
             bad[at] ^= 0x10;
             let found = read(&bad);
-            assert!(found.is_err() || found == whole, "byte {at}");
-            harmless += found.is_ok() as usize;
-        }
-        assert!(harmless * 100 < bytes.len(), "{harmless} of {}", bytes.len());
+            assert!(found.is_err() || format!("{found:?}") == whole, "byte {at}");
+            found.is_ok()
+        });
+        assert!(harmless.count() <= 3);
         let mut newer = bytes.clone();
         newer[8] = 9;
         assert_eq!(read(&newer).unwrap_err(), "has version 9, this program reads version 1");
