@@ -360,7 +360,7 @@ fn commands_freeze_and_converge() {
     let (path, out) = (file.to_str().unwrap(), folder.path().join("out"));
     run(&["capture", "stack:3", "--step", "30", "-o", path, "--solver", "pgs"]).unwrap();
     assert!(Frozen::read(&file).unwrap().reference.is_some());
-    run(&["converge", path, "--out", out.to_str().unwrap(), "--rounds", "1", "--solvers", "pgs"]).unwrap();
+    run(&["converge", path, "--out", out.to_str().unwrap(), "--repeats", "1", "--solvers", "pgs"]).unwrap();
     for name in ["converge.csv", "converge.json", "converge.svg"] {
         assert!(std::fs::metadata(out.join(name)).unwrap().len() > 1000, "{name}");
     }
