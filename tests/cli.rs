@@ -1,6 +1,9 @@
 //! The program as a user meets it: what it refuses, and what a small study leaves behind.
 
 use simpulse::engine::solvers::VARIANTS;
+use simpulse::lab::report::study_file::StudyFile;
+use simpulse::lab::report::{answer, columns};
+use simpulse::lab::study::DEFAULT_SOLVERS;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -46,13 +49,22 @@ fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let table: &[(&[&str], &[&str])] = &[
-        (&["run", "staack"], &["unknown scene 'staack'", "'stack'"]),
+        (&["run", "staack"], &["unknown scene 'staack'", "'stack'", "arch, "]),
         (&["run", "stack:x"], &["'x'", "stack"]),
         (&["run", "stack:0"], &["'0'"]),
         (&["scene", "arhc", "--json"], &["'arch'"]),
-        (&["run", "stack:2", "--solver", "softstep"], &["unknown solver 'softstep'", "'soft_step'"]),
-        (&["run", "stack:2", "--lanes", "5"], &["lanes", "5"]),
-        (&["run", "stack:2", "--order", "natral"], &["'natral'", "'natural'"]),
+        (
+            &["run", "stack:2", "--solver", "softstep"],
+            &["'softstep'", "'soft_step'", "[possible values: projection, pgs, "],
+        ),
+        (&["run", "stack:2", "--lanes", "5"], &["lanes", "5", "1, 4, 8, 16"]),
+        (&["converge", "stack:2", "--lanes", "3"], &["lanes", "3", "1, 4, 8, 16"]),
+        (&["profile", "stack:2", "--phase", "solv"], &["'solv'", "'solve'", "warm-start"]),
+        (&["verify", "--cases", "B9.gapp"], &["'B9.gapp'", "'B9.gap'"]),
+        (&["completions", "tcsh"], &["tcsh", "bash", "fish", "zsh"]),
+        (&["scene"], &["SCENE"]),
+        (&["scene", "arch", "--schema"], &["--schema"]),
+        (&["run", "stack:2", "--order", "natral"], &["'natral'", "'natural'", "colored"]),
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
@@ -77,7 +89,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--statte", "s.csv"], &["--statte"]),
         (&["study", "--scenes", "stack:2,pyramidd"], &["'pyramidd'", "'pyramid'"]),
         (&["study", "--solvers", "pgs,sof_step"], &["'sof_step'", "'soft_step'"]),
-        (&["study", "--lanes", "1,2"], &["lanes", "2"]),
+        (&["study", "--lanes", "1,2"], &["lanes", "'2'"]),
         (&["study", "--substeps", "2,0"], &["substeps", "0"]),
         (&["study", "--velocity-iterations", "0"], &["velocity_iterations", "0"]),
         (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
@@ -156,7 +168,9 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
         simpulse(folder.path(), &["study", "--scenes", "fast.json", "--quick", "--lanes", "1", "--out", "r"]);
     assert_eq!(study.status.code(), Some(0), "{}", text(&study.stderr));
     let table = text(&study.stdout);
-    assert!(table.contains("failed") && table.contains("diverged at step 1: body 1"), "{table}");
+    assert!(table.contains("fast: no setting holds"), "{table}");
+    let tables = std::fs::read_to_string(folder.path().join("r/tables.txt")).unwrap();
+    assert!(tables.contains("failed") && tables.contains("diverged at step 1: body 1"), "{tables}");
     assert!(!has_word(table, "nan") && !has_word(table, "inf"));
 }
 
@@ -180,14 +194,16 @@ fn a_small_study_leaves_whole_files() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let out = folder.path().join("a/b");
     let kept: Vec<String> = entries(&out).into_iter().filter(|n| !n.starts_with("replay-")).collect();
-    assert_eq!(kept, ["profiles.svg", "report.html", "speed_vs_error.svg", "study.csv", "study.json"]);
+    let names =
+        ["profiles.svg", "report.html", "speed_vs_error.svg", "study.csv", "study.json", "tables.txt"];
+    assert_eq!(kept, names);
 
     let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // 2 scenes × all solvers × 3 budgets × (natural order and 2 widths).
-    assert_eq!(rows.len(), 2 * VARIANTS.len() * 3 * 3);
+    // 2 scenes × all solvers of the default list × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 2 * DEFAULT_SOLVERS.len() * 3 * 3);
     for row in &rows {
         for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
             let value: f64 = row[column(name)].parse().unwrap();
@@ -211,7 +227,117 @@ fn a_small_study_leaves_whole_files() {
     for text in [csv_text.as_str(), &json_text, &svg, text(&output.stdout)] {
         assert!(!has_word(text, "nan") && !has_word(text, "inf"), "{text}");
     }
-    assert!(text(&output.stdout).contains("cheapest setting within"));
+    let answer = text(&output.stdout);
+    assert!(answer.contains("The cheapest setting that is good enough") && answer.lines().count() <= 60);
+
+    // From the records alone comes the answer that was printed.
+    let study = StudyFile::read(&out).unwrap();
+    assert!(answer.starts_with(&answer::text(&study.records, &study.environment, Some(40))), "{answer}");
+}
+
+/// The same answer within a page for the default study, whatever the number of solvers.
+#[test]
+fn the_answer_comes_first_and_fills_a_page_at_most() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["--quick", "--scenes", "stack:3,bounce,arch", "--lanes", "8", "--verbose"];
+    let output = simpulse(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(output.stderr.is_empty(), "progress is for terminals: {}", text(&output.stderr));
+    let (answer, tables) = text(&output.stdout).split_once("\nbudget: substeps").unwrap();
+    assert!(answer.lines().count() <= 60 && answer.contains("Ranking over all scenes"), "{answer}");
+    assert!(tables.contains("Equal time") && tables.contains("Performance profiles"));
+    let widest = answer.lines().map(|line| line.chars().count()).max();
+    assert!(widest <= Some(160), "{answer}");
+}
+
+/// The header of a CSV file.
+fn header(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap().lines().next().unwrap().to_string()
+}
+
+#[test]
+fn every_csv_header_is_documented() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = simpulse(folder.path(), args);
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {}", text(&output.stderr));
+    };
+    run(&["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "o"]);
+    run(&["converge", "stack:3", "--step", "20", "--solvers", "pgs", "--repeats", "0", "--out", "o"]);
+    run(&["growth", "--contacts", "1e2,3e2", "--settle", "2", "--repeats", "1", "--out", "o"]);
+    run(&["run", "stack:2", "--steps", "3", "--state", "o/state.csv", "--contacts", "o/contacts.csv"]);
+    let files = entries(&folder.path().join("o"));
+    let written: Vec<&String> = files.iter().filter(|name| name.ends_with(".csv")).collect();
+    assert_eq!(written.len(), columns::SHEETS.len(), "{written:?}");
+    for name in written {
+        let header = header(&folder.path().join("o").join(name));
+        let names: Vec<&str> = header.split(',').collect();
+        let documented = columns::SHEETS.iter().any(|sheet| sheet.documents(&names));
+        assert!(documented, "{name}: {header}");
+    }
+    let shown = simpulse(folder.path(), &["columns"]);
+    assert!(
+        text(&shown.stdout).contains("penetration_max") && text(&shown.stdout).contains("tangent_impulse")
+    );
+}
+
+#[test]
+fn data_is_printed_as_json_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = |args: &[&str]| -> serde_json::Value {
+        let output = simpulse(folder.path(), args);
+        let shown = text(&output.stdout);
+        serde_json::from_str(shown)
+            .unwrap_or_else(|e| panic!("{args:?}: {e}: {shown}{}", text(&output.stderr)))
+    };
+    assert_eq!(json(&["run", "stack:2", "--steps", "9", "--json"])["errors"]["steps"], 9);
+    assert_eq!(json(&["solvers", "--json"]).as_array().unwrap().len(), VARIANTS.len());
+    assert_eq!(json(&["scene", "arch", "--json"])["name"], "arch");
+    assert_eq!(json(&["scene", "--schema"])["title"], "simpulse scene");
+    assert!(json(&["columns", "--json"])[0]["columns"].is_array() && json(&["scenes", "--json"]).is_array());
+    assert!(json(&["verify", "--list", "--json"]).as_array().unwrap().len() > 50);
+    let cells = json(&["verify", "--cases", "A0", "--solvers", "pgs", "--json"]);
+    assert_eq!(cells["results"][0]["passed"], true);
+    let converge = ["converge", "stack:3", "--solvers", "pgs", "--repeats", "0", "--json"];
+    assert!(json(&converge)["gauss_seidel_rate"].as_f64().unwrap() < 1.0);
+    let frozen = json(&["capture", "stack:3", "--out", "s.frozen", "--json"]);
+    assert!(frozen["certificate"].is_object(), "{frozen}");
+    let profile = ["profile", "stack:5", "--seconds", "0.2", "--settle", "3", "--json"];
+    assert!(json(&profile)["phases"][0]["limit"].is_string());
+    let savings = ["savings", "--scenes", "circle_pile:150", "--repeats", "1", "--json"];
+    assert!(json(&savings)["savings"].is_array());
+    let advise = ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1"];
+    let advise = [&advise[..], &["--solvers", "pgs,soft_step", "--seconds", "5", "--json"]].concat();
+    assert!(json(&advise)["trials"].is_array());
+    let study = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--json"];
+    assert_eq!(json(&study)["records"].as_array().unwrap().len(), 3 * 2);
+}
+
+#[test]
+fn advice_ends_with_the_command_that_repeats_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let args =
+        ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1", "--solvers"];
+    let output = simpulse(folder.path(), &[&args[..], &["soft_step", "--seconds", "5"]].concat());
+    let last = text(&output.stdout).lines().last().unwrap();
+    let command = last.strip_prefix("to run it: simpulse ").unwrap_or_else(|| panic!("{last}"));
+    let words: Vec<&str> = command.split(' ').collect();
+    let run = simpulse(folder.path(), &words);
+    assert_eq!(run.status.code(), Some(0), "{command}: {}", text(&run.stderr));
+    assert!(text(&run.stdout).contains("soft_step"), "{}", text(&run.stdout));
+}
+
+#[test]
+fn shells_complete_options_and_their_values() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let output = simpulse(folder.path(), &["completions", shell]);
+        let script = text(&output.stdout);
+        for word in ["--solvers", "soft_step", "converge", "warm-start"] {
+            let word = if shell == "fish" { word.trim_start_matches("--") } else { word };
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
 }
 
 #[test]
@@ -221,9 +347,13 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
         ["run", "stack:3", "--steps", "25", "--every", "10", "--state", "s.csv", "--contacts", "c.csv"];
     let output = simpulse(folder.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let all = simpulse(folder.path(), &["run", "stack:3", "--steps", "25", "--all"]);
     for phase in ["pairs", "collide", "prepare", "solve", "relax", "integrate", "store", "penetration"] {
-        assert!(text(&output.stdout).contains(phase), "{phase}");
+        assert!(text(&all.stdout).contains(phase), "{phase}");
     }
+    // Without --all, eight figures in three groups.
+    let figures = text(&output.stdout).lines().filter(|line| line.starts_with("  ")).count();
+    assert_eq!(figures, 8, "{}", text(&output.stdout));
     let state = std::fs::read_to_string(folder.path().join("s.csv")).unwrap();
     let lines: Vec<&str> = state.lines().collect();
     assert_eq!(lines[0], "step,time,body,x,y,angle,vx,vy,omega");
@@ -254,7 +384,7 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
     let solvers = simpulse(folder.path(), &["solvers"]);
-    assert_eq!(text(&solvers.stdout).lines().count(), simpulse::engine::solvers::VARIANTS.len());
+    assert_eq!(text(&solvers.stdout).lines().count(), 1 + VARIANTS.len());
     let scenes = simpulse(folder.path(), &["scenes"]);
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 

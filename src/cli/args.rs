@@ -12,20 +12,11 @@ use super::report::ReportArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
-use super::study::Shard;
-use super::values::{self, Solvers};
+use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
+use super::values;
 use super::verify::VerifyArgs;
-use crate::engine::lanes::LaneWidth;
-use crate::engine::world::Order;
-use crate::lab::advise::limits::quantity;
-use crate::lab::error::Error;
-use crate::lab::overrides::Override;
-use crate::lab::scenes::tolerance::GivenTolerances;
-use crate::lab::study::StudyPlan;
-use crate::lab::study::budget::BudgetGrid;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
-use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -41,16 +32,6 @@ Examples:
   simpulse completions bash > ~/.local/share/bash-completion/completions/simpulse
   simpulse completions zsh > ~/.zfunc/_simpulse
   simpulse completions fish > ~/.config/fish/completions/simpulse.fish";
-
-const STUDY_EXAMPLES: &str = "\
-Without any budget option, each solver runs at half its standard budget, at that budget,
-and at its double. With some, every combination runs; what a solver ignores is left out.
-
-Examples:
-  simpulse study --quick
-  simpulse study --solvers all --out results/all
-  simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
-  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
 
 /// A laboratory for 2D contact solvers: how fast are they, and how wrong?
 ///
@@ -116,67 +97,6 @@ pub struct CompletionArgs {
     pub shell: Shell,
 }
 
-/// Lists are separated by commas.
-#[derive(Args, Debug)]
-pub struct StudyArgs {
-    /// Scenes
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", help = values::scenes_help())]
-    pub scenes: Vec<String>,
-    /// Solvers
-    #[command(flatten)]
-    pub solvers: Solvers,
-    /// Lanes per instruction [default: 1, 4, 8, and 16 where this build has instructions for it;
-    /// wider ones are emulated]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
-    pub lanes: Vec<LaneWidth>,
-    /// Constraint orders [default: both]
-    #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
-    pub orders: Vec<Order>,
-    /// Substeps to try
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub substeps: Vec<u32>,
-    /// Velocity sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub velocity_iterations: Vec<u32>,
-    /// Relaxation sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub relax_iterations: Vec<u32>,
-    /// Position sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub position_iterations: Vec<u32>,
-    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
-    pub set: Vec<Override>,
-    /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,reference=0.1
-    /// (`simpulse scene NAME` lists them; the reference value's in its own unit)
-    #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…")]
-    pub tolerance: Vec<String>,
-    /// Steps of the runs that measure errors [default: those of each scene]
-    #[arg(long)]
-    pub steps: Option<u32>,
-    /// Timing runs of each setting; the best of a scene run twice as often again [default: 3]
-    #[arg(long)]
-    pub repeats: Option<u32>,
-    /// Random seed: of scenes that have one, and of the order of timing runs
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Short runs, nothing repeated: a look at everything in seconds
-    #[arg(long)]
-    pub quick: bool,
-    /// Print the tables of every scene after the answer
-    #[arg(long)]
-    pub verbose: bool,
-    /// Print JSON instead of text: what study.json holds
-    #[arg(long)]
-    pub json: bool,
-    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
-    #[arg(long, value_name = "I/N")]
-    pub shard: Option<Shard>,
-    /// Folder for the results
-    #[arg(long, default_value = "results", value_name = "FOLDER")]
-    pub out: PathBuf,
-}
-
 /// A scene to look at.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
@@ -192,61 +112,4 @@ pub struct SceneArgs {
     /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
-}
-
-impl StudyArgs {
-    /// The plan that was asked for. Errors: unknown names, widths that do not exist.
-    pub fn plan(&self) -> Result<StudyPlan, Error> {
-        let base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
-        let or = |given: &[String], own: Vec<String>| if given.is_empty() { own } else { unique(given) };
-        Ok(StudyPlan {
-            scenes: or(&self.scenes, base.scenes),
-            solvers: self.solvers.chosen(),
-            widths: values::widths(&self.lanes, base.widths),
-            orders: if self.orders.is_empty() { base.orders } else { unique(&self.orders) },
-            budgets: BudgetGrid {
-                substeps: self.substeps.clone(),
-                velocity_iterations: self.velocity_iterations.clone(),
-                relax_iterations: self.relax_iterations.clone(),
-                position_iterations: self.position_iterations.clone(),
-            },
-            overrides: self.set.clone(),
-            tolerances: tolerances(&self.tolerance)?,
-            steps: self.steps.or(base.steps),
-            timing_steps: base.timing_steps,
-            repeats: self.repeats.unwrap_or(base.repeats),
-            seed: self.seed,
-        })
-    }
-}
-
-/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that is no limit.
-fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
-    let mut tolerances = GivenTolerances::default();
-    for text in given {
-        let refused = || Error::invalid("tolerance", format!("'{text}' is not NAME=VALUE"));
-        let (name, value) = text.split_once('=').ok_or_else(refused)?;
-        let (place, unit) = match name.trim() {
-            "penetration" => (&mut tolerances.penetration, "m"),
-            "residual" => (&mut tolerances.residual, ""),
-            "reference" => (&mut tolerances.truth, ""),
-            other => {
-                let known = ["penetration", "residual", "reference"].into_iter();
-                return Err(Error::unknown("tolerance", other, known));
-            }
-        };
-        *place = Some(quantity("tolerance", value, unit)?);
-    }
-    Ok(tolerances)
-}
-
-/// Each value once, in the order given.
-fn unique<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
-    let mut kept: Vec<T> = Vec::new();
-    for value in values {
-        if !kept.contains(value) {
-            kept.push(value.clone());
-        }
-    }
-    kept
 }

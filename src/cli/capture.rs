@@ -77,7 +77,7 @@ fn advance(world: &mut World, step: u64, bar: &Bar) -> Result<(), Error> {
         return Err(Error::invalid("--step", "steps are counted from 1, is 0"));
     }
     for done in 1..step {
-        bar.show(done as usize, step as usize, "steps before");
+        bar.step(done as usize, step as usize, "steps before");
         world.step().map_err(|divergence| Error::invalid("--step", divergence.to_string()))?;
     }
     Ok(())

@@ -79,6 +79,7 @@ impl ConvergeArgs {
             width: self.lanes.or_native(),
             overrides: self.set.clone(),
             rounds: self.repeats,
+            exact_rate: true,
         })
     }
 }

@@ -50,7 +50,7 @@ pub struct ProfileArgs {
     pub scene: String,
     /// The phase to repeat, or `all` in turn
     #[arg(long, default_value = "all", value_name = "PHASE", value_parser = phase())]
-    pub phase: Option<Phase>,
+    pub phase: Which,
     /// Time of the measurement (s)
     #[arg(long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
     pub seconds: f64,
@@ -93,11 +93,21 @@ fn key(phase: Phase) -> String {
     phase.name().replace(' ', "-")
 }
 
-/// The parser of `--phase`; none is all of them.
-fn phase() -> impl TypedValueParser<Value = Option<Phase>> {
+/// What to repeat.
+#[derive(Clone, Copy, Debug)]
+pub enum Which {
+    /// Every phase, in turn.
+    All,
+    /// One alone.
+    One(Phase),
+}
+
+/// The parser of `--phase`.
+fn phase() -> impl TypedValueParser<Value = Which> {
     let names = Phase::ALL.into_iter().map(|p| PossibleValue::new(key(p)));
     let all = [PossibleValue::new("all")];
-    PossibleValuesParser::new(names.chain(all)).map(|name| Phase::ALL.into_iter().find(|&p| key(p) == name))
+    PossibleValuesParser::new(names.chain(all))
+        .map(|name| Phase::ALL.into_iter().find(|&p| key(p) == name).map_or(Which::All, Which::One))
 }
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
@@ -112,7 +122,10 @@ fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
 
 /// Runs the command.
 pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
-    let phases = args.phase.map_or(Phase::ALL.to_vec(), |phase| vec![phase]);
+    let phases = match args.phase {
+        Which::All => Phase::ALL.to_vec(),
+        Which::One(phase) => vec![phase],
+    };
     if !(args.seconds > 0.0 && args.seconds <= MAX_SECONDS) {
         let message = format!("is {}, must be above 0 and at most {MAX_SECONDS}", args.seconds);
         return Err(Error::invalid("seconds", message));

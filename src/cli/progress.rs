@@ -14,6 +14,13 @@ impl Bar {
         Bar(bar)
     }
 
+    /// The same for one of many short steps: told of a hundred of them, so that it costs nothing.
+    pub fn step(&self, done: usize, total: usize, what: &str) {
+        if done.is_multiple_of(total.div_ceil(100)) {
+            self.show(done, total, what);
+        }
+    }
+
     /// So much is done, and this is under way.
     pub fn show(&self, done: usize, total: usize, what: impl Into<String>) {
         self.0.set_length(total as u64);

@@ -148,7 +148,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             drop(bar);
             return diverged(divergence.into());
         }
-        bar.show(step as usize, scene.steps as usize, "steps");
+        bar.step(step as usize, scene.steps as usize, "steps");
         times.add(&world.timings);
         if let Some((_, recorder)) = &mut recorder {
             recorder.add(&world)?;

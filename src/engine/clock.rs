@@ -85,9 +85,9 @@ impl Timings {
     }
 }
 
-/// What the passes of one phase asked for, where that is counted.
+/// What the passes of one phase request, where that is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Asked {
+pub struct Requested {
     /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
     /// rows written.
     pub contacts: [[f64; 4]; 3],
@@ -121,7 +121,7 @@ impl PhaseFilter {
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
-    asked: Asked,
+    requested: Requested,
     laps: [u32; Phase::ALL.len()],
     /// Time that the thread had waited at the last lap, where that is taken out.
     waited: Option<Duration>,
@@ -137,7 +137,7 @@ impl Clock {
         Clock {
             timings: Timings::default(),
             start,
-            asked: Asked::default(),
+            requested: Requested::default(),
             laps: [0; Phase::ALL.len()],
             waited: None,
         }
@@ -152,19 +152,19 @@ impl Clock {
 
     /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
     pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
-        for (sum, each) in self.asked.contacts[opposite].iter_mut().zip(per_contact) {
+        for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
             *sum += contacts as f64 * each as f64;
         }
     }
 
     /// Books bytes read and written.
     pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
-        self.asked.bytes = [0, 1].map(|k| self.asked.bytes[k] + bytes[k]);
+        self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
     }
 
     /// What has been booked.
-    pub(crate) fn asked(&self) -> Asked {
-        self.asked
+    pub(crate) fn requested(&self) -> Requested {
+        self.requested
     }
 
     /// Laps of each phase; indexed by `Phase as usize`.

@@ -163,7 +163,7 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     };
     let mut random = Random::seed_from_u64(salt);
     let solvers = vec![bytes::one(&mut random, &VARIANTS)];
-    let options = Options { solvers, max_iterations: 6, rounds: 0, ..Options::default() };
+    let options = Options { solvers, max_iterations: 6, rounds: 0, exact_rate: false, ..Options::default() };
     let curves = match converge::converge(problem, known.as_ref(), &options) {
         Ok(report) => {
             converge::table::text(&report);

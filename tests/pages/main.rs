@@ -8,6 +8,12 @@ mod report;
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// The colour of a solver in every plot.
+fn solver_color(name: &str) -> [u8; 3] {
+    let simpulse::lab::picture::Color(r, g, b, _) = simpulse::lab::report::style::Style::of(name).rgb();
+    [r, g, b]
+}
+
 /// Runs the program in a folder.
 fn simpulse(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()

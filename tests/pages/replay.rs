@@ -1,7 +1,7 @@
 //! The page that plays recordings.
 
 use crate::browser::{count, drive, or_skip, screenshot};
-use crate::succeeds;
+use crate::{solver_color, succeeds};
 use std::path::{Path, PathBuf};
 
 /// A page with two recordings of two seconds.
@@ -103,8 +103,8 @@ fn a_screenshot_shows_bodies_impulses_and_curves() {
     for (what, color, least) in [
         ("ground", [0xd3, 0xd8, 0xde], 5000),
         ("impulses", [0x00, 0x72, 0xb2], 300),
-        ("pgs", [0xd5, 0x5e, 0x00], 80),
-        ("soft_step", [0x56, 0xb4, 0xe9], 80),
+        ("pgs", solver_color("pgs"), 80),
+        ("soft_step", solver_color("soft_step"), 80),
     ] {
         let found = count(&pixels, color);
         assert!(found >= least, "{what}: {found} pixels");

@@ -1,7 +1,7 @@
 //! The page of a study.
 
 use crate::browser::{count, drive, or_skip, screenshot};
-use crate::{refused, succeeds};
+use crate::{refused, solver_color, succeeds};
 use std::path::Path;
 
 fn study(folder: &Path) {
@@ -28,7 +28,7 @@ fn the_page_is_made_again_from_the_records() {
     succeeds(path, &["report", "r"]);
     let with = std::fs::read_to_string(&page).unwrap();
     assert!(with.contains("B2.box") && with.contains("background:#") && !with.contains("Not run."));
-    refused(path, &["report", "nowhere"], &["nowhere/study.json"]);
+    refused(path, &["report", "nowhere"], &["nowhere"]);
     std::fs::write(path.join("r/study.json"), "[]").unwrap();
     refused(path, &["report", "r"], &["study.json"]);
 }
@@ -55,6 +55,7 @@ fn the_page_is_whole_in_a_browser() {
             }
         }
         const player = document.querySelector(".replay").player;
+        player.seek(0);
         player.step(5);
         return {
             plots: plots.length, outside, empty: plots.filter((s) => s.getBoundingClientRect().height < 40).length,
@@ -81,7 +82,7 @@ fn the_page_is_whole_in_a_browser() {
     for (what, color, least) in [
         ("within", [0xea, 0xf5, 0xf0], 20_000),
         ("band", [0xf3, 0xe3, 0xdc], 3000),
-        ("pgs", [0xd5, 0x5e, 0x00], 100),
+        ("pgs", solver_color("pgs"), 100),
     ] {
         let found = count(&pixels, color);
         assert!(found >= least, "{what}: {found} pixels");

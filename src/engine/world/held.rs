@@ -213,15 +213,15 @@ impl HeldWorld<'_> {
         let counted_contacts = self.world.work.lanes.lanes();
         let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
         let rows = count.row_updates / passes.max(1) as usize;
-        let asked = clock.asked();
+        let requested = clock.requested();
         let times = f64::from(passes.max(1));
         let per_contact = OppositeKind::ALL.map(|kind| {
             let batches = [&self.world.work.lanes, &self.world.work.serial];
             let of_kind = batches.into_iter().flat_map(|b| b.segments()).filter(|s| s.opposite == kind);
             let contacts = of_kind.map(|s| s.contacts).sum::<usize>().max(1) as f64;
-            asked.contacts[kind as usize].map(|sum| sum / contacts / times)
+            requested.contacts[kind as usize].map(|sum| sum / contacts / times)
         });
-        let bytes = asked.bytes.map(|sum| sum / times);
+        let bytes = requested.bytes.map(|sum| sum / times);
         (passes > 0).then_some(Probe {
             phase,
             passes,

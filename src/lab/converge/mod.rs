@@ -61,6 +61,8 @@ pub struct Options {
     pub overrides: Vec<Override>,
     /// Timing rounds; none for no times.
     pub rounds: u32,
+    /// Find the exact rate of Gauss–Seidel, which may take seconds.
+    pub exact_rate: bool,
 }
 
 impl Default for Options {
@@ -72,6 +74,7 @@ impl Default for Options {
             width: native_width(),
             overrides: Vec::new(),
             rounds: 15,
+            exact_rate: true,
         }
     }
 }
@@ -239,7 +242,7 @@ pub fn converge_watched(
         certificate: reference.map(|r| r.certificate),
         has_warm_start,
         lanes: options.width.lanes(),
-        gauss_seidel_rate: gauss_seidel_rate(problem),
+        gauss_seidel_rate: options.exact_rate.then(|| gauss_seidel_rate(problem)).flatten(),
         tolerances: TOLERANCES,
         curves,
     })

@@ -2,6 +2,7 @@
 
 use super::replay::{Sequence, Start};
 use super::{Curve, Reached, Report, TOLERANCES};
+use crate::engine::lanes::native_width;
 
 /// Places in [`TOLERANCES`] of the two that are told.
 const TOLD: [usize; 2] = [1, 3];
@@ -14,7 +15,9 @@ pub fn text(report: &Report) -> String {
         .iter()
         .filter(|c| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part)
         .collect();
-    let mut text = "In coloured order, against the rigid contact law:\n".to_string();
+    let emulated = if report.lanes > native_width().lanes() { ", emulated" } else { "" };
+    let mut text =
+        format!("In coloured order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
     for at in TOLD {
         for start in [Start::Cold, Start::Warm] {
             text += &sentence(&own, at, start);
@@ -83,7 +86,7 @@ fn exact(report: &Report, curves: &[&Curve]) -> String {
         return "Gauss-Seidel has no rate here: it comes to no solution, or at once.\n".into();
     };
     let sweeps = |tolerance: f64| (tolerance.ln() / exact.ln()).ceil();
-    let mut text = format!("Gauss-Seidel's exact rate is {exact:.4} per sweep");
+    let mut text = format!("Gauss-Seidel's exact rate, that of its slowest error, is {exact:.4} per sweep");
     if exact < 1.0 {
         text += &format!(", {:.0} sweeps for 1e-2 and {:.0} for 1e-4", sweeps(1e-2), sweeps(1e-4));
     }

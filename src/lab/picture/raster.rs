@@ -48,7 +48,11 @@ impl Canvas {
                     for stroke in letters::strokes(letter) {
                         let points: Vec<_> =
                             stroke.iter().map(|[u, v]| [left + unit * (u - begin), y - unit * v]).collect();
-                        self.stroke(&points, false, *color, 0.095 * size);
+                        match points[..] {
+                            // A dot is as wide as two strokes side by side.
+                            [first, last] if first == last => self.fill(&disc(first, 0.08 * size), *color),
+                            _ => self.stroke(&points, false, *color, 0.095 * size),
+                        }
                     }
                     left += unit * advance;
                 }

@@ -80,9 +80,9 @@ fn element(item: &Item) -> String {
             });
             write!(text, "<polygon points=\"{}\" {fill}{stroke}{}", points(corners), close("polygon", title))
         }
-        Item::Line { from, to, color: c, width } => write!(
+        Item::Line { from, to, color: c, width } => writeln!(
             text,
-            "<path d=\"M{} {}L{} {}\" stroke=\"{}\"{} stroke-width=\"{}\" stroke-linecap=\"round\"/>\n",
+            "<path d=\"M{} {}L{} {}\" stroke=\"{}\"{} stroke-width=\"{}\" stroke-linecap=\"round\"/>",
             px(from[0]),
             px(from[1]),
             px(to[0]),
@@ -101,9 +101,9 @@ fn element(item: &Item) -> String {
             opacity("fill-opacity", *c),
             close("circle", title)
         ),
-        Item::Text { at: [x, y], size, anchor, color: c, text: letters } => write!(
+        Item::Text { at: [x, y], size, anchor, color: c, text: letters } => writeln!(
             text,
-            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\">{}</text>\n",
+            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\">{}</text>",
             px(*x),
             px(*y),
             px(*size),

@@ -238,13 +238,17 @@ mod tests {
         for length in (0..bytes.len()).step_by(7).chain([bytes.len() - 1]) {
             assert!(read(&bytes[..length]).is_err(), "{length}");
         }
-        // zlib's checksum sees every change of the payload; one of its two header bytes says how hard
-        // it was compressed, which changes nothing.
-        for at in (0..bytes.len()).filter(|at| ![16, 17].contains(at)) {
+        // zlib's checksum sees every change of the payload. A few bits of the compressed text have no
+        // meaning: how hard it was compressed, and what fills its last byte.
+        let whole = format!("{:?}", read(&bytes));
+        let harmless = (0..bytes.len()).filter(|&at| {
             let mut bad = bytes.clone();
             bad[at] ^= 0x10;
-            assert!(read(&bad).is_err(), "byte {at}");
-        }
+            let found = read(&bad);
+            assert!(found.is_err() || format!("{found:?}") == whole, "byte {at}");
+            found.is_ok()
+        });
+        assert!(harmless.count() <= 3);
         let mut newer = bytes.clone();
         newer[8] = 9;
         assert_eq!(read(&newer).unwrap_err(), "has version 9, this program reads version 1");
@@ -267,7 +271,8 @@ mod tests {
             read(&file(&header, frames).unwrap()).unwrap_err()
         };
         assert!(read(&file(&good, frames).unwrap()).is_ok());
-        let liars: [(&dyn Fn(&mut Header), &str); 9] = [
+        type Lie<'a> = &'a dyn Fn(&mut Header);
+        let liars: [(Lie, &str); 9] = [
             (&|h| h.frames = 0, "no frames"),
             (&|h| h.frames = u32::MAX, "no room"),
             (&|h| h.frames -= 1, "after its last frame"),

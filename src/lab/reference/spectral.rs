@@ -150,8 +150,14 @@ mod tests {
     #[test]
     fn it_is_the_rate_that_sweeps_have() {
         for problem in [box_pyramid(4, 0.0), box_pyramid(5, 0.5), sliding_box()] {
-            let stop = Stop { tolerance: 1e-11, iterations: 100_000 };
+            let stop = Stop { tolerance: 1e-13, iterations: 100_000 };
             let start = vec![[0.0; 2]; problem.contacts.len()];
+            let solved = pgs(&problem, Target::Rigid, &start, Sweep::Forward, stop);
+            // A start from zero may miss the slowest error by symmetry; one near the solution that
+            // has no symmetry does not.
+            let off = |(i, [n, t]): (usize, Pair)| [n * (1.0 + 1e-3 * (1.7 * i as f64).sin()), t * 0.999];
+            let start: Vec<Pair> = solved.impulses.into_iter().enumerate().map(off).collect();
+            let stop = Stop { tolerance: 1e-10, ..stop };
             let run = pgs(&problem, Target::Rigid, &start, Sweep::Forward, stop);
             let (measured, exact) = (rate(&run.history).unwrap(), of(&problem));
             assert!((measured - exact).abs() < 0.01 * (1.0 - exact), "{measured} is not {exact}");

@@ -3,13 +3,12 @@
 use super::environment::Environment;
 use super::table::{finish, table};
 use super::units::{digits, is_emulated, ratio, si};
-use crate::engine::solvers::VARIANTS;
 use crate::engine::world::Order;
-use crate::lab::study::Record;
 use crate::lab::study::answer::{Answer, order};
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::ranking::{CLOSE, ranking};
+use crate::lab::study::{self, Record};
 
 /// What the columns of the answer are.
 const LEGEND: &str = "\
@@ -140,8 +139,12 @@ fn worst(record: &Record) -> (String, &'static str) {
 /// The other solvers that tie, or the next one, and how much slower it is.
 fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     let tied = answer.tied_solvers();
-    if !tied.is_empty() {
-        return [tied.join(", "), "tie".to_string()];
+    if let Some(first) = tied.first() {
+        let others = match tied.len() {
+            1 => String::new(),
+            count => format!(" and {} more", count - 1),
+        };
+        return [format!("{first}{others}"), "tie".to_string()];
     }
     let Some(next) = answer.runner_up() else {
         return ["no other solver".to_string(), "–".to_string()];
@@ -173,11 +176,9 @@ fn standings(records: &[Record], scenes: usize) -> String {
     )
 }
 
-/// Solvers that did not run.
+/// Solvers that the default list leaves out.
 fn left_out(records: &[Record]) -> String {
-    let ran = solvers_of(records);
-    let others: Vec<&str> = VARIANTS.iter().map(|v| v.name).filter(|n| !ran.contains(n)).collect();
-    match others.as_slice() {
+    match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
         others => format!("\nleft out (--solvers all runs every solver): {}\n", others.join(", ")),
     }
@@ -194,6 +195,7 @@ fn differing(records: &[Record]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::solvers::VARIANTS;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     fn page(records: &[Record]) -> String {
@@ -232,13 +234,20 @@ mod tests {
 
     #[test]
     fn the_page_stays_a_page_and_says_what_did_not_run() {
-        let on = |scene: &str| Record { scene: scene.to_string(), ..record(8, 1, 5.0, 1e-3) };
-        let records: Vec<Record> = (0..11).map(|i| on(&format!("scene:{i}"))).collect();
-        let text = page(&records);
-        // What a study adds are two lines: where the files are.
-        assert!(text.lines().count() + VARIANTS.len() < 60, "{text}");
-        assert!(text.lines().all(|line| line.chars().count() <= 160), "{text}");
-        let others: Vec<&str> = VARIANTS.iter().map(|v| v.name).filter(|n| *n != "pgs").collect();
-        assert!(text.contains(&others.join(", ")), "{text}");
+        let of = |scene: &str, solver| Record { scene: scene.to_string(), solver, ..record(8, 1, 5.0, 1e-3) };
+        let all = |solvers: &[&'static str]| -> Vec<Record> {
+            (0..11).flat_map(|i| solvers.iter().map(move |s| of(&format!("scene:{i}"), *s))).collect()
+        };
+        let every: Vec<&'static str> = VARIANTS.iter().map(|v| v.name).collect();
+        for solvers in [&study::DEFAULT_SOLVERS[..], &every] {
+            let text = page(&all(solvers));
+            // What a study adds are two lines: where the files are.
+            assert!(text.lines().count() <= 58, "{text}");
+            let left_out = |line: &str| line.starts_with("left out");
+            assert!(text.lines().filter(|l| !left_out(l)).all(|l| l.chars().count() <= 160), "{text}");
+            let others = every.iter().filter(|name| !solvers.contains(name));
+            let names: Vec<&str> = others.copied().collect();
+            assert!(text.contains(&names.join(", ")), "{text}");
+        }
     }
 }

@@ -78,7 +78,7 @@ fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -
     let (right, bottom) = (corner.0 + PANEL_WIDTH - RIGHT, corner.1 + PANEL_HEIGHT - BOTTOM);
     if samples().next().is_none() {
         let known = axis != ErrorAxis::Truth || records.iter().any(|r| r.truth.is_some());
-        let text = if known { "nothing measured" } else { "no known truth" };
+        let text = if known { "nothing measured" } else { "no reference value" };
         return write(area, text, ((left + right) / 2, (top + bottom) / 2), 13, HPos::Center);
     }
     let errors = Scale::of(samples().map(|s| s.error), 5);

@@ -136,9 +136,21 @@ impl StudyFile {
         text
     }
 
-    /// The text of the file.
+    /// The text of the file, a record a line.
     pub fn to_json(&self) -> Result<Vec<u8>, Error> {
-        serde_json::to_vec_pretty(self).map_err(|e| Error::invalid(NAME, e.to_string()))
+        let failed = |e: serde_json::Error| Error::invalid(NAME, e.to_string());
+        let head = serde_json::to_string_pretty(&StudyFile {
+            environment: self.environment.clone(),
+            settings: self.settings.clone(),
+            missing_scenes: self.missing_scenes.clone(),
+            parts: self.parts.clone(),
+            records: Vec::new(),
+        });
+        let lines = self.records.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>();
+        let (head, lines) = (head.map_err(failed)?, lines.map_err(failed)?);
+        // Records are the last member, and the head has none of them.
+        let head = head.trim_end_matches(['}', '\n', ']']);
+        Ok(format!("{head}\n{}\n  ]\n}}\n", lines.join(",\n")).into_bytes())
     }
 
     /// Reads the study of a folder, or a file.

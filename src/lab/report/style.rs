@@ -1,11 +1,13 @@
 //! A colour and a marker per solver, the same in every plot, whatever else is in it.
 //!
 //! Eight colours that differ with any colour vision (Okabe and Ito, yellow darkened for lines on
-//! white) times eight markers. A solver's place in [`VARIANTS`] decides; neighbours differ in both,
-//! and sixty-four solvers differ in one of them.
+//! white) times eight markers. A solver's place decides: first those of [`DEFAULT_SOLVERS`], which
+//! therefore differ in colour, then the others of [`VARIANTS`]. Neighbours differ in both, and
+//! sixty-four solvers differ in one of them.
 
 use crate::engine::solvers::VARIANTS;
 use crate::lab::picture::Color;
+use crate::lab::study::DEFAULT_SOLVERS;
 
 const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222", "#8a7f00"];
@@ -54,7 +56,8 @@ const MARKERS: [Marker; 8] = [
 impl Style {
     /// Of the solver of this name; one that this program does not have gets one by its letters.
     pub fn of(solver: &str) -> Style {
-        let known = VARIANTS.iter().position(|v| v.name == solver);
+        let others = VARIANTS.iter().map(|v| v.name).filter(|name| !DEFAULT_SOLVERS.contains(name));
+        let known = DEFAULT_SOLVERS.into_iter().chain(others).position(|name| name == solver);
         let place = known.unwrap_or_else(|| solver.bytes().fold(7, |sum, b| (sum * 31 + b as usize) % 64));
         Style::at(place)
     }
@@ -136,6 +139,8 @@ mod tests {
         let styles: Vec<Style> = VARIANTS.iter().map(|v| Style::of(v.name)).collect();
         assert!((0..styles.len()).all(|i| !styles[..i].contains(&styles[i])));
         assert_eq!(Style::at(0).rgb(), Color(0x00, 0x72, 0xb2, 255));
+        let colors = DEFAULT_SOLVERS.map(|name| Style::of(name).color);
+        assert!((0..colors.len()).all(|i| !colors[..i].contains(&colors[i])), "{colors:?}");
         // One that is not here keeps its own, too.
         assert_eq!(Style::of("somebody_elses"), Style::of("somebody_elses"));
     }

@@ -182,6 +182,7 @@ pub fn error_list(errors: &Errors) -> String {
         ("soft contacts give way, last second", e.soft_floor.map(length)),
         ("penetration beyond that", e.penetration_excess.map(length)),
         ("law residual, rms, body weights", Some(ratio(e.law_rms_body))),
+        ("law residual, rms, scene weights", Some(ratio(e.law_rms))),
         ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
         ("law residual, normal, max", Some(ratio(e.law_normal_max))),
         ("law residual, tangential, rms", Some(ratio(e.law_tangent_rms))),

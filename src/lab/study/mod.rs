@@ -20,7 +20,7 @@ pub mod telling;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
-use crate::engine::solvers::{Variant, find};
+use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
@@ -50,14 +50,24 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "circle_pile:500",
 ];
 
-/// Solvers that are compared where none are named: one or two of every family. All others of
+/// Solvers that are compared where none are named: sequential impulses without and with position sweeps,
+/// accelerated, in parallel, in substeps, of positions, of energies, and soft. All others of
 /// [`VARIANTS`](crate::engine::solvers::VARIANTS) run when they are named, or with `all`.
-pub const DEFAULT_SOLVERS: [&str; 6] =
-    ["projection", "pgs", "pgs_ngs_block", "jacobi", "tgs_ngs", "soft_step"];
+pub const DEFAULT_SOLVERS: [&str; 8] =
+    ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "avbd", "soft_step"];
 
 /// The rows of [`DEFAULT_SOLVERS`].
 pub fn default_solvers() -> Vec<&'static Variant> {
     DEFAULT_SOLVERS.iter().filter_map(|name| find(name).ok()).collect()
+}
+
+/// The solvers of the crate that a comparison of `ran` left out, where `ran` is the default list: who
+/// names solvers knows what is left out.
+pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
+    let is_default =
+        ran.len() == DEFAULT_SOLVERS.len() && ran.iter().all(|name| DEFAULT_SOLVERS.contains(name));
+    let others = VARIANTS.iter().map(|v| v.name).filter(|name| is_default && !ran.contains(name));
+    others.collect()
 }
 
 /// What a study tries.
@@ -463,6 +473,8 @@ mod tests {
     fn every_solver_of_the_default_list_exists() {
         assert_eq!(default_solvers().len(), DEFAULT_SOLVERS.len());
         assert!(DEFAULT_SOLVERS.contains(&crate::engine::solvers::DEFAULT));
+        assert_eq!(left_out(&DEFAULT_SOLVERS).len(), VARIANTS.len() - DEFAULT_SOLVERS.len());
+        assert!(left_out(&["pgs"]).is_empty() && left_out(&[]).is_empty());
     }
 
     #[test]

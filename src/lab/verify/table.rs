@@ -338,7 +338,7 @@ pub static CASES: &[Case] = &[
     ),
     case(
         "B5.height",
-        "highest stack that rests after 20 s",
+        "highest stack that rests after 20 s (below: m off its axis)",
         "boxes",
         "the list's 60 are to stand",
         stacks::height,

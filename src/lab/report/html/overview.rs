@@ -97,7 +97,7 @@ pub fn overview(records: &[Record]) -> String {
             }
             let (xs, ys): (Vec<f64>, Vec<f64>) = held.iter().copied().unzip();
             let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
-            let (held_on, of) = (held.len(), all.clone().count());
+            let (held_on, of) = (held.len(), scenes(records).len());
             let title = format!(
                 "{solver}, {name}: holds on {} of {} scenes; there {} tolerances and {}× in the mean",
                 held_on,

@@ -29,7 +29,7 @@ pub fn answer(records: &[Record], steps: Option<u64>) -> String {
     let cut =
         steps.map_or(String::new(), |n| format!(" Runs end after {n} steps: what fails later is not seen."));
     let mut text = format!(
-        "<p class=\"lead\">{}{cut}</p>\n<table class=\"numbers\"><caption>Over all scenes</caption><thead><tr><th>solver\
+        "<p class=\"lead\">{}{cut}</p>\n<table class=\"numbers ranking\"><caption>Over all scenes</caption><thead><tr><th>solver\
          <th>score<th>holds on<th>good enough on<th>fastest or tied<th>within {CLOSE}×</tr></thead><tbody>\n",
         sentences(&ranking, &answers)
     );
