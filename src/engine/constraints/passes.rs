@@ -524,6 +524,12 @@ impl<'a> Passes<'a> {
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
+        self.bounce(substep);
+        self.book_impulses();
+    }
+
+    /// The first part of [`Self::end_substep`].
+    pub fn bounce(&mut self, substep: u32) {
         if self.input.features.restitution && self.input.phases.runs(Phase::Restitution) {
             self.over_contacts(&restitution::Track);
             if substep + 1 == self.input.budget.substeps {
@@ -532,6 +538,10 @@ impl<'a> Passes<'a> {
             }
             self.clock.lap(Phase::Restitution);
         }
+    }
+
+    /// The second part of [`Self::end_substep`]: adds the accumulated impulses to those of the step.
+    pub fn book_impulses(&mut self) {
         if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {

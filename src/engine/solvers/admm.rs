@@ -69,7 +69,10 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[(Law::Rest, "20 iterations are too few for tall stacks")],
+    breaks: &[
+        (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
+        (Law::Rest, "20 iterations are too few for tall stacks"),
+    ],
     step,
 };
 

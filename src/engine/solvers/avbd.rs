@@ -202,6 +202,7 @@ fn descend(blocks: &mut Blocks<'_>, h: f32, alpha: f32) {
         let edges = blocks.graph.edges_of(body);
         for &contact in edges {
             let side = usize::from(blocks.graph.ends(contact as usize)[1] as usize == body);
+            let has_friction = blocks.friction && blocks.contacts[contact as usize].friction > 0.0;
             for p in 0..blocks.contacts[contact as usize].manifold.count as usize {
                 let rows = rows(blocks, contact as usize, p, alpha);
                 let kept = blocks.kept.point(contact as usize, p);
@@ -209,7 +210,7 @@ fn descend(blocks: &mut Blocks<'_>, h: f32, alpha: f32) {
                 // A row at its bound keeps its stiffness: without it a body would go past where the row
                 // takes hold again, and back, for ever.
                 for (axis, penalty) in
-                    penalties.into_iter().enumerate().take(if blocks.friction { 2 } else { 1 })
+                    penalties.into_iter().enumerate().take(if has_friction { 2 } else { 1 })
                 {
                     let mut jacobian = rows.jacobian[side][axis].map(f64::from);
                     if inv_inertia <= 0.0 {

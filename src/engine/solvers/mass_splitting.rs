@@ -67,7 +67,10 @@ pub static SOLVER: Variant = Variant {
     softness: Some(angular_frequencies),
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[(Law::Rest, "12 slow sweeps are too few for stacks")],
+    breaks: &[
+        (Law::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),
+        (Law::Rest, "12 slow sweeps are too few for stacks"),
+    ],
     step,
 };
 

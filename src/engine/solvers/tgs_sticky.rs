@@ -83,7 +83,9 @@ fn step(passes: &mut Passes<'_>) {
                 passes.sticky_sweep(Phase::Relax, 0.0, push_speed, 0.0, REACH);
             }
         }
-        passes.end_substep(substep);
+        passes.bounce(substep);
     }
+    // Impulses add up over the whole step, as nothing is applied twice.
+    passes.book_impulses();
     passes.book_drift(REACH);
 }

@@ -40,6 +40,7 @@ pub static SOLVER: Variant = Variant {
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Cone, "friction of positions and of velocities have a cone each"),
+        (Law::Momentum, "corrections of velocities are in no impulse that it reports"),
         (Law::Converges, "the law that it solves is one of positions"),
         (Law::Rest, "no warm start"),
     ],
