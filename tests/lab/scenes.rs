@@ -63,6 +63,9 @@ fn every_scene_file_has_its_rows() {
     let mut found = 0;
     for file in std::fs::read_dir(folder).unwrap() {
         let path = file.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "rs") {
+            continue;
+        }
         let stem = path.file_stem().unwrap().to_str().unwrap().to_string();
         if MACHINERY.contains(&stem.as_str()) {
             continue;
@@ -332,8 +335,10 @@ fn the_pile_follows_its_seed() {
 #[test]
 fn wrong_names_and_sizes_are_named() {
     let message = |name: &str| load(name).err().map(|e| e.to_string()).unwrap_or_default();
-    assert_eq!(message("stak"), "unknown scene 'stak'; did you mean 'stack'?");
-    assert_eq!(message("qqqqqqqqqqqqqq"), "unknown scene 'qqqqqqqqqqqqqq'");
+    let names: Vec<&str> = CATALOG.iter().map(|entry| entry.name).collect();
+    let names = names.join(", ");
+    assert_eq!(message("stak"), format!("unknown scene 'stak'; did you mean 'stack'? [{names}]"));
+    assert_eq!(message("qqqqqqqqqqqqqq"), format!("unknown scene 'qqqqqqqqqqqqqq' [{names}]"));
     for size in ["0", "1001", "x", "", "-3", "1:2", "99999999999"] {
         let text = message(&format!("stack:{size}"));
         assert!(text.contains(&format!("'{size}'")) && text.contains("1 to 1000 (boxes)"), "{text}");

@@ -10,6 +10,9 @@ use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::ranking::{CLOSE, ranking};
 use crate::lab::study::{self, Record};
 
+/// Names in a line.
+const PER_LINE: usize = 10;
+
 /// What the columns of the answer are.
 const LEGEND: &str = "\
 A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and three errors
@@ -180,7 +183,13 @@ fn standings(records: &[Record], scenes: usize) -> String {
 fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
-        others => format!("\nleft out (--solvers all runs every solver): {}\n", others.join(", ")),
+        others => {
+            let mut text = "\nleft out (--solvers all runs every solver):".to_string();
+            for line in others.chunks(PER_LINE) {
+                text += &format!("\n  {}", line.join(", "));
+            }
+            text + "\n"
+        }
     }
 }
 
