@@ -5,6 +5,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// A bar that says what runs; it goes when it is dropped.
 pub struct Bar(ProgressBar);
 
+impl Default for Bar {
+    fn default() -> Self {
+        Bar::new()
+    }
+}
+
 impl Bar {
     /// Nothing is drawn before the first call of [`Bar::show`], or where nobody looks.
     pub fn new() -> Self {

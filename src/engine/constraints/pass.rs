@@ -29,7 +29,7 @@ pub struct PassInput<'a> {
     pub increments: &'a [[f32; 4]],
 }
 
-/// What a pass asks for per contact; see [`crate::engine::clock::Clock::book`].
+/// What a pass requests per contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PerLane {
     /// Floats of records that are read.

@@ -303,7 +303,7 @@ impl<'a> Passes<'a> {
         self.over_bodies(Phase::Integrate, |work| work.sums.clone_from(&work.rows));
     }
 
-    /// Constraint pass: displaces bodies that overlap or slip, see [`super::positional`]; `first` in each
+    /// Constraint pass: displaces bodies that overlap or slip, see `positional.rs`; `first` in each
     /// substep, and overlap removed at `push_speed` (m/s) at most.
     pub fn displacing_sweep(&mut self, push_speed: f32, first: bool) {
         if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, first }) {
@@ -330,7 +330,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Constraint pass: a sweep whose friction holds places, see [`super::sticky`]: removes `fraction` of an
+    /// Constraint pass: a sweep whose friction holds places, see `sticky.rs`: removes `fraction` of an
     /// overlap and `stick` of a drift per substep, overlap at `push_speed` (m/s) at most, drift of points
     /// within `reach` (m).
     pub fn sticky_sweep(&mut self, phase: Phase, fraction: f32, push_speed: f32, stick: f32, reach: f32) {

@@ -52,7 +52,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
 
 /// Solvers that are compared where none are named: sequential impulses without and with position sweeps,
 /// accelerated, in parallel, in substeps, of positions, and soft; all of them fast. All others of
-/// [`VARIANTS`](crate::engine::solvers::VARIANTS) run when they are named, or with `all`.
+/// [`VARIANTS`] run when they are named, or with `all`.
 pub const DEFAULT_SOLVERS: [&str; 7] =
     ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "soft_step"];
 
@@ -75,7 +75,7 @@ pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
 pub struct StudyPlan {
     /// Names of the catalogue, with sizes, or `.json` files.
     pub scenes: Vec<String>,
-    /// Rows of [`VARIANTS`](crate::engine::solvers::VARIANTS).
+    /// Rows of [`VARIANTS`].
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of coloured runs.
     pub widths: Vec<LaneWidth>,
