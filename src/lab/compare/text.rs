@@ -44,8 +44,8 @@ pub fn text(found: &Comparison, all: bool) -> String {
     let times: Vec<Line> = found.pairs.iter().filter_map(|p| times(p, found.threshold)).collect();
     let common = match (found.common, found.relative) {
         (None, _) => String::new(),
-        (Some(common), false) => format!(": in the median {} times as long", ratio(common)),
-        (Some(common), true) => format!(": relative to the median, {} times as long", ratio(common)),
+        (Some(common), false) => format!(": in the median {} times as long", digits(common)),
+        (Some(common), true) => format!(": relative to the median, {} times as long", digits(common)),
     };
     text += &section(&format!("Times{common}"), times, all);
     text + if found.regressed() { "regression: yes\n" } else { "regression: no\n" }
@@ -66,7 +66,7 @@ fn section(title: &str, mut lines: Vec<Line>, all: bool) -> String {
         let mut rows =
             table(&["scene", "solver", "budget", "lanes", "what", "before", "after", "growth", ""]);
         for line in &lines[..shown] {
-            let growth = if line.growth.is_finite() { ratio(line.growth) } else { "–".into() };
+            let growth = if line.growth.is_finite() { digits(line.growth) } else { "–".into() };
             let word = match line.verdict {
                 Verdict::Worse => "worse",
                 Verdict::Better => "better",

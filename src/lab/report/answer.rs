@@ -185,10 +185,9 @@ fn left_out(records: &[Record]) -> String {
         [] => String::new(),
         others => {
             let mut text = "\nleft out (--solvers all runs every solver):".to_string();
-            for line in others.chunks(PER_LINE) {
-                text += &format!("\n  {}", line.join(", "));
-            }
-            text + "\n"
+            let lines: Vec<String> = others.chunks(PER_LINE).map(|line| line.join(", ")).collect();
+            text += &format!("\n  {}\n", lines.join(",\n  "));
+            text
         }
     }
 }
