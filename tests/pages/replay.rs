@@ -55,7 +55,11 @@ fn the_controls_do_what_they_say() {
         root.dispatchEvent(new KeyboardEvent("keydown", { key: "End" })); out.last = state.time;
         root.dispatchEvent(new KeyboardEvent("keydown", { key: "Home" })); out.home = state.time;
         get("play").click(); out.playing = state.playing;
-        for (let i = 0; i < 12; i++) await pause(50);
+        // However slow the machine; a browser that shows no frames plays none.
+        out.ticks = 0;
+        const tick = () => { out.ticks += 1; requestAnimationFrame(tick); };
+        requestAnimationFrame(tick);
+        for (let i = 0; i < 200 && !(state.time > 0); i++) await pause(50);
         get("play").click(); out.played = state.time; out.paused = state.playing;
         const curves = root.querySelector("canvas.curves");
         curves.dispatchEvent(new PointerEvent("pointerdown", { clientX: curves.getBoundingClientRect().left + 0.5 * curves.clientWidth }));
@@ -79,7 +83,7 @@ fn the_controls_do_what_they_say() {
     near("fit", 1.0);
     near("last", 2.0);
     near("home", 0.0);
-    assert!(number("wheel") > 1.5 && number("played") > 0.0, "{found}");
+    assert!(number("wheel") > 1.5 && (number("played") > 0.0 || number("ticks") < 3.0), "{found}");
     assert!((number("picked") - 1.0).abs() < 0.02, "{found}");
     for name in ["moved", "zoomed", "same", "without", "grey", "playing"] {
         assert_eq!(found[name], true, "{name}: {found}");
