@@ -6,6 +6,7 @@ use super::bounces::Bounces;
 use super::descent::Blocks;
 use super::features::{Features, Layout};
 use super::graph::Graph;
+use super::impact;
 use super::jacobi::{self, JacobiRule};
 use super::kept::Kept;
 use super::masses::EffectiveMasses;
@@ -15,9 +16,10 @@ use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
+use super::preload::Preload;
 use super::prepare::{Prepare, Store};
 use super::restitution;
-use super::rules::{NormalRule, Rule};
+use super::rules::{NormalRule, Rule, Soft};
 use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
@@ -25,7 +27,8 @@ use super::types::{Joined, TypeInput};
 use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, held};
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, IMPACT_SWEEPS, IMPACT_TOLERANCE, IMPACT_WAVES, Parameters};
+use std::cell::Cell;
 use std::fmt;
 
 /// Everything a step works on, kept from step to step so that nothing is allocated.
@@ -126,6 +129,8 @@ pub struct Passes<'a> {
     count: WorkCount,
     iterations: u32,
     order: SweepOrder,
+    /// Something may bounce at the end of the step.
+    bounces: bool,
 }
 
 impl<'a> Passes<'a> {
@@ -141,7 +146,8 @@ impl<'a> Passes<'a> {
         width: LaneWidth,
     ) -> Self {
         let (count, order) = (WorkCount::default(), SweepOrder::Forward);
-        let mut passes = Passes { work, contacts, clock, input, width, count, iterations: 0, order };
+        let bounces = input.features.restitution;
+        let mut passes = Passes { work, contacts, clock, input, width, count, iterations: 0, order, bounces };
         passes.set_order(SweepOrder::Forward);
         // A phase that is repeated finds the records, and the check, of the step before it.
         if passes.input.phases.runs(Phase::Prepare) {
@@ -150,7 +156,10 @@ impl<'a> Passes<'a> {
             }
             passes.over_batches(Phase::Prepare, &Prepare);
             if input.features.restitution {
-                passes.over_contacts(&restitution::Begin { h: input.h });
+                passes.bounce_before();
+                let begin = restitution::Begin { h: input.h, found: Cell::new(0.0) };
+                passes.over_contacts(&begin);
+                passes.bounces = begin.found.get() > 0.0;
             }
             passes.clock.lap(Phase::Prepare);
         }
@@ -346,6 +355,12 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
+    /// the impulses so far, of which a step takes over the part `rate`; see [`super::preload`].
+    pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
+        self.run(Phase::Prepare, &Preload { springs, share, rate });
+    }
+
     /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
     pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
         if !self.input.phases.runs(phase) {
@@ -522,6 +537,30 @@ impl<'a> Passes<'a> {
         &mut self.work.kept
     }
 
+    /// Lets bounce what comes in, wave by wave; see [`super::impact`].
+    fn bounce_before(&mut self) {
+        let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
+        self.over_contacts(&impact::Load { h, dt });
+        for _ in 0..IMPACT_WAVES {
+            let wave = impact::Wave { h, dt, found: Cell::new(0.0) };
+            self.over_contacts(&wave);
+            if wave.found.get() == 0.0 {
+                break;
+            }
+            for _ in 0..IMPACT_SWEEPS {
+                let solve = impact::Solve { change: Cell::new(0.0) };
+                self.over_contacts(&solve);
+                self.count_sweep(if self.input.features.friction { 2 } else { 1 });
+                if solve.change.get() < IMPACT_TOLERANCE {
+                    break;
+                }
+            }
+            if self.input.record_impulses {
+                self.over_contacts(&impact::Book);
+            }
+        }
+    }
+
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
     pub fn end_substep(&mut self, substep: u32) {
         self.bounce(substep);
@@ -530,7 +569,7 @@ impl<'a> Passes<'a> {
 
     /// The first part of [`Self::end_substep`].
     pub fn bounce(&mut self, substep: u32) {
-        if self.input.features.restitution && self.input.phases.runs(Phase::Restitution) {
+        if self.bounces && self.input.phases.runs(Phase::Restitution) {
             self.over_contacts(&restitution::Track);
             if substep + 1 == self.input.budget.substeps {
                 self.over_contacts(&restitution::Apply { h: self.input.h });
@@ -565,7 +604,7 @@ impl<'a> Passes<'a> {
     pub fn finish(mut self) -> WorkCount {
         self.set_order(SweepOrder::Forward);
         if self.input.phases.runs(Phase::Store) {
-            if self.input.features.restitution {
+            if self.bounces {
                 self.over_contacts(&restitution::Forget);
             }
             self.over_batches(Phase::Store, &Store);

@@ -36,11 +36,14 @@ use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
+use std::cell::Cell;
 
 /// Reads the energies, before anything moves.
 pub struct Begin {
     /// Substep (s).
     pub h: f32,
+    /// Whether a point may bounce: greater than zero (m²/s²).
+    pub found: Cell<f32>,
 }
 
 impl Pass for Begin {
@@ -51,7 +54,8 @@ impl Pass for Begin {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
+        let most = prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
+        self.found.set(self.found.get().max(most));
     }
 }
 
@@ -107,7 +111,7 @@ impl Pass for Forget {
 // them per batch is not measurable beside the gathers.
 
 /// Reads energies before anything moves. `increments` are the changes of velocity in free flight
-/// per substep `h` (s), `[h aₓ, h a_y, h α, 0]` per row.
+/// per substep `h` (s), `[h aₓ, h a_y, h α, 0]` per row. Returns the greatest energy (m²/s²).
 pub fn prepare<L: Lanes, N: KernelFeatures>(
     rows: &[BodyRow],
     batches: &mut Batches,
@@ -115,13 +119,16 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     contacts: &[Contact],
     increments: &[[f32; 4]],
     h: f32,
-) {
+) -> f32 {
     bounces.reserve(batches.lanes(), N::POINTS);
+    let mut most = 0.0_f32;
     for i in 0..batches.visits().len() {
         let segment = batches.visits()[i];
         let layout = N::layout(segment.opposite);
-        prepare_segment::<L>(rows, batches, &segment, &layout, bounces, contacts, increments, h);
+        let found = prepare_segment::<L>(rows, batches, &segment, &layout, bounces, contacts, increments, h);
+        most = most.max(found);
     }
+    most
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -135,7 +142,8 @@ fn prepare_segment<L: Lanes>(
     contacts: &[Contact],
     increments: &[[f32; 4]],
     h: f32,
-) {
+) -> f32 {
+    let mut most = L::zero();
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride);
     let rows_of = row_a.batches().zip(row_b.batches());
@@ -163,13 +171,29 @@ fn prepare_segment<L: Lanes>(
             let fast = (L::splat(-RESTITUTION_THRESHOLD) - v).select_positive(energy, L::zero());
             bounce[1 + 2 * p] = e * e * fast;
             bounce[2 + 2 * p] = L::zero();
+            most = most.max(bounce[1 + 2 * p]);
         }
     }
+    largest(most)
+}
+
+/// The largest of all lanes, or zero.
+pub(super) fn largest<L: Lanes>(value: L) -> f32 {
+    let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
+    floats.iter().fold(0.0, |most, &x| x.max(most))
+}
+
+/// The speed v of a rebound that has the energy `energy` (m²/s²) at `separation` (m); see the [module](self).
+#[inline(always)]
+pub(super) fn rebound<L: Lanes>(energy: L, a: L, separation: L, h: f32) -> L {
+    let half = a * L::splat(0.5 * h);
+    let left = half * half + L::splat(2.0) * (energy - a * separation);
+    half + left.max(L::zero()).sqrt()
 }
 
 /// Normal velocity (m/s) and separation (m) of point `p` of a batch, as bodies now are.
 #[inline(always)]
-fn point<L: Lanes>(
+pub(super) fn point<L: Lanes>(
     rows: &[BodyRow],
     record: &[L],
     layout: &Layout,
@@ -252,9 +276,7 @@ fn apply_segment<L: Lanes>(
         for p in 0..layout.points {
             let [vn, separation] = point::<L>(rows, record, layout, p, row_a, row_b);
             let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
-            let half = a * L::splat(0.5 * h);
-            let left = half * half + L::splat(2.0) * (energy - a * separation);
-            let rebound = half + left.max(L::zero()).sqrt();
+            let rebound = rebound(energy, a, separation, h);
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             let target = mass.neg_mul_add(vn - rebound, old).max(L::zero());

@@ -33,6 +33,7 @@ pub mod pgs_soft;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
+pub mod shim;
 pub mod shock;
 pub mod soft_step;
 pub mod sor;
@@ -44,7 +45,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 26] = [
+pub static VARIANTS: [&Variant; 27] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -69,6 +70,7 @@ pub static VARIANTS: [&Variant; 26] = [
     &xpbd::SOLVER,
     &avbd::SOLVER,
     &soft_step::SOLVER,
+    &shim::SOLVER,
     &box2d::SOLVER,
     &rapier::SOLVER,
 ];

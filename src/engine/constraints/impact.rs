@@ -1,0 +1,298 @@
+//! Impacts: bodies that are about to hit each other, or have, bounce before the step is solved.
+//!
+//! # Newton's law with Coulomb's friction
+//!
+//! A point that comes in at the normal velocity v < 0 shall leave at the rebound v⁺ of
+//! [`super::restitution`], e |v| but for the acceleration of flight. Its impulses N along n and T along t
+//! are those of the whole impact, so that friction is bounded by all of N:
+//!
+//! ```text
+//! k_nn N + k_nt T = v⁺ − v_n       k_nt = I_a⁻¹ (r_a × n)(r_a × t) + I_b⁻¹ (r_b × n)(r_b × t)
+//! k_nt N + k_tt T = −v_t           if |T| ≤ µ N: the point sticks
+//!               T = ±µ N           else, with the sign of the T that would stop it
+//! ```
+//!
+//! A disc has k_nt = 0; a corner does not, and is turned by both. Both rows are solved at once.
+//!
+//! # Waves
+//!
+//! Which points bounce, and how fast, is decided at the beginning of a wave: those that come in. All of
+//! them are solved together, by Gauss–Seidel on accumulated impulses, so that a box that lands flat bounces
+//! flat. What comes in then makes the next wave: through a row of balls an impact runs ball by ball.
+//!
+//! # What comes in
+//!
+//! A point is an impact if it closes its gap within the step, and faster than what forces alone make
+//! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests.
+
+use super::batches::{Batches, Segment, SegmentRecords};
+use super::bounces::Bounces;
+use super::features::{KernelFeatures, Layout, OppositeKind};
+use super::pass::{Pass, PassInput, PerLane};
+use super::restitution::{largest, point, rebound};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
+use glam::Vec2;
+use std::cell::Cell;
+
+/// Reads what impacts need of contacts and bodies, once per step.
+pub(super) struct Load {
+    /// Substep (s).
+    pub h: f32,
+    /// Step (s).
+    pub dt: f32,
+}
+
+/// Begins a wave: finds what comes in, and how fast it shall leave.
+pub(super) struct Wave {
+    /// Substep (s).
+    pub h: f32,
+    /// Step (s).
+    pub dt: f32,
+    /// Whether something comes in: greater than zero.
+    pub found: Cell<f32>,
+}
+
+/// One Gauss–Seidel sweep over the points of a wave.
+pub(super) struct Solve {
+    /// Greatest change of a velocity, as a part of what the wave asks for (1).
+    pub change: Cell<f32>,
+}
+
+/// Adds the impulses of a wave to those of the step.
+pub(super) struct Book;
+
+/// Side record of an impact: a (m/s²), e (1), threshold (m/s); then per point target (m/s; zero where
+/// nothing comes in), N and T (N·s). See [`Bounces`].
+const FIRST: usize = 3;
+const PER_POINT: usize = 3;
+
+impl Pass for Load {
+    fn traffic(&self, _: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane { halves: 0, ..PerLane::of_bodies(1, FIRST, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.bounces.reserve(on.batches.lanes(), F::POINTS);
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let layout = F::layout(segment.opposite);
+            load::<L>(on.batches, &segment, &layout, on.bounces, on.contacts, on.increments, self);
+        }
+    }
+}
+
+impl Pass for Wave {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 2 + FIRST + layout.points * (layout.arms() + 1);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, PER_POINT * layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let layout = F::layout(segment.opposite);
+            wave::<L>(on.rows, on.batches, &segment, &layout, on.bounces, self);
+        }
+    }
+}
+
+impl Pass for Solve {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 3 + layout.points * (layout.arms() + 2 + PER_POINT);
+        let once = PerLane::of_bodies(read, 2 * layout.points, opposite);
+        PerLane { rows: layout.points * once.rows, halves: layout.points * once.halves, ..once }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let layout = F::layout(segment.opposite);
+            solve::<L>(on.rows, on.batches, &segment, &layout, on.bounces, &self.change);
+        }
+    }
+}
+
+impl Pass for Book {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        let impulses = 2 * layout.points;
+        PerLane { floats_read: 1 + impulses, floats_written: impulses, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let layout = F::layout(segment.opposite);
+            let contact = on.batches.records_of::<L>(&segment, &layout).contact;
+            let sides = on.bounces.of::<L>(&segment, layout.points);
+            for (batch, (side, contact)) in sides.zip(contact.batches::<L::Index>()).enumerate() {
+                let floats: &[f32] = bytemuck::cast_slice(side);
+                let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+                for (lane, &contact) in filled.iter().enumerate() {
+                    for p in 0..layout.points {
+                        let of =
+                            |quantity: usize| floats[(FIRST + PER_POINT * p + quantity) * L::WIDTH + lane];
+                        let [normal, tangent] = &mut on.contacts[contact as usize].step_impulse[p];
+                        (*normal, *tangent) = (*normal + of(1), *tangent + of(2));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn load<L: Lanes>(
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+    contacts: &[Contact],
+    increments: &[[f32; 4]],
+    &Load { h, dt }: &Load,
+) {
+    let SegmentRecords { contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
+    for (batch, (side, (contact, (row_a, row_b)))) in
+        bounces.of::<L>(segment, layout.points).zip(indices).enumerate()
+    {
+        let row_b: LaneIndex<L::Index> = row_b;
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(side);
+        floats.fill(0.0);
+        // Lanes without a contact have e = 0, and bounce as little as contacts that have.
+        for (lane, &contact) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+            let Contact { restitution, manifold, .. } = &contacts[contact as usize];
+            let along = |row: u32| {
+                manifold.normal.dot(Vec2::new(increments[row as usize][0], increments[row as usize][1]))
+            };
+            let (a, b) = (along(row_a.entries()[lane]) / h, along(row_b.entries()[lane]) / h);
+            floats[lane] = a - b;
+            floats[L::WIDTH + lane] = *restitution;
+            floats[2 * L::WIDTH + lane] = dt * (a.abs() + b.abs());
+        }
+    }
+}
+
+#[inline(never)]
+fn wave<L: Lanes>(
+    rows: &[BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+    Wave { h, dt, found }: &Wave,
+) {
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let (zero, dt_lanes) = (L::zero(), L::splat(*dt));
+    let mut most = zero;
+    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
+        let (a, e, threshold) = (side[0], side[1], side[2]);
+        for p in 0..layout.points {
+            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
+            // Where it would be at the end of the step, a tenth of its way further.
+            let fall = a * L::splat(0.5 * (dt + h));
+            let closes = (v - fall).mul_add(dt_lanes * L::splat(1.1), s);
+            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+            let target = rebound(e * e * energy, a, s, *h);
+            let is_fast = (-threshold - v).select_positive(target, zero);
+            let comes_in = (-closes).select_positive(is_fast, zero);
+            let target = e.select_positive(comes_in, zero);
+            // A point that is not there has no mass.
+            let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
+            let at = FIRST + PER_POINT * p;
+            (side[at], side[at + 1], side[at + 2]) = (target, zero, zero);
+            most = most.max(target);
+        }
+    }
+    found.set(largest(most).max(found.get()));
+}
+
+#[inline(never)]
+fn solve<L: Lanes>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+    change: &Cell<f32>,
+) {
+    let moves = segment.opposite == OppositeKind::Dynamic;
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let mut most = zero;
+    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
+        for p in 0..layout.points {
+            let at = FIRST + PER_POINT * p;
+            let target = side[at];
+            if largest(target) == 0.0 {
+                continue;
+            }
+            let [vn, _] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let b = L::gather(rows, row_b);
+            let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+            let n = [record[0], record[1]];
+            let arms = |first: usize, has: bool| {
+                if has { [record[layout.at(p, first)], record[layout.at(p, first) + 1]] } else { [zero; 2] }
+            };
+            let (arm_b, arm_a) =
+                (arms(layout.arm_b, layout.has_arms[0]), arms(layout.arm_a, layout.has_arms[1]));
+            let [old_n, old_t] = [side[at + 1], side[at + 2]];
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let k_nn = one / mass.select_positive(mass, one);
+            let wanted = target - vn;
+            let mut new = [mass.mul_add(wanted, old_n).max(zero), zero];
+            if layout.has_friction {
+                let vt = {
+                    let x = b[0] - a[0];
+                    let along = n[1].mul_add(x, -(n[0] * (b[1] - a[1])));
+                    a[2].neg_mul_add(arm_a[1], b[2].mul_add(arm_b[1], along))
+                };
+                let mass_t = record[layout.at(p, layout.tangent_mass)];
+                let k_tt = one / mass_t.select_positive(mass_t, one);
+                let answers = if moves { a[7] } else { zero };
+                let k_nt = (b[7] * arm_b[0]).mul_add(arm_b[1], answers * arm_a[0] * arm_a[1]);
+                // Velocities that are to be made, from none of the wave's impulses.
+                let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted));
+                let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, -vt));
+                let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
+                let safe = determinant.select_positive(determinant, one);
+                let stick = [
+                    k_tt.mul_add(want_n, -(k_nt * want_t)) / safe,
+                    k_nn.mul_add(want_t, -(k_nt * want_n)) / safe,
+                ];
+                let mu = record[layout.friction];
+                let size = stick[1].max(-stick[1]);
+                let slope = stick[1].select_positive(mu, -mu);
+                // Along the edge of the cone N meets k_nn ± µ k_nt; where that is not positive the
+                // edge leads nowhere (Painlevé), and N is that without friction.
+                let along = slope.mul_add(k_nt, k_nn);
+                let edge_n = (want_n / along.select_positive(along, one)).max(zero);
+                let edge_n = along.select_positive(edge_n, (want_n * mass).max(zero));
+                let slides = mu.neg_mul_add(stick[0], size);
+                let slides = stick[0].select_positive(slides, one);
+                new = [
+                    slides.select_positive(edge_n, stick[0]),
+                    slides.select_positive(slope * edge_n, stick[1]),
+                ];
+            }
+            let new = new.map(|impulse| target.select_positive(impulse, zero));
+            (side[at + 1], side[at + 2]) = (new[0], new[1]);
+            let delta = [new[0] - old_n, new[1] - old_t];
+            let size = delta[0].max(-delta[0]) + delta[1].max(-delta[1]);
+            most = most.max(k_nn * size / target.select_positive(target, one));
+            let x = n[0].mul_add(delta[0], n[1] * delta[1]);
+            let y = n[1].mul_add(delta[0], -(n[0] * delta[1]));
+            let turn = |arm: [L; 2]| arm[0].mul_add(delta[0], arm[1] * delta[1]);
+            let v = [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), b[7].mul_add(turn(arm_b), b[2]), b[3]];
+            L::scatter_velocity(rows, row_b, v);
+            if moves {
+                let w = a[7].neg_mul_add(turn(arm_a), a[2]);
+                let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
+                L::scatter_velocity(rows, row_a, v);
+            }
+        }
+    }
+    change.set(largest(most).max(change.get()));
+}

@@ -1,0 +1,101 @@
+//! Preload: soft contacts that do not sag at rest.
+//!
+//! A spring bears a load by giving way. Each contact keeps a preload d (m), by which its springs are
+//! shortened: they see the separation s − d instead of s. With d the sag of the present load, s = 0 at rest.
+//!
+//! # The sag
+//!
+//! At rest a soft row (see [`super::rules::Soft`]) neither gains nor loses impulse: γ_i λ = −m γ_m β s.
+//! Both points of a contact share one d, so what they bear together decides, and
+//!
+//! ```text
+//! sag = γ_i Σλ / (γ_m β Σm)
+//! ```
+//!
+//! One d per contact and not per point: a preload carries force along the normal and no moment. Rocking
+//! of a slender column is a mode so slow and so little damped that an integral in it grows.
+//!
+//! # How it follows the load
+//!
+//! At the start of each step
+//!
+//! ```text
+//! d ← min(d + (φ sag − d) · rate, φ sag)
+//! ```
+//!
+//! slowly upwards, and down at once: a preload that the load does not call for would push bodies apart. The
+//! part φ < 1 leaves some overlap, so that points at rest stay points.
+//! A contact that comes has none, and none has more than the distance within which points are contacts:
+//! what sinks deeper is squeezed by more than its load.
+
+use super::batches::{Batches, Segment, SegmentRecords};
+use super::features::{KernelFeatures, Layout, OppositeKind};
+use super::kept::{Kept, load, save};
+use super::pass::{Pass, PassInput, PerLane};
+use super::rules::{Soft, Softness};
+use crate::engine::lanes::Lanes;
+use crate::engine::params::SPECULATIVE_DISTANCE;
+
+/// Follows the load and shortens the springs; see the [module](self). The solver keeps one float per contact
+/// point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Preload {
+    /// The springs.
+    pub springs: Soft,
+    /// φ: part of the sag that is taken away (1).
+    pub share: f32,
+    /// Share of the way to the sag per step (1).
+    pub rate: f32,
+}
+
+impl Pass for Preload {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        // Separation, mass, impulse and preload of each point, and the index of the contact.
+        let (read, written) = (1 + 4 * layout.points, 2 * layout.points);
+        PerLane { floats_read: read, floats_written: written, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
+                OppositeKind::Dynamic => self.springs.dynamic,
+                _ => self.springs.against_static,
+            };
+            let compliance = impulse_scale / (mass_scale * bias_rate);
+            let layout = F::layout(segment.opposite);
+            preload_segment::<L>(on.batches, &segment, &layout, on.kept, self.share * compliance, self.rate);
+        }
+    }
+}
+
+#[inline(never)]
+fn preload_segment<L: Lanes>(
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    kept: &mut Kept,
+    compliance: f32,
+    rate: f32,
+) {
+    let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact_mut(layout.stride);
+    for (batch, (record, contact)) in records.zip(contact.batches::<L::Index>()).enumerate() {
+        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+        let (mut impulse, mut mass, mut preload) = (L::zero(), L::zero(), L::zero());
+        for p in 0..layout.points {
+            impulse = impulse + record[layout.at(p, layout.normal_impulse)];
+            mass = mass + record[layout.at(p, layout.normal_mass)];
+            preload = preload.max(load::<L>(kept.points(), contacts, p));
+        }
+        // A lane without a contact has no mass.
+        let safe = mass.select_positive(mass, L::splat(1.0));
+        let sag = (L::splat(compliance) * impulse / safe).min(L::splat(SPECULATIVE_DISTANCE));
+        preload = L::splat(rate).mul_add(sag - preload, preload).min(sag);
+        for p in 0..layout.points {
+            save::<L>(kept.points(), contacts, p, preload);
+            let at = layout.at(p, layout.separation);
+            record[at] = record[at] - preload;
+        }
+    }
+}

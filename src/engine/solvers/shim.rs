@@ -1,0 +1,108 @@
+//! Soft contacts that do not sag: each contact is shimmed by what its springs give way under the load it
+//! bears, so that they are stiff enough to move with and rigid to stand on.
+//!
+//! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
+//!
+//! **Departures.** Other than in [`super::soft_step`], springs are as stiff as the substep rate allows, a fixed
+//! part of it, and have a preload per contact that follows the load in `settling_time`; see
+//! [`crate::engine::constraints::Passes::preload`].
+//!
+//! **Cost.** Per step 1 warm start and 1 pass that shortens springs; per substep 2 body passes,
+//! `velocity_iterations` soft sweeps and `relax_iterations` rigid ones.
+//!
+//! **Fails when** a column is so tall that it buckles on its springs: preload has no moment, so that
+//! rocking is held by the springs alone. N unit boxes need about 30 Hz (N/14)^1.5.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::rules::{Rigid, Rule, Soft};
+use crate::engine::constraints::sweep::Sweep;
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, MAX_PUSH_SPEED, Parameter};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "shim",
+    source: "shim",
+    summary: "substeps, and soft contacts whose springs are preloaded until they do not sag",
+    budget: Budget { substeps: 16, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    parameters: &[
+        Parameter {
+            name: "stiffness",
+            unit: "",
+            default: 0.15,
+            range: [1e-6, 0.2],
+            meaning: "frequency of contacts, as a part of the substep rate",
+            trials: &[],
+        },
+        Parameter {
+            name: "damping_ratio",
+            unit: "",
+            default: CONTACT_DAMPING_RATIO,
+            range: [0.0, 1e3],
+            meaning: "damping of contacts; 1 is critical",
+            trials: &[],
+        },
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: MAX_PUSH_SPEED,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+        Parameter {
+            name: "height",
+            unit: "",
+            default: 100.0,
+            range: [1.0, 1e6],
+            meaning: "bodies in the highest column that preload may not make swing",
+            trials: &[],
+        },
+        Parameter {
+            name: "preload",
+            unit: "",
+            default: 0.95,
+            range: [0.0, 1.0],
+            meaning: "part of its sag that a contact is preloaded by; 0 is none",
+            trials: &[],
+        },
+    ],
+    softness: None,
+    by_levels: false,
+    kept: KeptSize { per_point: 1, per_body: 0 },
+    breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
+    step,
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [stiffness, damping_ratio, push_speed, height, share] = [0, 1, 2, 3, 4].map(|i| passes.parameter(i));
+    let omega = TAU * stiffness / h;
+    let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
+    let (soft, rigid) = (Rule::Soft(Sweep(springs)), Rigid::rule(h));
+    let (dt, slowest) = (h * budget.substeps as f32, FRAC_PI_2 / height);
+    let time = 1.0 / (2.0 * damping_ratio * omega * slowest * slowest);
+    passes.preload(springs, share, dt / (dt + time));
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &soft);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.sweep(Phase::Relax, &rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
