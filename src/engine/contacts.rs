@@ -57,9 +57,11 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
+    /// By how much the contact's springs are shortened (m), for solvers that do; zero when it comes.
+    pub preload: f32,
     /// Fills the last quad.
     #[doc(hidden)]
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -76,6 +78,8 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
+    /// `[of the step's impulses, preload, padding]`.
+    pub const PRELOAD: usize = 7;
 }
 
 impl Contact {

@@ -28,8 +28,9 @@
 //! determinant below a thousandth of a₁₁ a₂₂) or there is one point only, rows are solved one after
 //! the other.
 //!
-//! Friction rows come first, bounded by the normal impulses so far (`catto2024solver2d`,
-//! `solve_pgs_ngs_block`): normal rows have the last word.
+//! In [`BlockSweep`] friction rows come first, bounded by the normal impulses so far (`catto2024solver2d`,
+//! `solve_pgs_ngs_block`): normal rows have the last word. In [`BlockSweepNormalFirst`] they come last, bounded
+//! by the new ones, so that the cone holds and what slides feels the load of now.
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
@@ -55,17 +56,88 @@ impl<R: NormalRule> Pass for BlockSweep<R> {
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R>(on.rows, on.batches, self.0);
+        sweep::<L, F, R, FrictionFirst>(on.rows, on.batches, self.0);
     }
 }
 
+/// A block sweep under a rule, normal rows before friction rows.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockSweepNormalFirst<R>(pub R);
+
+impl<R: NormalRule> Pass for BlockSweepNormalFirst<R> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
+
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        sweep::<L, F, R, NormalFirst>(on.rows, on.batches, self.0);
+    }
+}
+
+/// Which rows of a contact come first.
+trait RowOrder {
+    const NORMAL_FIRST: bool;
+}
+
+struct NormalFirst;
+struct FrictionFirst;
+
+impl RowOrder for NormalFirst {
+    const NORMAL_FIRST: bool = true;
+}
+
+impl RowOrder for FrictionFirst {
+    const NORMAL_FIRST: bool = false;
+}
+
 #[inline(never)]
-fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
-    over_moving_segments!(segment, L, N, R; rows, batches, rule);
+fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, W: RowOrder>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    rule: R,
+) {
+    over_moving_segments!(segment, L, N, R, W; rows, batches, rule);
+}
+
+/// Velocities of a contact while its rows are solved, and what they have applied.
+struct Progress<L> {
+    /// Of b against a along t, by motion without spin (m/s).
+    along_t: L,
+    /// Spins (rad/s).
+    w: [L; 2],
+    /// Impulses along n and t (N·s).
+    sum: [L; 2],
+}
+
+/// The friction rows of a batch, bounded by the normal impulses in its record.
+#[inline(always)]
+fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+    record: &mut [L],
+    rule: R,
+    mass_sum: L,
+    inertia: [L; 2],
+    progress: &mut Progress<L>,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let friction = record[layout.friction];
+    for p in 0..N::POINTS {
+        let arm = arms::<L, N, O>(record, &layout, p, 1);
+        let vt = with_arms::<L, N, O>(progress.along_t, progress.w, arm);
+        let at = layout.at(p, layout.tangent_impulse);
+        let (old, mass) = (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
+        let bound = friction * record[layout.at(p, layout.normal_impulse)];
+        let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
+        record[at] = new;
+        let delta = new - old;
+        progress.sum[1] = progress.sum[1] + delta;
+        progress.along_t = mass_sum.mul_add(delta, progress.along_t);
+        spin::<L, N, O>(&mut progress.w, inertia, arm, delta);
+    }
 }
 
 #[inline(always)]
-fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -77,25 +149,11 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
         let n = [record[0], record[1]];
         let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let [along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
-        let mut w = [a[W], b[W]];
-        let mut sum = [L::zero(); 2];
-
-        if N::FRICTION && R::FRICTION {
-            let friction = record[layout.friction];
-            for p in 0..N::POINTS {
-                let arm = arms::<L, N, O>(record, &layout, p, 1);
-                let vt = with_arms::<L, N, O>(along_t, w, arm);
-                let at = layout.at(p, layout.tangent_impulse);
-                let (old, mass) = (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
-                let bound = friction * record[layout.at(p, layout.normal_impulse)];
-                let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
-                record[at] = new;
-                let delta = new - old;
-                sum[1] = sum[1] + delta;
-                along_t = mass_sum.mul_add(delta, along_t);
-                spin::<L, N, O>(&mut w, inertia, arm, delta);
-            }
+        let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut progress = Progress { along_t, w: [a[W], b[W]], sum: [L::zero(); 2] };
+        let has_friction = const { N::FRICTION && R::FRICTION };
+        if has_friction && !W::NORMAL_FIRST {
+            friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
         }
 
         let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
@@ -111,7 +169,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             old[p] = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             [constant[p], slope[p]] = rule.line(!O::MOVES, separation, mass, old[p]);
-            v[p] = with_arms::<L, N, O>(along_n, w, arm[p]);
+            v[p] = with_arms::<L, N, O>(along_n, progress.w, arm[p]);
         }
         let mut coupling = L::zero();
         if N::POINTS == 2 {
@@ -127,10 +185,13 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
         for p in 0..N::POINTS {
             record[layout.at(p, layout.normal_impulse)] = new[p];
             let delta = new[p] - old[p];
-            sum[0] = sum[0] + delta;
-            spin::<L, N, O>(&mut w, inertia, arm[p], delta);
+            progress.sum[0] = progress.sum[0] + delta;
+            spin::<L, N, O>(&mut progress.w, inertia, arm[p], delta);
         }
-        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        if has_friction && W::NORMAL_FIRST {
+            friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
+        }
+        apply::<L, O>(&mut a, &mut b, n, progress.sum, progress.w);
         BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
     });
 }

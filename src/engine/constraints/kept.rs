@@ -5,7 +5,7 @@
 //! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
 
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Lanes, held};
+use crate::engine::lanes::held;
 
 /// How many numbers a solver keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,26 +100,6 @@ impl Kept {
                 }
             }
         }
-    }
-}
-
-/// A number of one point in all lanes, from what is kept, one float per point.
-#[inline(always)]
-pub(super) fn load<L: Lanes>(kept: &[f32], contacts: &[u32], p: usize) -> L {
-    let mut value = L::zero();
-    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
-    for (float, &contact) in floats.iter_mut().zip(contacts) {
-        *float = kept[2 * contact as usize + p];
-    }
-    value
-}
-
-/// The other way round, in the first lanes, as many as `contacts`.
-#[inline(always)]
-pub(super) fn save<L: Lanes>(kept: &mut [f32], contacts: &[u32], p: usize, value: L) {
-    let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
-    for (float, &contact) in floats.iter().zip(contacts) {
-        kept[2 * contact as usize + p] = *float;
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
 use super::batches::Batches;
-use super::block::BlockSweep;
+use super::block::{BlockSweep, BlockSweepNormalFirst};
 use super::bounces::Bounces;
 use super::descent::Blocks;
 use super::features::{Features, Layout};
@@ -253,6 +253,13 @@ impl<'a> Passes<'a> {
     /// together; see [`super::block`].
     pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         if self.run(phase, &BlockSweep(rule)) {
+            self.solved(&Sweep(rule));
+        }
+    }
+
+    /// Constraint pass: as [`Self::block_sweep`], but friction rows come last, bounded by the new impulses.
+    pub fn block_sweep_normal_first<R: NormalRule>(&mut self, phase: Phase, rule: R) {
+        if self.run(phase, &BlockSweepNormalFirst(rule)) {
             self.solved(&Sweep(rule));
         }
     }

@@ -30,14 +30,13 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
-use super::kept::{Kept, load, save};
 use super::pass::{Pass, PassInput, PerLane};
 use super::rules::{Soft, Softness};
+use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::Lanes;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
-/// Follows the load and shortens the springs; see the [module](self). The solver keeps one float per contact
-/// point.
+/// Follows the load and shortens the springs; see the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Preload {
     /// The springs.
@@ -62,40 +61,45 @@ impl Pass for Preload {
                 OppositeKind::Dynamic => self.springs.dynamic,
                 _ => self.springs.against_static,
             };
-            let compliance = impulse_scale / (mass_scale * bias_rate);
+            let compliance = self.share * impulse_scale / (mass_scale * bias_rate);
             let layout = F::layout(segment.opposite);
-            preload_segment::<L>(on.batches, &segment, &layout, on.kept, self.share * compliance, self.rate);
+            preload_segment::<L>(on.batches, &segment, &layout, on.contacts, [compliance, self.rate]);
         }
     }
 }
 
+/// `factors`: sag per impulse and effective mass (s), and rate.
 #[inline(never)]
 fn preload_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
     layout: &Layout,
-    kept: &mut Kept,
-    compliance: f32,
-    rate: f32,
+    contacts: &mut [Contact],
+    factors: [f32; 2],
 ) {
+    let [compliance, rate] = factors.map(L::splat);
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
-    for (batch, (record, contact)) in records.zip(contact.batches::<L::Index>()).enumerate() {
-        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
-        let (mut impulse, mut mass, mut preload) = (L::zero(), L::zero(), L::zero());
+    for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
+        let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
+        let (mut impulse, mut mass) = (L::zero(), L::zero());
         for p in 0..layout.points {
             impulse = impulse + record[layout.at(p, layout.normal_impulse)];
             mass = mass + record[layout.at(p, layout.normal_mass)];
-            preload = preload.max(load::<L>(kept.points(), contacts, p));
         }
         // A lane without a contact has no mass.
         let safe = mass.select_positive(mass, L::splat(1.0));
-        let sag = (L::splat(compliance) * impulse / safe).min(L::splat(SPECULATIVE_DISTANCE));
-        preload = L::splat(rate).mul_add(sag - preload, preload).min(sag);
+        let sag = (compliance * impulse / safe).min(L::splat(SPECULATIVE_DISTANCE));
+        let [_, last, ..] =
+            L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
+        let preload = rate.mul_add(sag - last, last).min(sag);
         for p in 0..layout.points {
-            save::<L>(kept.points(), contacts, p, preload);
             let at = layout.at(p, layout.separation);
             record[at] = record[at] - preload;
+        }
+        let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&preload));
+        for (&preload, &contact) in floats.iter().zip(filled) {
+            contacts[contact as usize].preload = preload;
         }
     }
 }

@@ -18,7 +18,7 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
-use super::kept::{Kept, load, save};
+use super::kept::Kept;
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_moving_segments, spin,
@@ -74,6 +74,26 @@ impl Pass for BookDrift {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         over_moving_segments!(book, L, F; on.rows, on.batches, on.kept, self.reach);
+    }
+}
+
+/// A number of one point in all lanes, from what is kept.
+#[inline(always)]
+fn load<L: Lanes>(kept: &[f32], contacts: &[u32], p: usize) -> L {
+    let mut value = L::zero();
+    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
+    for (float, &contact) in floats.iter_mut().zip(contacts) {
+        *float = kept[2 * contact as usize + p];
+    }
+    value
+}
+
+/// The other way round, in the first lanes, as many as `contacts`.
+#[inline(always)]
+fn save<L: Lanes>(kept: &mut [f32], contacts: &[u32], p: usize, value: L) {
+    let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
+    for (float, &contact) in floats.iter().zip(contacts) {
+        kept[2 * contact as usize + p] = *float;
     }
 }
 

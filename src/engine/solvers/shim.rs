@@ -17,8 +17,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Rule, Soft};
-use crate::engine::constraints::sweep::Sweep;
+use crate::engine::constraints::rules::{Rigid, Soft};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, MAX_PUSH_SPEED, Parameter};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -34,7 +33,7 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "stiffness",
             unit: "",
-            default: 0.15,
+            default: 0.16,
             range: [1e-6, 0.2],
             meaning: "frequency of contacts, as a part of the substep rate",
             trials: &[],
@@ -58,7 +57,7 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "height",
             unit: "",
-            default: 100.0,
+            default: 300.0,
             range: [1.0, 1e6],
             meaning: "bodies in the highest column that preload may not make swing",
             trials: &[],
@@ -74,7 +73,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: None,
     by_levels: false,
-    kept: KeptSize { per_point: 1, per_body: 0 },
+    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     step,
 };
@@ -84,7 +83,7 @@ fn step(passes: &mut Passes<'_>) {
     let [stiffness, damping_ratio, push_speed, height, share] = [0, 1, 2, 3, 4].map(|i| passes.parameter(i));
     let omega = TAU * stiffness / h;
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
-    let (soft, rigid) = (Rule::Soft(Sweep(springs)), Rigid::rule(h));
+    let rigid = Rigid::new(h);
     let (dt, slowest) = (h * budget.substeps as f32, FRAC_PI_2 / height);
     let time = 1.0 / (2.0 * damping_ratio * omega * slowest * slowest);
     passes.preload(springs, share, dt / (dt + time));
@@ -96,12 +95,12 @@ fn step(passes: &mut Passes<'_>) {
             passes.integrate_and_warm_start();
         }
         for _ in 0..budget.velocity_iterations {
-            passes.sweep(Phase::Solve, &soft);
+            passes.block_sweep_normal_first(Phase::Solve, springs);
             passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {
-            passes.sweep(Phase::Relax, &rigid);
+            passes.block_sweep_normal_first(Phase::Relax, rigid);
         }
         passes.end_substep(substep);
     }

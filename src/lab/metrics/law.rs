@@ -93,8 +93,11 @@ impl PointStep {
     pub fn velocities(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> [f64; 2] {
         let [end, slip] = self.relative_velocity(&a.after, &b.after);
         let [approach, _] = self.relative_velocity(&a.before, &b.before);
-        let bounces =
-            self.restitution > 0.0 && self.impulse[0] > 0.0 && approach < -(RESTITUTION_THRESHOLD as f64);
+        // A slow approach may bounce, or end at rest: it is held to what it did.
+        let has_left = approach < 0.0 && end > -0.5 * self.restitution * approach;
+        let bounces = self.restitution > 0.0
+            && self.impulse[0] > 0.0
+            && (has_left || approach < -(RESTITUTION_THRESHOLD as f64));
         let un = if bounces {
             end + self.restitution * approach
         } else if self.gap > 0.0 {

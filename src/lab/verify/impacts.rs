@@ -1,4 +1,4 @@
-//! A5–A7, A17 and A18: bounces.
+//! A5–A7 and A17–A19: bounces.
 
 use super::lab::*;
 use super::{Failure, Finding, Lab};
@@ -97,9 +97,116 @@ pub(super) fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(gain, 0.0, 1e-5))
 }
 
+/// A body of 1 kg that touches the ground with one point, `arm` from its centre (m), and comes in at
+/// `velocity` (m/s).
+struct Rough {
+    shape: SceneShape,
+    angle: f64,
+    arm: [f64; 2],
+    inertia: f64,
+    velocity: [f64; 2],
+    spin: f64,
+}
+
+/// Velocity and spin after an impact under Newton's law with `e` and Coulomb's friction with `mu` on the
+/// impulses of all of it, by hand: v_n⁺ = −e v_n, and along t the impulse that stops the point, or ±µ N.
+fn after_impact(rough: &Rough, e: f64, mu: f64) -> [f64; 3] {
+    let ([x, y], [vx, vy], w) = (rough.arm, rough.velocity, rough.spin);
+    // The ground's normal is (0, 1); its tangent is taken as (1, 0).
+    let (vn, vt) = (vy + w * x, vx - w * y);
+    let (k_nn, k_tt) = (1.0 + x * x / rough.inertia, 1.0 + y * y / rough.inertia);
+    let k_nt = -x * y / rough.inertia;
+    let rise = -(1.0 + e) * vn;
+    let determinant = k_nn * k_tt - k_nt * k_nt;
+    let mut normal = (k_tt * rise + k_nt * vt) / determinant;
+    let mut tangent = (-k_nn * vt - k_nt * rise) / determinant;
+    if tangent.abs() > mu * normal {
+        let slope = mu * tangent.signum();
+        normal = rise / (k_nn + slope * k_nt);
+        tangent = slope * normal;
+    }
+    [vx + tangent, vy + normal, w + (x * normal - y * tangent) / rough.inertia]
+}
+
+/// The worst difference from [`after_impact`] over restitutions and frictions that slide and stick (m/s, and
+/// m/s at the arm of the spin).
+fn rough_impact(lab: &Lab, rough: impl Fn() -> Rough) -> Result<Finding, Failure> {
+    let (mut worst, mut of) = (0.0, String::new());
+    for e in [0.2, 0.5, 0.9] {
+        for mu in [0.05, 0.2, 0.5, 1.0] {
+            let body = rough();
+            let truth = after_impact(&body, e, mu);
+            let arm = body.arm[0].hypot(body.arm[1]);
+            let shape = body.shape.clone().friction(mu).restitution(e);
+            let mut falling = SceneBody::dynamic([-body.arm[0], -body.arm[1]], shape);
+            falling = falling.moving(body.velocity, body.spin);
+            falling.angle = body.angle;
+            let scene = Scene::new("rough", vec![ground(50.0, mu), falling]).weightless();
+            let dt = scene.dt;
+            let world = lab.run(scene, 3.0 * dt, |_| ())?;
+            let ([vx, vy], w) = (velocity(&world, 1), spin(&world, 1));
+            let found = [vx - truth[0], vy - truth[1], arm * (w - truth[2])];
+            let error = largest(found.map(f64::abs));
+            if !(error <= worst) {
+                worst = error;
+                of = format!("worst with e = {e}, µ = {mu}");
+            }
+        }
+    }
+    Ok(Finding::new(worst, 0.0, 1e-4).note(of))
+}
+
+/// A19. A disc, at 3 m/s along the ground and with a spin that is not that of rolling.
+pub(super) fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
+    let radius = 0.5;
+    let density = 1.0 / (std::f64::consts::PI * radius * radius);
+    rough_impact(lab, || Rough {
+        shape: SceneShape::disc(radius).density(density),
+        angle: 0.0,
+        arm: [0.0, -radius],
+        inertia: 0.5 * radius * radius,
+        velocity: [3.0, -4.0],
+        spin: 2.0,
+    })
+}
+
+/// A19. A unit square on a corner, 20° to the left of below its centre.
+pub(super) fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
+    let angle = 25f64.to_radians();
+    // The corner (−½, −½) turned by the angle.
+    let (sin, cos) = angle.sin_cos();
+    let arm = [-0.5 * cos + 0.5 * sin, -0.5 * sin - 0.5 * cos];
+    rough_impact(lab, || Rough {
+        shape: SceneShape::rectangle(0.5, 0.5).density(1.0),
+        angle,
+        arm,
+        inertia: 1.0 / 6.0,
+        velocity: [1.0, -4.0],
+        spin: 0.5,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_disc_that_sticks_rolls_away_at_two_thirds_and_one_that_slides_loses_mu_of_the_normal() {
+        let disc = |velocity| Rough {
+            shape: smooth_disc(0.5),
+            angle: 0.0,
+            arm: [0.0, -0.5],
+            inertia: 0.125,
+            velocity,
+            spin: 0.0,
+        };
+        let near = |found: [f64; 3], truth: [f64; 3]| {
+            assert!(found.iter().zip(truth).all(|(f, t)| (f - t).abs() < 1e-14), "{found:?} {truth:?}");
+        };
+        near(after_impact(&disc([3.0, -4.0]), 0.5, 1.0), [2.0, 2.0, -4.0]);
+        // N = 1.5 · 4 = 6 and T = −0.6, which with r × t = ½ turns by −0.3/0.125.
+        near(after_impact(&disc([3.0, -4.0]), 0.5, 0.1), [2.4, 2.0, -2.4]);
+    }
 
     #[test]
     fn each_law_is_at_no_distance_from_itself() {
