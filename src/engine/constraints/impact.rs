@@ -219,7 +219,7 @@ fn solve<L: Lanes>(
 ) {
     let moves = segment.opposite == OppositeKind::Dynamic;
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let (zero, one) = (L::zero(), L::splat(1.0));
     let mut most = zero;
     for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
@@ -277,6 +277,10 @@ fn solve<L: Lanes>(
                     slides.select_positive(slope * edge_n, stick[1]),
                 ];
             }
+            // What bounces leaves by itself: it is not pushed out as well.
+            let at_surface = record[layout.at(p, layout.separation)];
+            record[layout.at(p, layout.separation)] =
+                target.select_positive(at_surface.max(zero), at_surface);
             let new = new.map(|impulse| target.select_positive(impulse, zero));
             (side[at + 1], side[at + 2]) = (new[0], new[1]);
             let delta = [new[0] - old_n, new[1] - old_t];
