@@ -242,7 +242,9 @@ fn solve<L: Lanes>(
             let mass = record[layout.at(p, layout.normal_mass)];
             let k_nn = one / mass.select_positive(mass, one);
             let wanted = target - vn;
-            let mut new = [mass.mul_add(wanted, old_n).max(zero), zero];
+            // Without friction, whether the scene has any or not.
+            let smooth = [mass.mul_add(wanted, old_n).max(zero), zero];
+            let mut new = smooth;
             if layout.has_friction {
                 let vt = {
                     let x = b[0] - a[0];
@@ -272,10 +274,11 @@ fn solve<L: Lanes>(
                 let edge_n = along.select_positive(edge_n, (want_n * mass).max(zero));
                 let slides = mu.neg_mul_add(stick[0], size);
                 let slides = stick[0].select_positive(slides, one);
-                new = [
+                let rough = [
                     slides.select_positive(edge_n, stick[0]),
                     slides.select_positive(slope * edge_n, stick[1]),
                 ];
+                new = std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]));
             }
             // What bounces leaves by itself: it is not pushed out as well.
             let at_surface = record[layout.at(p, layout.separation)];

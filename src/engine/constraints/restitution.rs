@@ -1,4 +1,5 @@
-//! Bouncing: one pass at the end of a step, and its own side records.
+//! Bouncing: one pass at the end of a step, and its own side records. [`super::impact`] has let bounce before
+//! the step what was seen to come in; here is what only others pushed together.
 //!
 //! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the
 //! speed is known at its start, some way s₀ above (or below) the surface, and the bounce is

@@ -3,15 +3,18 @@
 //!
 //! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
 //!
-//! **Departures.** Other than in [`super::soft_step`], springs are as stiff as the substep rate allows, a fixed
-//! part of it, and have a preload per contact that follows the load in `settling_time`; see
-//! [`crate::engine::constraints::Passes::preload`].
+//! **Departures.** Other than in [`super::soft_step`], springs are as stiff as the substep rate allows, a
+//! fixed part of it; each contact has a preload that follows its load
+//! ([`crate::engine::constraints::Passes::preload`]); and the two normal rows of a contact are solved
+//! together, friction rows after them.
 //!
 //! **Cost.** Per step 1 warm start and 1 pass that shortens springs; per substep 2 body passes,
-//! `velocity_iterations` soft sweeps and `relax_iterations` rigid ones.
+//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones.
 //!
 //! **Fails when** a column is so tall that it buckles on its springs: preload has no moment, so that
-//! rocking is held by the springs alone. N unit boxes need about 30 Hz (N/14)^1.5.
+//! rocking is held by the springs alone. N unit boxes need 30 Hz (N/14)^1.5, which the standard budget has
+//! for 41. And where there is no room for the bodies: springs push no faster than `push_speed`, and
+//! beyond 7 cm of overlap not harder.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

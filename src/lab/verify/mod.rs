@@ -25,12 +25,12 @@
 //! | overlap is pushed apart no faster than 3 m/s | the cap |
 //! | the distance from the origin and the length of a step do not matter | positions keep what their sums round away |
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
+//! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step |
 //! | discs roll without lifting off | their contact points do not turn with them |
 //!
 //! It does not promise:
 //!
-//! - Bounces among several bodies at once, which one pass per step cannot settle; one solution where
-//!   the sweeps of a step have not converged.
+//! - One solution where the sweeps of a step have not converged.
 //! - Heavy loads on light bodies: the depth F/(m ω²) itself exceeds the body.
 //! - **High stacks.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
 //!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
