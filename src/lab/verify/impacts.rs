@@ -147,7 +147,7 @@ fn rough_impact(lab: &Lab, rough: impl Fn() -> Rough) -> Result<Finding, Failure
             let ([vx, vy], w) = (velocity(&world, 1), spin(&world, 1));
             let found = [vx - truth[0], vy - truth[1], arm * (w - truth[2])];
             let error = largest(found.map(f64::abs));
-            if !(error <= worst) {
+            if error > worst || error.is_nan() {
                 worst = error;
                 of = format!("worst with e = {e}, µ = {mu}");
             }
