@@ -33,6 +33,7 @@ use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{CATALOG, SCHEMA};
 use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
 use output::{note, print, print_json};
 use serde_json::{Value, json};
@@ -50,7 +51,8 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            note(&format!("error: {}\n", one_line(&error.to_string())));
+            let message = empty(&error).unwrap_or_else(|| error.to_string());
+            note(&format!("error: {}\n", one_line(&message)));
             return ExitCode::from(2);
         }
     };
@@ -88,6 +90,25 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Columns(args)) => columns(&args),
         Some(Command::Completions(args)) => completions(&args),
     }
+}
+
+/// What to say about an option without a value: clap has several messages, and one of them is
+/// about the value ''.
+fn empty(error: &clap::Error) -> Option<String> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let argument = text(ContextKind::InvalidArg).filter(|_| text(ContextKind::InvalidValue) == Some(""))?;
+    let (name, value) = argument.split_once(' ').unwrap_or((argument, ""));
+    let given: Vec<_> = std::env::args().collect();
+    let all =
+        given.contains(&format!("{name}=")) || given.windows(2).any(|w| w[0] == name && w[1].is_empty());
+    Some(match (value.contains('…'), all) {
+        (true, true) => format!("{name}: the list is empty"),
+        (true, false) => format!("{name}: a value between the commas is empty"),
+        (false, _) => format!("{name}: the value is empty"),
+    })
 }
 
 /// A message without its own prefix and without advice on usage, on one line.

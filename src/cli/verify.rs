@@ -9,6 +9,7 @@ use crate::lab::verify::{
     self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Required, Sweep, SweepRow,
 };
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -32,7 +33,7 @@ Examples:
   simpulse verify --list")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "ID,…")]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new())]
     pub cases: Vec<String>,
     /// Solvers
     #[command(flatten)]

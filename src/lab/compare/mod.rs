@@ -16,6 +16,7 @@ use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
+use crate::lab::study::sweep::Swept;
 use serde::Serialize;
 
 /// Errors below this share of their tolerance are as good as none (1).
@@ -193,8 +194,8 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
     }
 }
 
-fn key(r: &Record) -> (&str, &str, Budget, Order, usize) {
-    (&r.scene, r.solver, r.budget, r.order, r.lanes)
+fn key(r: &Record) -> (&str, &str, Budget, Option<Swept>, Order, usize) {
+    (&r.scene, r.solver, r.budget, r.swept, r.order, r.lanes)
 }
 
 fn pair(one: &Record, other: &Record) -> Pair {
@@ -220,7 +221,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         solver: one.solver,
         order: one.order,
         lanes: one.lanes,
-        budget: one.budget_text.clone(),
+        budget: one.budget_text.clone() + &one.swept.map_or(String::new(), |s| format!(" {s}")),
         marks: [one.mark(), other.mark()],
         errors: errors.collect(),
         time: time(),

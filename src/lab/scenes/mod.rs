@@ -105,6 +105,9 @@ pub struct Entry {
     pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
 
+/// What a size counts where the scene is one mass on another.
+pub const MASS_RATIO: &str = "times as heavy";
+
 /// A whole number that a scene is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {

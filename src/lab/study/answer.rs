@@ -100,7 +100,7 @@ pub fn order(a: &Record, b: &Record) -> Ordering {
 
 /// Whether two records differ in their lane width at most.
 pub fn same(a: &Record, b: &Record) -> bool {
-    (a.solver, a.budget, a.order) == (b.solver, b.budget, b.order)
+    (a.solver, a.budget, a.order, a.swept) == (b.solver, b.budget, b.order, b.swept)
 }
 
 fn time(record: &Record) -> f64 {

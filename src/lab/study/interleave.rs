@@ -149,10 +149,10 @@ pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize
     }
 }
 
-/// Settings of one scene, timed in turns.
+/// Settings, timed in turns.
 pub struct Race<'a> {
-    scene: &'a Scene,
-    settings: Vec<Settings>,
+    /// Each with its scene: one for all, or variants of one.
+    settings: Vec<(&'a Scene, Settings)>,
     blocks: Vec<Range<u32>>,
     entrants: Vec<Entrant>,
     random: Pcg64,
@@ -183,9 +183,9 @@ pub fn whole_blocks(steps: u32) -> u32 {
 
 impl<'a> Race<'a> {
     /// Of the first `steps` steps; `seed` decides who begins.
-    pub fn new(scene: &'a Scene, settings: Vec<Settings>, steps: u32, seed: u64) -> Self {
+    pub fn new(settings: Vec<(&'a Scene, Settings)>, steps: u32, seed: u64) -> Self {
         let entrants = vec![Entrant::default(); settings.len()];
-        Race { scene, settings, blocks: blocks(steps), entrants, random: Pcg64::seed_from_u64(seed) }
+        Race { settings, blocks: blocks(steps), entrants, random: Pcg64::seed_from_u64(seed) }
     }
 
     /// Goes through the steps so many times with those settings that `enter`; a world that diverges
@@ -197,7 +197,8 @@ impl<'a> Race<'a> {
             names.shuffle(&mut self.random);
             let mut worlds: Vec<World> = Vec::new();
             for &i in &names {
-                worlds.push(self.scene.build(self.settings[i].clone())?);
+                let (scene, settings) = &self.settings[i];
+                worlds.push(scene.build(settings.clone())?);
             }
             for entrant in &mut self.entrants {
                 entrant.blocks.push(vec![f64::NAN; self.blocks.len()]);
@@ -227,7 +228,8 @@ pub fn race(
     repeats: u32,
     seed: u64,
 ) -> Result<Vec<Result<Sample, Divergence>>, Error> {
-    let mut race = Race::new(scene, settings.to_vec(), steps, seed);
+    let settings: Vec<_> = settings.iter().map(|s| (scene, s.clone())).collect();
+    let mut race = Race::new(settings.clone(), steps, seed);
     let all: Vec<usize> = (0..settings.len()).collect();
     race.run(repeats, &all)?;
     Ok(all.into_iter().map(|i| race.sample(i)).collect())

@@ -3,6 +3,7 @@
 use super::curve::ErrorAxis;
 use super::interleave::Sample;
 use super::pareto::{self, Point};
+use super::sweep::Swept;
 use crate::engine::params::Budget;
 use crate::engine::world::{Divergence, Order};
 use crate::lab::interned::{self, Name};
@@ -31,6 +32,9 @@ pub struct Record {
     pub budget: Budget,
     /// The same, for tables.
     pub budget_text: String,
+    /// What a sweep set; none without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swept: Option<Swept>,
     /// Times and counts; none if the run failed.
     pub lap: Option<Sample>,
     /// Times faster than one coloured lane; none without that run.
@@ -144,10 +148,10 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Marks, scene by scene, the settings on each front, of those that hold. A setting is a solver, a budget and
+/// Marks, scene by scene and value by value of a sweep, the settings on each front, of those that hold. A setting is a solver, a budget and
 /// an order, at its fastest width.
 pub fn mark_fronts(records: &mut [Record]) {
-    for group in records.chunk_by_mut(|a, b| a.scene == b.scene) {
+    for group in records.chunk_by_mut(|a, b| a.scene == b.scene && a.swept == b.swept) {
         let fastest: Vec<usize> =
             (0..group.len()).filter(|&i| group[i].holds() && is_fastest(group, i)).collect();
         let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
@@ -204,6 +208,7 @@ pub(crate) mod tests {
             lanes,
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
             budget_text: format!("{substeps} sub"),
+            swept: None,
             lap: Some(lap),
             speed_up: None,
             errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),

@@ -94,7 +94,7 @@ fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Savin
     }
     let mut settings = vec![base.clone()];
     settings.extend(forced.iter().map(|&(_, extra_features)| Settings { extra_features, ..base.clone() }));
-    let samples = race(scene, &settings, timing_steps(plan, scene), plan.repeats, plan.seed)?;
+    let samples = race(scene, &settings, timing_steps(plan, [scene]), plan.repeats, plan.seed)?;
     let Some(Ok(own)) = samples.first() else { return Ok(Vec::new()) };
     if own.load.contacts < FEWEST_CONTACTS {
         return Ok(Vec::new());

@@ -13,6 +13,7 @@ mod precision;
 mod scale;
 mod sections;
 mod setting;
+mod sweep;
 mod words;
 
 use crate::lab::error::Error;
@@ -23,10 +24,12 @@ use crate::lab::recording::page::{MOST, Panel, SCRIPT, STYLE, fragment};
 use crate::lab::recording::read::read_file;
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
+use crate::lab::report::sweep::is_sweep;
 use crate::lab::study::curve::solvers_of;
 use matrix::Matrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+pub use sweep::svg as sweep_svg;
 
 /// Name of the page in the folder of a study.
 pub const NAME: &str = "report.html";
@@ -108,6 +111,19 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         body += &content;
         body += "</section>\n";
     };
+    if is_sweep(records) {
+        let swept = records.iter().find_map(|r| r.swept).map_or("", |s| s.name);
+        let lead = format!(
+            "Time and errors against {}, a curve per solver; a mark is a setting at its fastest lane width, hollow \
+             ones are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the \
+             scene’s tolerance. What falls, slides, tunnels or blows up is at the upper edge and breaks the curve. \
+             All settings of a scene were timed in turns.",
+            escaped(swept)
+        );
+        section("sweep", "Sweep", &lead, sweep::section(records));
+        section("machine", "Machine, settings and command", "", machine(study));
+        return text + &body + "</body>\n</html>\n";
+    }
     section("answer", "The answer", "", words::answer(records, study.settings["steps"].as_u64()));
     section(
         "overview",
@@ -246,6 +262,10 @@ fn command(settings: &Value) -> String {
         a.iter().map(|o| format!("{}={}", plain(&o["name"]), plain(&o["value"]))).collect()
     });
     option("set", set);
+    let sweep = &settings["sweep"];
+    if sweep.is_object() {
+        option("sweep", vec![format!("{}={}", plain(&sweep["name"]), list(&sweep["values"]).join(","))]);
+    }
     let units = [("penetration", "m"), ("residual", ""), ("truth", "")];
     let given = |(name, unit): &(&str, &str)| {
         settings["tolerance"][name].as_f64().map(|v| format!("{name}={v}{unit}"))

@@ -1,6 +1,6 @@
 //! Work-precision plots: time against three errors, scene by scene, with every number in a table.
 
-use super::panel::{Frame, Labels, Panel};
+use super::panel::{Band, Frame, Labels, Panel};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest};
 use crate::lab::picture::svg::escaped;
@@ -10,7 +10,7 @@ use crate::lab::study::curve::ErrorAxis as Axis;
 use crate::lab::units::{digits, lanes, si};
 
 /// Name and unit of an error on a scene.
-fn name(scene: &[Record], axis: Axis) -> Option<(String, String)> {
+pub fn name(scene: &[Record], axis: Axis) -> Option<(String, String)> {
     match axis {
         Axis::Penetration => Some(("deepest penetration".into(), "m".into())),
         Axis::Law => Some(("contact-law residual (body weights, rms)".into(), String::new())),
@@ -44,7 +44,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     let tolerance = settings.first().and_then(|e| e.tolerance(axis));
     let xs = held().map(|e| error(e)).chain(tolerance);
     let ys = settings.iter().filter_map(|e| e.time());
-    let frame = Frame { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: true };
+    let frame = Frame { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: Band::Right };
     let mut panel = Panel::new(&frame, Scale::log(xs, unit), Scale::log(ys, "s"));
     if let Some(tolerance) = tolerance {
         panel.shade_left(tolerance);

@@ -1,6 +1,6 @@
 //! Profiles, lanes, phases and iterations.
 
-use super::panel::{Frame, Panel};
+use super::panel::{Band, Frame, Panel};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes, standard};
 use crate::engine::clock::Phase;
@@ -19,7 +19,7 @@ pub fn profiles(records: &[Record]) -> String {
         let title = format!("{} within tolerance", profile.axis.name());
         let share = format!("share of {} scenes", profile.scenes);
         let names = ["time, in times that of the fastest", share.as_str()];
-        let frame = Frame { size: [420.0, 310.0], title: &title, names, band: false };
+        let frame = Frame { size: [420.0, 310.0], title: &title, names, band: Band::None };
         let mut x = Scale::log([1.0, most], "×");
         x.low = 0.95;
         x.ticks.retain(|t| t.0 >= 1.0);
@@ -80,7 +80,7 @@ pub fn lanes(records: &[Record]) -> String {
         };
         let title = format!("{} · {colors}", scene[0].scene);
         let panel = |size, title: &str, names, y| {
-            Panel::new(&Frame { size, title, names, band: false }, Scale::steps(&widths), y)
+            Panel::new(&Frame { size, title, names, band: Band::None }, Scale::steps(&widths), y)
         };
         let mut speed =
             panel([300.0, 250.0], &title, ["lanes", "speed-up over 1 lane"], Scale::linear(most, "×"));
@@ -204,7 +204,7 @@ pub fn iterations(records: &[Record]) -> String {
                 size: [300.0, 230.0],
                 title: &scene[0].scene,
                 names: ["sweeps of a step", name],
-                band: false,
+                band: Band::None,
             };
             let x = Scale::log(held.iter().map(|h| h.1), "");
             let mut panel = Panel::new(&frame, x, Scale::log(held.iter().map(|h| h.2), unit));
