@@ -205,14 +205,16 @@ impl Shard {
 /// Runs the command.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let mut plan = args.plan()?;
-    if let Some(sweep) = &plan.sweep {
-        note(&keep_concerned(sweep, &mut plan.solvers));
-    }
+    let without = match plan.sweep.clone() {
+        Some(sweep) => keep_concerned(&sweep, &mut plan.solvers),
+        None => String::new(),
+    };
     let mut elsewhere = Vec::new();
     if let Some(shard) = args.shard {
         (plan.scenes, elsewhere) = shard.split(plan.scenes)?;
     }
     plan.check()?;
+    note(&without);
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     html::write_recordings(&args.out, &[])?;

@@ -45,12 +45,16 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// So many of something: `1 scene`, `2 scenes`.
+pub fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// A lane width in words: `1 lane`, `8 lanes`, `16 lanes, emulated` where the build has no
 /// instructions that wide.
-pub fn lanes(count: usize) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    let emulated = if is_emulated(count) { ", emulated" } else { "" };
-    format!("{count} lane{plural}{emulated}")
+pub fn lanes(lanes: usize) -> String {
+    let emulated = if is_emulated(lanes) { ", emulated" } else { "" };
+    count(lanes, "lane") + emulated
 }
 
 /// Whether lanes of this width are wider than what this build has instructions for.

@@ -2,7 +2,7 @@
 
 use super::environment::Environment;
 use super::table::{finish, table};
-use super::units::{digits, ratio, si};
+use super::units::{count, digits, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
@@ -25,10 +25,10 @@ pub fn is_sweep(records: &[Record]) -> bool {
 pub fn text(records: &[Record], environment: &Environment) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
     let mut text = format!(
-        "Sweep of {}: {} scenes, {} solvers, {} settings\n{}; {}: {} lanes per instruction\n\n{LEGEND}",
+        "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\n\n{LEGEND}",
         swept.name,
-        records.chunk_by(|a, b| a.scene == b.scene).count(),
-        solvers_of(records).len(),
+        count(records.chunk_by(|a, b| a.scene == b.scene).count(), "scene"),
+        count(solvers_of(records).len(), "solver"),
         records.len(),
         environment.cpu,
         environment.instructions(),
@@ -78,9 +78,6 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
         own.into_iter().for_each(|record| {
             rows.add_row(row(record));
         });
-    }
-    if let Some(last) = rows.column_mut(9) {
-        last.set_cell_alignment(comfy_table::CellAlignment::Left);
     }
     text + &finish(rows, 1)
 }

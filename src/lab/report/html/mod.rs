@@ -26,6 +26,7 @@ use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
 use crate::lab::report::sweep::is_sweep;
 use crate::lab::study::curve::solvers_of;
+use crate::lab::units::count;
 use matrix::Matrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -88,10 +89,10 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
          </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{STYLE}</style>\n</head>\n<body>\n\
          <h1>Which contact solver, how fast, and how wrong?</h1>\n\
-         <p class=\"soft\">{} scenes, {} solvers, {} settings · {}, {} lanes native · simpulse {}</p>\n",
+         <p class=\"soft\">{}, {}, {} settings · {}, {} lanes native · simpulse {}</p>\n",
         include_str!("page.css"),
-        scenes.len(),
-        solvers.len(),
+        count(scenes.len(), "scene"),
+        count(solvers.len(), "solver"),
         records.len(),
         escaped(&e.cpu),
         e.native_lanes,
@@ -264,7 +265,9 @@ fn command(settings: &Value) -> String {
     option("set", set);
     let sweep = &settings["sweep"];
     if sweep.is_object() {
-        option("sweep", vec![format!("{}={}", plain(&sweep["name"]), list(&sweep["values"]).join(","))]);
+        let values = sweep["values"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+        let values: Vec<String> = values.map(|v| v.to_string()).collect();
+        option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
     }
     let units = [("penetration", "m"), ("residual", ""), ("truth", "")];
     let given = |(name, unit): &(&str, &str)| {

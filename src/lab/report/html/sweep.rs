@@ -48,19 +48,20 @@ fn values(scene: &[Record]) -> Vec<f64> {
 
 /// The plots of one scene.
 fn panels(scene: &[Record], swept: Swept) -> Vec<String> {
-    let mut made = vec![panel(scene, swept, Shown::Time, "", "s")];
+    let mut made = vec![panel(scene, swept, Shown::Time, "s")];
     for axis in Axis::ALL {
-        if let Some((name, unit)) = name(scene, axis) {
-            made.push(panel(scene, swept, Shown::Error(axis), &name, &unit));
+        if let Some((_, unit)) = name(scene, axis) {
+            made.push(panel(scene, swept, Shown::Error(axis), &unit));
         }
     }
     made
 }
 
-fn panel(scene: &[Record], swept: Swept, what: Shown, name: &str, unit: &str) -> String {
+fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
     let settings = fastest(scene);
+    // What the reference value is of stands over the plots.
     let name = match what {
-        Shown::Error(_) => name,
+        Shown::Error(axis) => axis.name(),
         Shown::Time if is_dt(&scene[0]) => "time per second of the scene",
         Shown::Time => "time of a step",
     };
@@ -81,7 +82,12 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, name: &str, unit: &str) ->
         panel.shade_below(tolerance);
     }
     let at = |r: &Record| r.swept.map_or(0.0, |s| s.value);
-    for solver in solvers_of(scene) {
+    // Solvers that fail at the same value stand side by side, three in a row.
+    let count = solvers_of(scene).len();
+    let rows = count.div_ceil(3).saturating_sub(1).max(1);
+    let grid: Vec<[f64; 2]> =
+        (0..count).map(|i| [9.0 * ((i % 3) as f64 - 1.0), (i / 3) as f64 / rows as f64]).collect();
+    for (i, solver) in solvers_of(scene).into_iter().enumerate() {
         for natural in [true, false] {
             let mut own: Vec<&&Record> =
                 settings.iter().filter(|r| r.solver == solver && r.is_natural() == natural).collect();
@@ -115,7 +121,8 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, name: &str, unit: &str) ->
                     (broke, _) => {
                         let title =
                             format!("{words}: {}", broke.unwrap_or_else(|| "missed its reference".into()));
-                        let place = panel.above(at(record), Style::of(solver).marker as usize as f64 / 7.0);
+                        let [x, y] = panel.above(at(record), grid[i][1]);
+                        let place = [x + grid[i][0], y];
                         panel.marker(place, 3.2, solver, natural, false, &title);
                     }
                 }
@@ -131,21 +138,29 @@ pub fn section(records: &[Record]) -> String {
     let mut text = legend(&solvers_of(records));
     for scene in scenes(records) {
         text += &format!(
-            "<h3>{} <span class=\"soft\">{} bodies</span></h3>\n<div class=\"panels sweep\">\n{}</div>\n",
+            "<h3>{} <span class=\"soft\">{} bodies{}</span></h3>\n<div class=\"panels sweep\">\n{}</div>\n",
             escaped(&scene[0].scene),
             scene[0].bodies,
+            escaped(&reference(scene)),
             panels(scene, swept).concat()
         );
     }
-    text + &format!("<pre class=\"sweep-table\">{}</pre>\n", escaped(&sweep::tables(records)))
+    let table = sweep::tables(records);
+    let lines: Vec<String> = table.lines().map(|line| escaped(line).to_string()).collect();
+    text + &format!("<pre class=\"sweep-table\">{}</pre>\n", lines.join("\n"))
+}
+
+/// What the reference value of a scene is of; nothing where none is known.
+fn reference(scene: &[Record]) -> String {
+    scene.iter().find_map(|r| r.truth).map_or(String::new(), |t| format!("; reference value: {}", t.quantity))
 }
 
 /// `sweep.svg`: the same plots in a picture of their own, a row per scene.
 pub fn svg(records: &[Record]) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
     const HEAD: f64 = 30.0;
-    let rows: Vec<(&str, Vec<String>)> =
-        scenes(records).into_iter().map(|scene| (scene[0].scene.as_str(), panels(scene, swept))).collect();
+    let rows: Vec<(String, Vec<String>)> =
+        scenes(records).into_iter().map(|s| (s[0].scene.clone() + &reference(s), panels(s, swept))).collect();
     let columns = rows.iter().map(|r| r.1.len()).max().unwrap_or(1);
     let solvers = solvers_of(records);
     let [width, height] = SIZE;
