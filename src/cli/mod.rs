@@ -30,8 +30,9 @@ use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{CATALOG, SCHEMA};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
+use crate::lab::units::si;
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
@@ -191,38 +192,47 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
         Some(name) if !args.schema => name,
         _ => return Ok(SCHEMA.to_string()),
     };
-    let loaded = open_scene(name, args.seed, None, None)?;
-    let scene = loaded.scene;
-    if args.json {
-        return Ok(scene.to_json());
+    let scene = match args.json || is_path(name) {
+        true => open_scene(name, args.seed, None, None)?,
+        false => return Ok(described(&scenes::describe(name, args.seed)?)),
+    };
+    match args.json {
+        true => Ok(scene.scene.to_json()),
+        false => Ok(described(&Description::of(&scene))),
     }
+}
+
+/// A scene in words.
+fn described(scene: &Description) -> String {
     let [gx, gy] = scene.gravity;
     let mut text = format!(
-        "{}: {} bodies, {} steps of {} s, gravity ({gx}, {gy})\n",
+        "{}: {}, {} steps of {}, gravity ({gx}, {gy}) m/s²\n",
         scene.name,
-        scene.bodies.len(),
+        if scene.bodies == 1 { "1 body".into() } else { format!("{} bodies", scene.bodies) },
         scene.steps,
-        scene.dt
+        si(scene.dt, "s")
     );
-    if let Some(truth) = &loaded.truth {
-        text += &format!("reference value: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
+    if let Some((quantity, expected, unit)) = scene.reference {
+        text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
     }
     text += "holds if nothing blows up and no body passes through a static one";
-    for demand in loaded.demands {
+    for demand in scene.demands {
         text += &format!("; {}", demand.meaning());
     }
     text += "\ntolerances\n";
-    let (own, unit) = (loaded.tolerances, loaded.truth.as_ref().map_or("", |t| t.unit));
+    let own = scene.tolerances;
+    let unit = scene.reference.map_or("", |(_, _, unit)| unit);
     let lines = [
         ("penetration", Some((own.penetration, "m"))),
-        ("residual", Some((own.residual, "body weights"))),
+        ("residual", Some((own.residual, ""))),
         ("reference", own.truth.map(|t| (t, unit))),
     ];
     for (name, line) in lines {
         let Some((Tolerance { value, reason }, unit)) = line else { continue };
-        text += &format!("  {name:<12} {:>10.4} {unit}: {reason}\n", value);
+        let value = if unit.is_empty() { format!("{value} body weights") } else { si(value, unit) };
+        text += &format!("  {name:<12} {value}: {reason}\n");
     }
-    Ok(text)
+    text
 }
 
 /// Runs `steps` steps; the errors of the last `observed` of them, none without steps.

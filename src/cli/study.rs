@@ -8,6 +8,7 @@ use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
+use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::Override;
 use crate::lab::report::study_file::StudyFile;
@@ -215,6 +216,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     }
     plan.check()?;
     note(&without);
+    note(&study::cost::estimate(&plan)?.note("study", free_memory())?);
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     html::write_recordings(&args.out, &[])?;

@@ -8,6 +8,7 @@
 pub mod answer;
 pub mod budget;
 pub mod compare;
+pub mod cost;
 pub mod curve;
 pub mod interleave;
 pub mod pareto;
