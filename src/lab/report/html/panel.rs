@@ -2,6 +2,7 @@
 
 use super::scale::Scale;
 use crate::lab::picture::svg::{escaped, points, px};
+use crate::lab::report::axes::wrapped;
 use crate::lab::report::style::Style;
 
 /// Width of the band for what has no place on the axis (pixels).
@@ -80,9 +81,16 @@ impl Panel {
             px(left),
             px(top)
         );
+        // Where labels would touch, or reach into that of the band, only the first stands.
+        let mut free = f64::NEG_INFINITY;
+        let end = if frame.band == Band::Right { right + 0.5 * BAND - 14.0 } else { width };
         for (v, label) in &x.ticks {
-            text +=
-                &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", across(*v), px(bottom + 15.0));
+            let (at, half) = (left + x.share(*v) * (right - left), 3.1 * label.chars().count() as f64);
+            if at - half > free && at + half < end {
+                free = at + half + 3.0;
+                text +=
+                    &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", px(at), px(bottom + 15.0));
+            }
         }
         for (v, label) in &y.ticks {
             text += &format!(
@@ -92,11 +100,15 @@ impl Panel {
             );
         }
         let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
+        // A character is about half as wide as its line is high.
+        let lines = wrapped(frame.names[0], ((right - left) / 5.6) as usize);
+        let first = height - 10.0 - 6.5 * lines.len().saturating_sub(1) as f64;
+        for (i, line) in lines.iter().enumerate() {
+            let y = px(first + 12.5 * i as f64);
+            text += &format!("\n<text class=\"name\" x=\"{middle}\" y=\"{y}\">{}</text>", escaped(line));
+        }
         text += &format!(
-            "\n<text class=\"name\" x=\"{middle}\" y=\"{}\">{}</text>\n\
-             <text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
-            px(height - 10.0),
-            escaped(frame.names[0]),
+            "\n<text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
             escaped(frame.names[1])
         );
         match frame.band {
