@@ -135,7 +135,7 @@ impl Family {
     }
 }
 
-/// Most contacts that can be asked for.
+/// Most contacts of a size.
 const MAX_CONTACTS: f64 = 1e8;
 
 /// Ascending, each once.
@@ -164,7 +164,8 @@ const STEPS_PER_REPEAT: u32 = 4;
 
 /// What all sizes take together. What is too large for the memory is left out one by one, with a word.
 fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate {
-    let contacts: f64 = targets.iter().sum();
+    let possible = |target: &&f64| **target <= CONTACTS_PER_BODY * MAX_BODIES as f64;
+    let contacts: f64 = targets.iter().filter(possible).sum();
     let sweeps = sweeps(&settings.budget, settings.solver);
     let bodies = (contacts / CONTACTS_PER_BODY) as usize;
     let steps = args.settle.saturating_add(args.repeats.saturating_mul(STEPS_PER_REPEAT));

@@ -93,7 +93,7 @@ struct Found {
     broken: Option<Broken>,
 }
 
-/// Runs the scene that was asked for; writes its files once all of it has run.
+/// Runs the scene; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = settings(&args.setting, args.order, args.lanes)?;
     for (name, value) in [("steps", args.steps), ("every", args.every)] {

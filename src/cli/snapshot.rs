@@ -57,7 +57,7 @@ pub struct SnapshotArgs {
     pub seed: Option<u64>,
 }
 
-/// What a file name asks for.
+/// The format that a file name means.
 fn encoder(path: &Path) -> Result<fn(&Picture) -> Vec<u8>, Error> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("svg") => Ok(|picture| svg::svg(picture).into_bytes()),
