@@ -48,8 +48,11 @@ pub fn tables(records: &[Record]) -> String {
 /// All but the page are made before the first is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let records = &study.records;
-    let mut contents = vec![("study.csv", export::csv(records)?), ("study.json", study.to_json()?)];
-    contents.push(("tables.txt", tables(records).into_bytes()));
+    let mut contents = vec![
+        ("tables.txt", tables(records).into_bytes()),
+        ("study.csv", export::csv(records)?),
+        ("study.json", study.to_json()?),
+    ];
     if sweep::is_sweep(records) {
         contents.push((SWEEP, html::sweep_svg(records).into_bytes()));
     } else {

@@ -83,9 +83,9 @@ impl Panel {
         );
         // Where labels would touch, or reach into that of the band, only the first stands.
         let mut free = f64::NEG_INFINITY;
-        let end = if frame.band == Band::Right { right + 0.5 * BAND - 14.0 } else { width };
+        let end = if frame.band == Band::Right { right + 0.5 * BAND - 17.0 } else { width };
         for (v, label) in &x.ticks {
-            let (at, half) = (left + x.share(*v) * (right - left), 3.1 * label.chars().count() as f64);
+            let (at, half) = (left + x.share(*v) * (right - left), 3.5 * label.chars().count() as f64);
             if at - half > free && at + half < end {
                 free = at + half + 3.0;
                 text +=
