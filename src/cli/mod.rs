@@ -32,7 +32,7 @@ use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
 use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
-use crate::lab::units::si;
+use crate::lab::units::{bodies, si};
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
@@ -208,7 +208,7 @@ fn described(scene: &Description) -> String {
     let mut text = format!(
         "{}: {}, {} steps of {}, gravity ({gx}, {gy}) m/s²\n",
         scene.name,
-        if scene.bodies == 1 { "1 body".into() } else { format!("{} bodies", scene.bodies) },
+        bodies(scene.bodies),
         scene.steps,
         si(scene.dt, "s")
     );

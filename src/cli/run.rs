@@ -16,7 +16,7 @@ use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{digits, lanes, ratio, si};
+use crate::lab::report::units::{bodies, digits, lanes, ratio, si};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::study::cost::sweeps;
@@ -327,9 +327,9 @@ fn how(s: &Settings) -> String {
 fn head(world: &World, scene: &Scene) -> String {
     let s = &world.settings;
     format!(
-        "{}: {} bodies, {} steps of {} · {}, {}\n\n",
+        "{}: {}, {} steps of {} · {}, {}\n\n",
         scene.name,
-        scene.bodies.len(),
+        bodies(scene.bodies.len()),
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,

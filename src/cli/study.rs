@@ -215,11 +215,11 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         (plan.scenes, elsewhere) = shard.split(plan.scenes)?;
     }
     plan.check()?;
-    note(&without);
-    note(&study::cost::estimate(&plan)?.note("study", free_memory())?);
+    let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     html::write_recordings(&args.out, &[])?;
+    note(&(without + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
         let (plan, out, finished, elsewhere) =

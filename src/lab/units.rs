@@ -50,6 +50,11 @@ pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
+/// `1 body`, `2 bodies`.
+pub fn bodies(number: usize) -> String {
+    if number == 1 { "1 body".to_string() } else { format!("{number} bodies") }
+}
+
 /// A lane width in words: `1 lane`, `8 lanes`, `16 lanes, emulated` where the build has no
 /// instructions that wide.
 pub fn lanes(lanes: usize) -> String {

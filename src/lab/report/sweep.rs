@@ -2,7 +2,7 @@
 
 use super::environment::Environment;
 use super::table::{finish, table};
-use super::units::{count, digits, ratio, si};
+use super::units::{bodies, count, digits, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
@@ -53,7 +53,7 @@ fn value(record: &Record) -> f64 {
 
 /// Where the scene is good enough, and its table, solver by solver.
 fn scene_text(scene: &[Record], swept: Swept) -> String {
-    let mut text = format!("{} · {} bodies\n", scene[0].scene, scene[0].bodies);
+    let mut text = format!("{} · {}\n", scene[0].scene, bodies(scene[0].bodies));
     let unit = if swept.unit.is_empty() { String::new() } else { format!(" ({})", swept.unit) };
     let heading = format!("{}{unit}", swept.name);
     let width = solvers_of(scene).iter().map(|s| s.len()).max().unwrap_or(0);

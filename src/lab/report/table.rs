@@ -1,6 +1,6 @@
 //! Tables for the terminal, to be read at 160 columns.
 
-use super::units::{digits, is_emulated, ratio, si};
+use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
 use crate::lab::study::{Fronts, Record, TruthError};
@@ -44,7 +44,7 @@ pub(crate) fn finish(mut table: Table, left: usize) -> String {
 /// The records of one scene, errors once per solver, budget and order.
 pub fn scene_table(records: &[Record]) -> String {
     let Some(first) = records.first() else { return String::new() };
-    let mut text = format!("{} · {} bodies · dt {}", first.scene, first.bodies, si(first.dt, "s"));
+    let mut text = format!("{} · {} · dt {}", first.scene, bodies(first.bodies), si(first.dt, "s"));
     if let Some(steps) = records.iter().find_map(|r| Some(r.errors?.steps)) {
         text += &format!(" · {steps} steps");
     }

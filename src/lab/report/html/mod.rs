@@ -26,7 +26,7 @@ use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
 use crate::lab::report::sweep::is_sweep;
 use crate::lab::study::curve::solvers_of;
-use crate::lab::units::count;
+use crate::lab::units::{bodies, count};
 use matrix::Matrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -151,10 +151,10 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     for scene in scenes {
         let name = &scene[0].scene;
         by_scene += &format!(
-            "<h3 id=\"{}\">{} <span class=\"soft\">{} bodies</span></h3>\n{}",
+            "<h3 id=\"{}\">{} <span class=\"soft\">{}</span></h3>\n{}",
             words::anchor(name),
             escaped(name),
-            scene[0].bodies,
+            bodies(scene[0].bodies),
             precision::scene(scene)
         );
     }

@@ -10,7 +10,7 @@ use crate::lab::report::sweep;
 use crate::lab::study::Record;
 use crate::lab::study::curve::{ErrorAxis as Axis, solvers_of};
 use crate::lab::study::sweep::Swept;
-use crate::lab::units::si;
+use crate::lab::units::{bodies, si};
 
 /// Width and height of a plot (pixels).
 const SIZE: [f64; 2] = [420.0, 330.0];
@@ -138,9 +138,9 @@ pub fn section(records: &[Record]) -> String {
     let mut text = legend(&solvers_of(records));
     for scene in scenes(records) {
         text += &format!(
-            "<h3>{} <span class=\"soft\">{} bodies{}</span></h3>\n<div class=\"panels sweep\">\n{}</div>\n",
+            "<h3>{} <span class=\"soft\">{}{}</span></h3>\n<div class=\"panels sweep\">\n{}</div>\n",
             escaped(&scene[0].scene),
-            scene[0].bodies,
+            bodies(scene[0].bodies),
             escaped(&reference(scene)),
             panels(scene, swept).concat()
         );
