@@ -581,7 +581,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Counts a velocity sweep, and keeps its rule where that is asked for.
+    /// Counts a velocity sweep, and keeps its rule if `observe` is set.
     fn solved(&mut self, sweep: &dyn VelocitySweep) {
         let friction = self.input.features.friction && sweep.has_friction();
         self.count_sweep(if friction { 2 } else { 1 });
