@@ -177,3 +177,77 @@ fn the_same_solvers_fail() {
         assert_eq!(lost, pairing.0 == "Jacobi", "{}", pairing.0);
     }
 }
+
+/// The growth per substep of what is left over in a pyramid of sticking unit boxes when a substep
+/// applies the last impulses once more and sweeps once: the greatest |z| of `papers/solver2d.md`.
+/// `rows` are the rows of a contact in their order: point, and normal (0) or tangent (1).
+fn growth(base: usize, rows: [(usize, usize); 4]) -> f64 {
+    let mut place = Vec::new();
+    for level in 0..base {
+        place.extend((0..base - level).map(|i| [0.5 * level as f64 + i as f64, level as f64 + 0.5]));
+    }
+    // A contact: the lower box if there is one, the upper one, x of both points, y.
+    let touches = |a: [f64; 2], b: [f64; 2]| b[1] - a[1] == 1.0 && (b[0] - a[0]).abs() < 1.0;
+    let mut contacts: Vec<(Option<usize>, usize, [f64; 2], f64)> =
+        (0..base).map(|b| (None, b, [place[b][0] - 0.5, place[b][0] + 0.5], 0.0)).collect();
+    for a in 0..place.len() {
+        for b in (a + 1..place.len()).filter(|&b| touches(place[a], place[b])) {
+            let x = [place[a][0], place[b][0]];
+            contacts.push((Some(a), b, [x[0].max(x[1]) - 0.5, x[0].min(x[1]) + 0.5], place[b][1] - 0.5));
+        }
+    }
+    // Inverse mass 1, inverse inertia 6.
+    type Row = Vec<(usize, [f64; 3])>;
+    let row = |&(a, b, x, y): &(Option<usize>, usize, [f64; 2], f64), (p, axis): (usize, usize)| -> Row {
+        let side = |body: usize, sign: f64| {
+            let r = [x[p] - place[body][0], y - place[body][1]];
+            let u = [[0.0, 1.0], [1.0, 0.0]][axis];
+            (body, [sign * u[0], sign * u[1], sign * (r[0] * u[1] - r[1] * u[0])])
+        };
+        a.map(|a| side(a, -1.0)).into_iter().chain([side(b, 1.0)]).collect()
+    };
+    let all: Vec<Row> = contacts.iter().flat_map(|c| rows.map(|r| row(c, r))).collect();
+    let inverse = [1.0, 1.0, 6.0];
+    let mut velocity: Vec<[f64; 3]> =
+        (0..place.len()).map(|i| [(i as f64).sin(), (i as f64).cos(), 0.0]).collect();
+    let mut impulse = vec![0.0; all.len()];
+    let push = |velocity: &mut [[f64; 3]], row: &Row, by: f64| {
+        for (body, j) in row {
+            (0..3).for_each(|k| velocity[*body][k] += inverse[k] * j[k] * by);
+        }
+    };
+    let size = |velocity: &[[f64; 3]]| velocity.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
+    // Means over windows, since it oscillates.
+    let (windows, window) = ([2000, 5000], 500);
+    let mut sums = [0.0; 2];
+    for substep in 0..windows[1] + window {
+        for (sum, start) in sums.iter_mut().zip(windows) {
+            if (start..start + window).contains(&substep) {
+                *sum += size(&velocity);
+            }
+        }
+        for (row, impulse) in all.iter().zip(&impulse) {
+            push(&mut velocity, row, *impulse);
+        }
+        for (row, impulse) in all.iter().zip(&mut impulse) {
+            let sum = |of: &dyn Fn(usize, f64, usize) -> f64| -> f64 {
+                row.iter().flat_map(|(b, j)| (0..3).map(|k| of(*b, j[k], k))).sum()
+            };
+            let by = -sum(&|b, j, k| j * velocity[b][k]) / sum(&|_, j, k| j * j * inverse[k]);
+            *impulse += by;
+            push(&mut velocity, row, by);
+        }
+    }
+    (sums[1] / sums[0]).powf(1.0 / f64::from(windows[1] - windows[0]))
+}
+
+/// One rigid sweep per substep grows or dies out by the order of the rows of a contact alone.
+#[test]
+fn the_order_of_rows_decides_whether_one_rigid_sweep_is_stable() {
+    let (normals_first, by_points) = ([(0, 0), (1, 0), (0, 1), (1, 1)], [(0, 0), (0, 1), (1, 0), (1, 1)]);
+    let [first, points] = [normals_first, by_points].map(|rows| growth(14, rows));
+    println!("normals first {first:.5}, point by point {points:.5}");
+    // By the eigenvalues 1.00278 and 0.99674.
+    assert!((first - 1.00278).abs() < 2e-4, "{first}");
+    assert!((points - 0.99674).abs() < 2e-4, "{points}");
+}
