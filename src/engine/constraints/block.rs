@@ -32,12 +32,12 @@
 //! `solve_pgs_ngs_block`): normal rows have the last word.
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::NormalRule;
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
-    over_moving_segments, spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
+    spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
@@ -61,7 +61,7 @@ impl<R: NormalRule> Pass for BlockSweep<R> {
 
 #[inline(never)]
 fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
-    over_moving_segments!(segment, L, N, R; rows, batches, rule);
+    over_segments!(segment, L, N, R; rows, batches, rule);
 }
 
 #[inline(always)]
@@ -72,10 +72,11 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     rule: R,
 ) {
     let layout = const { Layout::of::<N, O>() };
+    let pushes_a = segment.pushes_a();
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let [along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut w = [a[W], b[W]];
@@ -110,7 +111,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             old[p] = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
-            [constant[p], slope[p]] = rule.line(!O::MOVES, separation, mass, old[p]);
+            [constant[p], slope[p]] = rule.line(!pushes_a, separation, mass, old[p]);
             v[p] = with_arms::<L, N, O>(along_n, w, arm[p]);
         }
         let mut coupling = L::zero();
@@ -118,7 +119,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             coupling = mass_sum;
             if N::ROTATION {
                 coupling = (inertia[1] * arm[0][1]).mul_add(arm[1][1], coupling);
-                if O::MOVES {
+                if O::HAS_ROW {
                     coupling = (inertia[0] * arm[0][0]).mul_add(arm[1][0], coupling);
                 }
             }
@@ -131,7 +132,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
             spin::<L, N, O>(&mut w, inertia, arm[p], delta);
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
     });
 }
 

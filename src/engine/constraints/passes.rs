@@ -6,7 +6,7 @@ use super::bounces::Bounces;
 use super::descent::Blocks;
 use super::features::{Features, Layout};
 use super::graph::Graph;
-use super::jacobi::{self, JacobiRule};
+use super::jacobi::{self, JacobiSweep};
 use super::kept::Kept;
 use super::masses::EffectiveMasses;
 use super::motion::Motion;
@@ -17,7 +17,7 @@ use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
 use super::prepare::{Prepare, Store};
 use super::restitution;
-use super::rules::{NormalRule, Rule};
+use super::rules::{NormalRule, Rule, Soft};
 use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
@@ -250,18 +250,18 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
-    pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
+    pub fn jacobi_sweep(&mut self, phase: Phase, rule: Soft, relaxation: f32) {
         if !self.input.phases.runs(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
-        rule.with_pass(relaxation, |pass| self.over_batches(phase, pass));
+        self.over_batches(phase, &JacobiSweep { rule, relaxation });
         // Sums are cleared, read, and added to velocities.
         let row = size_of::<BodyRow>() as f64;
         self.book_rows([row, 1.5 * row]);
         jacobi::finish(&mut self.work.rows, &self.work.sums, &self.work.masses);
         self.clock.lap(phase);
-        self.solved(rule.rule().sweep());
+        self.solved(&Sweep(rule));
     }
 
     /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart; the law of the
@@ -581,7 +581,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Counts a velocity sweep, and keeps its rule where that is asked for.
+    /// Counts a velocity sweep, and keeps its rule if `observe` is set.
     fn solved(&mut self, sweep: &dyn VelocitySweep) {
         let friction = self.input.features.friction && sweep.has_friction();
         self.count_sweep(if friction { 2 } else { 1 });

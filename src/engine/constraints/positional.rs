@@ -22,11 +22,11 @@
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
-    over_moving_segments, spin, to_frame, turn, turned, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
+    spin, to_frame, turn, turned, with_arms,
 };
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
@@ -55,7 +55,7 @@ impl Pass for Displace {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         let mut store = Displaced { rows: on.rows, before: on.sums };
-        over_moving_segments!(displace, L, F; &mut store, on.batches, *self);
+        over_segments!(displace, L, F; &mut store, on.batches, *self);
     }
 }
 
@@ -66,7 +66,7 @@ impl Pass for AfterDisplacing {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_moving_segments!(correct, L, F; on.rows, on.batches);
+        over_segments!(correct, L, F; on.rows, on.batches);
     }
 }
 
@@ -109,7 +109,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
         let before = BodyPair::<L>::gather::<O, _>(store.before, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let frame =
             |at: usize, a: &[L; 8], b: &[L; 8]| to_frame::<L, O>([a[at], a[at + 1]], [b[at], b[at + 1]], n);
@@ -132,7 +132,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let mut k = mass_sum;
                 if N::ROTATION {
                     k = (inertia[1] * arm[1]).mul_add(arm[1], k);
-                    if O::MOVES {
+                    if O::HAS_ROW && segment.pushes_a() {
                         k = (inertia[0] * arm[0]).mul_add(arm[0], k);
                     }
                 }
@@ -171,7 +171,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
         L::scatter_delta(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::MOVES {
+        if O::HAS_ROW && segment.pushes_a() {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
             L::scatter_delta(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
@@ -189,7 +189,7 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite>(
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut w = [a[W], b[W]];
@@ -215,6 +215,6 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite>(
             }
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
     });
 }
