@@ -161,10 +161,30 @@ fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
     let line = |v: &&Variant| {
         let standard = budget::brief(&v.budget, v);
         let star = if is_default(v) { "*" } else { " " };
-        format!("{star} {:<width$}  {} [{}; standard {standard}]\n", v.name, v.summary, v.source)
+        let own: String = v.parameters.iter().map(|p| format!("; {}={}", p.name, p.default)).collect();
+        format!("{star} {:<width$}  {} [{}; standard {standard}{own}]\n", v.name, v.summary, v.source)
     };
     let lines: String = VARIANTS.iter().map(line).collect();
-    print(&format!("* in the default study; --solvers all runs every solver\n{lines}"))
+    print(&format!("* in the default study; --solvers all runs every solver\n{lines}\n{}", parameters()))
+}
+
+/// What `--set` and `--sweep` take: each parameter with its range and what it does, where solvers differ in
+/// that, several times.
+fn parameters() -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for p in VARIANTS.iter().flat_map(|v| v.parameters) {
+        let [low, high] = p.range;
+        let range = format!("{low} to {high} {}", p.unit);
+        let line = format!("  {:<16}  {:<22}  {}\n", p.name, range.trim_end(), p.meaning);
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
+    }
+    lines.sort();
+    format!(
+        "Parameters (--set NAME=VALUE; study --sweep NAME=VALUE,VALUE,…) with their ranges\n{}",
+        lines.concat()
+    )
 }
 
 fn columns(args: &ListArgs) -> Result<ExitCode, Error> {

@@ -70,7 +70,7 @@ pub struct ErrorChange {
 pub struct TimeChange {
     /// Median time of a step (ns), before and after.
     pub median_ns: [f64; 2],
-    /// Ratio over paired blocks, divided by the common one if that was wished.
+    /// Ratio over paired blocks, divided by the common one where times are relative.
     pub ratio: f64,
     /// Its interval.
     pub interval: [f64; 2],

@@ -199,7 +199,7 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
                  <code>simpulse report DIR</code> put it here.</p>\n"
             .into(),
     };
-    section("verify", "Hard cases whose truth is known", "", cases);
+    section("verify", "Hard cases with known reference values", "", cases);
     section("machine", "Machine, settings and command", "", machine(study));
     text += "<nav>";
     for (id, title) in &contents {
@@ -269,11 +269,12 @@ fn command(settings: &Value) -> String {
         let values: Vec<String> = values.map(|v| v.to_string()).collect();
         option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
     }
-    let units = [("penetration", "m"), ("residual", ""), ("truth", "")];
-    let given = |(name, unit): &(&str, &str)| {
-        settings["tolerance"][name].as_f64().map(|v| format!("{name}={v}{unit}"))
+    let options =
+        [("penetration", "penetration", "m"), ("residual", "residual", ""), ("truth", "reference", "")];
+    let given = |(name, option, unit): &(&str, &str, &str)| {
+        settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))
     };
-    option("tolerance", units.iter().filter_map(given).collect());
+    option("tolerance", options.iter().filter_map(given).collect());
     for name in ["steps", "repeats", "seed"] {
         let value = &settings[name];
         option(name, if value.is_u64() { vec![value.to_string()] } else { Vec::new() });
@@ -336,6 +337,19 @@ mod tests {
             }
         }
         open.is_empty()
+    }
+
+    #[test]
+    fn the_command_has_the_options_of_the_command_line() {
+        let mut plan = StudyPlan { sweep: Some("friction=0.5,0".parse().unwrap()), ..StudyPlan::default() };
+        plan.tolerances.penetration = Some(0.005);
+        plan.tolerances.truth = Some(3.0);
+        let command = command(&StudyFile::new(&plan, Vec::new(), Vec::new()).settings);
+        for part in
+            [" --sweep friction=0,0.5 ", " --tolerance penetration=0.005m,reference=3 ", " --repeats 3 "]
+        {
+            assert!(command.contains(part), "{part}: {command}");
+        }
     }
 
     #[test]

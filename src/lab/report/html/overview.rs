@@ -78,7 +78,8 @@ pub fn overview(records: &[Record]) -> String {
                 panel.marker(panel.at(x, dot.slower), 2.6, e.solver, false, true, &title);
             }
             None => {
-                let title = format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its truth".into()));
+                let title =
+                    format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its reference value".into()));
                 let place = Style::of(e.solver).marker as usize as f64 / 7.0;
                 panel.marker(panel.in_band(dot.slower, place), 2.6, e.solver, false, true, &title);
             }

@@ -101,7 +101,8 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
                 }
             }
             (broke, _) => {
-                let title = format!("{what}, {}", broke.unwrap_or_else(|| "missed its truth".into()));
+                let title =
+                    format!("{what}, {}", broke.unwrap_or_else(|| "missed its reference value".into()));
                 let at = panel.in_band(time, Style::of(entry.solver).marker as usize as f64 / 7.0);
                 panel.marker(at, 3.0, entry.solver, entry.is_natural(), false, &title);
             }
@@ -113,7 +114,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
 fn table(entries: &[Record], settings: &[&Record]) -> String {
     let mut text = String::from(
         "<details><summary>All settings of this scene</summary>\n<table class=\"numbers\"><thead><tr><th>solver\
-         <th>budget<th>order, lanes<th>time (µs)<th>speed-up<th>penetration<th>residual<th>to truth<th>verdict\
+         <th>budget<th>order, lanes<th>time (µs)<th>speed-up<th>penetration<th>residual<th>to reference<th>verdict\
          </tr></thead><tbody>\n",
     );
     let unit = entries.iter().find_map(|e| e.truth.as_ref()).map_or("", |t| t.unit);
@@ -123,7 +124,7 @@ fn table(entries: &[Record], settings: &[&Record]) -> String {
             (Some(broke), _) => format!("<td class=\"bad\">{}", escaped(&broke)),
             (None, Some(x)) if x <= 1.0 => "<td class=\"ok\">within tolerance".into(),
             (None, Some(x)) => format!("<td>{}× tolerance", number(x)),
-            (None, None) => "<td>missed its truth".into(),
+            (None, None) => "<td>missed its reference value".into(),
         };
         let order = if entry.is_natural() { "natural".into() } else { lanes(entry.lanes) };
         text += &format!(
