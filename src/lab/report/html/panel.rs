@@ -81,15 +81,22 @@ impl Panel {
             px(left),
             px(top)
         );
-        // Where labels would touch, or reach into that of the band, only the first stands.
-        let mut free = f64::NEG_INFINITY;
+        // As many labels as do not touch each other, at equal distances, and none in that of the band.
         let end = if frame.band == Band::Right { right + 0.5 * BAND - 17.0 } else { width };
-        for (v, label) in &x.ticks {
+        let place = |(v, label): &(f64, String)| {
             let (at, half) = (left + x.share(*v) * (right - left), 3.5 * label.chars().count() as f64);
-            if at - half > free && at + half < end {
-                free = at + half + 3.0;
-                text +=
-                    &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", px(at), px(bottom + 15.0));
+            [at, half]
+        };
+        let apart = |stride: usize| {
+            let kept: Vec<[f64; 2]> = x.ticks.iter().step_by(stride).map(place).collect();
+            kept.windows(2).all(|w| w[0][0] + w[0][1] + 3.0 < w[1][0] - w[1][1])
+        };
+        let stride = (1..=x.ticks.len()).find(|&stride| apart(stride)).unwrap_or(1);
+        for tick in x.ticks.iter().step_by(stride) {
+            let [at, half] = place(tick);
+            if at + half < end {
+                let (x, y) = (px(at), px(bottom + 15.0));
+                text += &format!("<text class=\"x\" x=\"{x}\" y=\"{y}\">{}</text>", tick.1);
             }
         }
         for (v, label) in &y.ticks {

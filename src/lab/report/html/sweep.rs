@@ -13,7 +13,7 @@ use crate::lab::study::sweep::Swept;
 use crate::lab::units::{bodies, si};
 
 /// Width and height of a plot (pixels).
-const SIZE: [f64; 2] = [420.0, 330.0];
+const SIZE: [f64; 2] = [330.0, 290.0];
 
 /// What a plot shows against the swept value.
 #[derive(Clone, Copy)]
@@ -138,7 +138,7 @@ pub fn section(records: &[Record]) -> String {
     let mut text = legend(&solvers_of(records));
     for scene in scenes(records) {
         text += &format!(
-            "<h3>{} <span class=\"soft\">{}{}</span></h3>\n<div class=\"panels sweep\">\n{}</div>\n",
+            "<h3>{} <span class=\"soft\">{}{}</span></h3>\n<div class=\"panels four\">\n{}</div>\n",
             escaped(&scene[0].scene),
             bodies(scene[0].bodies),
             escaped(&reference(scene)),
