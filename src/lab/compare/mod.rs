@@ -212,7 +212,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         Some(ErrorChange { error, unit, values, negligible: NEGLIGIBLE * tolerance })
     });
     let time = || {
-        let samples = [one.lap.as_ref()?, other.lap.as_ref()?];
+        let samples = [one.sample.as_ref()?, other.sample.as_ref()?];
         let Ratio { median, interval } = Ratio::of(samples[1], samples[0])?;
         Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
     };
@@ -334,7 +334,7 @@ mod tests {
     fn noise_is_no_regression() {
         let noisy = |seed: u64| {
             let mut r = record(8, 1, 10.0, 1e-3);
-            let sample = r.lap.as_mut().unwrap();
+            let sample = r.sample.as_mut().unwrap();
             // ±30 %, and no trend.
             sample.blocks_ns[0].iter_mut().enumerate().for_each(|(i, ns)| {
                 *ns *= 1.0 + 0.3 * (((i as u64 * 7 + seed * 13) % 11) as f64 / 5.0 - 1.0);

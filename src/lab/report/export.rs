@@ -91,7 +91,7 @@ struct Line<'a> {
 
 impl<'a> Line<'a> {
     fn of(r: &'a Record) -> Self {
-        let (lap, errors, truth) = (r.lap.as_ref(), r.errors.as_ref(), r.truth.as_ref());
+        let (sample, errors, truth) = (r.sample.as_ref(), r.errors.as_ref(), r.truth.as_ref());
         let us = |ns: f64| ns / 1e3;
         Line {
             scene: &r.scene,
@@ -108,11 +108,11 @@ impl<'a> Line<'a> {
             swept: r.swept.map(|s| s.name),
             swept_unit: r.swept.map(|s| s.unit),
             swept_value: r.swept.map(|s| s.value),
-            median_us: lap.map(|l| us(l.median_ns)),
-            spread_us: lap.map(|l| us(l.spread_ns)),
-            quartile_1_us: lap.map(|l| us(l.quartiles_ns[0])),
-            quartile_3_us: lap.map(|l| us(l.quartiles_ns[1])),
-            ns_per_row_sweep: lap.map(|l| l.row_sweep_ns),
+            median_us: sample.map(|l| us(l.median_ns)),
+            spread_us: sample.map(|l| us(l.spread_ns)),
+            quartile_1_us: sample.map(|l| us(l.quartiles_ns[0])),
+            quartile_3_us: sample.map(|l| us(l.quartiles_ns[1])),
+            ns_per_row_sweep: sample.map(|l| l.row_sweep_ns),
             speed_up: r.speed_up,
             steps: errors.map(|e| e.steps),
             points: errors.map(|e| e.points),
@@ -149,13 +149,13 @@ impl<'a> Line<'a> {
             truth_unit: truth.map(|t| t.unit),
             truth_expected: truth.map(|t| t.expected),
             truth_error: truth.and_then(|t| t.error),
-            contacts: lap.map(|l| l.load.contacts),
-            rows: lap.map(|l| l.load.rows),
-            sweeps: lap.map(|l| l.load.sweeps),
-            colors: lap.map(|l| l.load.colors),
-            overflow: lap.map(|l| l.load.overflow),
-            occupancy: lap.map(|l| l.load.occupancy),
-            bytes_per_contact: lap.map(|l| l.load.bytes_per_contact),
+            contacts: sample.map(|l| l.load.contacts),
+            rows: sample.map(|l| l.load.rows),
+            sweeps: sample.map(|l| l.load.sweeps),
+            colors: sample.map(|l| l.load.colors),
+            overflow: sample.map(|l| l.load.overflow),
+            occupancy: sample.map(|l| l.load.occupancy),
+            bytes_per_contact: sample.map(|l| l.load.bytes_per_contact),
             bits_equal: r.bits_equal,
             front_penetration: r.front.penetration,
             front_law: r.front.law,

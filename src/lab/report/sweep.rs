@@ -106,7 +106,7 @@ fn reach(scene: &[Record], solver: &str, swept: Swept) -> String {
 
 fn row(record: &Record) -> Vec<String> {
     const NOTHING: &str = "–";
-    let lap = record.lap.as_ref();
+    let sample = record.sample.as_ref();
     let errors = record.errors.as_ref();
     let nothing = || NOTHING.to_string();
     vec![
@@ -114,8 +114,8 @@ fn row(record: &Record) -> Vec<String> {
         value(record).to_string(),
         record.budget_text.clone(),
         if record.order == Order::Natural { "natural".into() } else { record.lanes.to_string() },
-        lap.map_or_else(nothing, |l| digits(l.median_ns / 1e3)),
-        lap.map_or_else(nothing, |l| digits(l.spread_ns / 1e3)),
+        sample.map_or_else(nothing, |l| digits(l.median_ns / 1e3)),
+        sample.map_or_else(nothing, |l| digits(l.spread_ns / 1e3)),
         errors.map_or_else(nothing, |e| si(e.penetration_max, "m")),
         errors.map_or_else(nothing, |e| ratio(e.law_rms_body)),
         match record.truth {

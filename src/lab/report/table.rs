@@ -112,16 +112,16 @@ fn lanes(record: &Record) -> String {
 fn row(record: &Record) -> Vec<String> {
     const NOTHING: &str = "–";
     let mut cells = vec![record.solver.to_string(), record.budget_text.clone(), lanes(record)];
-    let Some(lap) = &record.lap else {
+    let Some(sample) = &record.sample else {
         cells.resize(7, NOTHING.to_string());
         cells.push(record.mark().map_or("failed", |mark| mark.word()).to_string());
         cells.resize(20, NOTHING.to_string());
         return cells;
     };
     cells.extend([
-        digits(lap.median_ns / 1e3),
-        digits(lap.spread_ns / 1e3),
-        digits(lap.row_sweep_ns),
+        digits(sample.median_ns / 1e3),
+        digits(sample.spread_ns / 1e3),
+        digits(sample.row_sweep_ns),
         record.speed_up.map_or(NOTHING.to_string(), digits),
     ]);
     let errors = record.errors.as_ref();
@@ -139,9 +139,9 @@ fn row(record: &Record) -> Vec<String> {
     let reference = |t: TruthError| t.error.map_or("missed".to_string(), |e| si(e, t.unit));
     cells.push(record.truth.map_or(NOTHING.to_string(), reference));
     cells.extend([
-        format!("{:.0}", lap.load.sweeps),
-        lap.load.colors.to_string(),
-        format!("{:.0} %", 100.0 * lap.load.occupancy),
+        format!("{:.0}", sample.load.sweeps),
+        sample.load.colors.to_string(),
+        format!("{:.0} %", 100.0 * sample.load.occupancy),
         front(&record.front),
     ]);
     cells

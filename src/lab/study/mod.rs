@@ -1,7 +1,7 @@
 //! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from a [race](interleave) of all
+//! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
 //! settings of a scene, alone on the machine; those that may be the cheapest are timed again. All
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
@@ -32,7 +32,7 @@ use crate::lab::scenes::tolerance::{GivenTolerances, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use compare::Ratio;
-use interleave::Race;
+use interleave::Interleaved;
 pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -459,31 +459,31 @@ fn timed_records(
     rows: &[Row],
     tell: &dyn Fn(String),
 ) -> Result<Vec<Record>, Error> {
-    let racing: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
+    let running: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
     let variant = |row: &Row| &variants[row.cell.scene[1]];
-    let chosen = racing.iter().map(|&i| {
+    let chosen = running.iter().map(|&i| {
         let row = &rows[i];
         (&variant(row).0, settings(plan, row.cell, row.order, row.width))
     });
-    let mut race = Race::new(chosen.collect(), steps, plan.seed);
+    let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
     let name = &variants[0].0.name;
-    let all: Vec<usize> = (0..racing.len()).collect();
+    let all: Vec<usize> = (0..running.len()).collect();
     for pass in 1..=plan.repeats {
         tell(format!("times {name} · pass {pass}"));
-        race.run(1, &all)?;
+        interleaved.run(1, &all)?;
     }
-    let place = |i: usize| racing.binary_search(&i).ok();
+    let place = |i: usize| running.binary_search(&i).ok();
     let untimed = Divergence { step: 0, body: 0, speed: 0.0 };
-    let lap = |race: &Race, i: usize| match rows[i].outcome.errors {
-        Ok(_) => place(i).map_or(Err(untimed), |place| race.sample(place)),
+    let sample = |interleaved: &Interleaved, i: usize| match rows[i].outcome.errors {
+        Ok(_) => place(i).map_or(Err(untimed), |place| interleaved.sample(place)),
         Err(divergence) => Err(divergence),
     };
     let record = |(i, row): (usize, &Row)| {
         let Row { cell, order, width, outcome } = row;
         let (scene, tolerances) = variant(row);
-        let lap = lap(&race, i);
-        let failure = lap.as_ref().err().map(|&d| Failure::from(d));
-        let lap = lap.ok();
+        let sample = sample(&interleaved, i);
+        let failure = sample.as_ref().err().map(|&d| Failure::from(d));
+        let sample = sample.ok();
         Record {
             scene: scene.name.clone(),
             bodies: scene.bodies.len(),
@@ -499,9 +499,9 @@ fn timed_records(
             truth: outcome.truth,
             tolerances: *tolerances,
             broken: outcome.broken,
-            bits_equal: lap.as_ref().map(|lap| lap.hash == outcome.hash),
+            bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
             front: Fronts::default(),
-            lap,
+            sample,
             failure,
         }
     };
@@ -511,17 +511,17 @@ fn timed_records(
         tell(format!("times {name} · finalists"));
         let finalists = answer::finalists(&records);
         let entering: Vec<usize> = finalists.iter().filter_map(|&i| place(i)).collect();
-        race.run(FINAL * plan.repeats, &entering)?;
+        interleaved.run(FINAL * plan.repeats, &entering)?;
         for i in finalists {
-            records[i].lap = lap(&race, i).ok();
+            records[i].sample = sample(&interleaved, i).ok();
         }
     }
     let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
     for i in 0..records.len() {
         let own = &records[i];
         let budget = |r: &&Record| (r.solver, r.budget, r.swept) == (own.solver, own.budget, own.swept);
-        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.lap.as_ref());
-        let ratio = slow.zip(own.lap.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
+        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
+        let ratio = slow.zip(own.sample.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
         records[i].speed_up = ratio.map(|r| r.median);
     }
     Ok(records)

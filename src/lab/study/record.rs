@@ -36,7 +36,8 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swept: Option<Swept>,
     /// Times and counts; none if the run failed.
-    pub lap: Option<Sample>,
+    #[serde(alias = "lap")]
+    pub sample: Option<Sample>,
     /// Times faster than one coloured lane; none without that run.
     pub speed_up: Option<f64>,
     /// Errors, the same for all widths; none if the run failed.
@@ -158,7 +159,7 @@ pub fn mark_fronts(records: &mut [Record]) {
             let (indices, points): (Vec<usize>, Vec<Point>) = fastest
                 .iter()
                 .filter_map(|&i| {
-                    let (sample, error) = (group[i].lap.as_ref()?, error(&group[i])?);
+                    let (sample, error) = (group[i].sample.as_ref()?, error(&group[i])?);
                     Some((i, Point { sample, error }))
                 })
                 .unzip();
@@ -176,7 +177,7 @@ pub fn mark_fronts(records: &mut [Record]) {
 /// Whether no width of the same setting is faster than record `i`.
 fn is_fastest(group: &[Record], i: usize) -> bool {
     let own = &group[i];
-    let time = |r: &Record| r.lap.as_ref().map(|lap| lap.median_ns);
+    let time = |r: &Record| r.sample.as_ref().map(|sample| sample.median_ns);
     let Some(own_time) = time(own) else { return false };
     let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
     !group.iter().any(|r| same(r) && time(r).is_some_and(|t| t < own_time))
@@ -189,7 +190,7 @@ pub(crate) mod tests {
 
     /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
-        let lap = Sample {
+        let sample = Sample {
             median_ns: 1e3 * time,
             spread_ns: 0.0,
             quartiles_ns: [0.0; 2],
@@ -209,7 +210,7 @@ pub(crate) mod tests {
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
             budget_text: format!("{substeps} sub"),
             swept: None,
-            lap: Some(lap),
+            sample: Some(sample),
             speed_up: None,
             errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),
             truth: None,
@@ -223,7 +224,7 @@ pub(crate) mod tests {
 
     pub fn failed(lanes: usize) -> Record {
         let failure = Failure { step: 7, body: 2, speed: None };
-        Record { lap: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
+        Record { sample: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
     /// A record of a run that has errors and a time, and fell.

@@ -78,15 +78,15 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     let mut order: Vec<&&Record> = settings.iter().collect();
     order.sort_by_key(|e| (!e.on_front(axis), e.is_natural()));
     for entry in order {
-        let Some(lap) = &entry.lap else { continue };
-        let (time, color) = (1e-9 * lap.median_ns, Style::of(entry.solver).color);
+        let Some(sample) = &entry.sample else { continue };
+        let (time, color) = (1e-9 * sample.median_ns, Style::of(entry.solver).color);
         let budgets: Vec<&&Record> =
             settings.iter().filter(|e| e.solver == entry.solver && e.order == entry.order).collect();
         let size = budgets.iter().position(|e| e.budget == entry.budget).unwrap_or(0).min(4);
         let what = format!("{}, {}: {}", entry.solver, entry.words(), si(time, "s"));
         match (entry.broke(), axis.of(entry)) {
             (None, Some(value)) => {
-                let quartiles = lap.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
+                let quartiles = sample.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
                 if quartiles[0] > 1e-11 {
                     panel.bar(error(entry), quartiles, color);
                 }

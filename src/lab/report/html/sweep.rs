@@ -110,8 +110,8 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
                 );
                 match (record.broke(), what.of(record)) {
                     (None, Some(y)) => {
-                        if let (Shown::Time, Some(lap), false) = (what, &record.lap, is_dt(record)) {
-                            let quartiles = lap.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
+                        if let (Shown::Time, Some(sample), false) = (what, &record.sample, is_dt(record)) {
+                            let quartiles = sample.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
                             panel.bar(at(record), quartiles, Style::of(solver).color);
                         }
                         let title =
