@@ -435,7 +435,14 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
     let solvers = simpulse(folder.path(), &["solvers"]);
-    assert_eq!(text(&solvers.stdout).lines().count(), 1 + VARIANTS.len());
+    let (list, parameters) = text(&solvers.stdout).split_once("\n\n").unwrap();
+    assert_eq!(list.lines().count(), 1 + VARIANTS.len());
+    for parameter in VARIANTS.iter().flat_map(|v| v.parameters) {
+        assert!(
+            parameters.contains(parameter.name) && parameters.contains(parameter.meaning),
+            "{parameter:?}"
+        );
+    }
     let scenes = simpulse(folder.path(), &["scenes"]);
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 
