@@ -228,9 +228,9 @@ pub fn time_in_turns(
     repeats: u32,
     seed: u64,
 ) -> Result<Vec<Result<Sample, Divergence>>, Error> {
-    let settings: Vec<_> = settings.iter().map(|s| (scene, s.clone())).collect();
-    let mut interleaved = Interleaved::new(settings.clone(), steps, seed);
     let all: Vec<usize> = (0..settings.len()).collect();
+    let settings = settings.iter().map(|s| (scene, s.clone())).collect();
+    let mut interleaved = Interleaved::new(settings, steps, seed);
     interleaved.run(repeats, &all)?;
     Ok(all.into_iter().map(|i| interleaved.sample(i)).collect())
 }
