@@ -53,12 +53,6 @@
 //! one clamp and one difference. Against updating `along_n`, `along_t`, ω_a and ω_b after each
 //! row that is 12 % faster, or 6 % with k between points alone. The k are formed in registers.
 //!
-//! # Order of rows
-//!
-//! Point by point, the normal row and then its friction row. With both normal rows first a pyramid of base
-//! 20 whose contacts stick converges by 0.9974 per sweep instead of 0.9967, so 26 % more slowly, and one
-//! rigid sweep per substep is unstable there (`papers/solver2d.md`). The number of operations is the same.
-//!
 //! # Floor, and how far from it
 //!
 //! Two points with friction against a dynamic body, 16 lanes, one Zen 5 core (AVX-512) at up to
@@ -71,6 +65,14 @@
 //! floor: a batch fills the window of out-of-order execution, so that the chain from a row's
 //! load through four clamps to its store overlaps with little of the next batch. What pays is
 //! a shorter chain and fewer instructions, not fewer bytes.
+//!
+//! # Order of rows
+//!
+//! Both normal rows, then both friction rows. Point by point (normal, friction, normal, friction) costs the same
+//! and converges faster: on a pyramid of base 20 by 0.9967 instead of 0.9974 per sweep, and `soft_step` left
+//! 1.4 µm/s instead of 313 on `pyramid:40`. But then the first friction row answers to a spin that the second normal
+//! row would have taken away: boxes wander sideways, one on an incline drifts (A1.stick, A1.slip fail), and a pile
+//! under `pgs` falls (B3.pile). More in `papers/solver2d.md`.
 //!
 //! Tried without gain: row indices stored as multiples that the addressing mode takes (32
 //! instructions less, relaxing −3 %, soft 0 %; left to itself the compiler then forms addresses
@@ -383,13 +385,16 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
                 normal.answer::<N, O>(q, mass_sum, inertia, arm, delta);
             }
             if friction_rows {
-                for q in p..N::POINTS {
+                for q in 0..N::POINTS {
                     tangent.answer::<N, O>(q, L::zero(), inertia, arm, delta);
                 }
             }
             spin::<L, N, O>(&mut w, inertia, arm, delta);
-            if friction_rows {
-                let bound = record[layout.friction] * new;
+        }
+        if friction_rows {
+            let friction = record[layout.friction];
+            for p in 0..N::POINTS {
+                let bound = friction * normal.impulse[p];
                 let new = tangent.impulse[p].min(bound).max(-bound);
                 record[layout.at(p, layout.tangent_impulse)] = new;
                 let delta = new - tangent.old[p];
@@ -397,7 +402,6 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
                 let arm = tangent.arm[p];
                 for q in p + 1..N::POINTS {
                     tangent.answer::<N, O>(q, mass_sum, inertia, arm, delta);
-                    normal.answer::<N, O>(q, L::zero(), inertia, arm, delta);
                 }
                 spin::<L, N, O>(&mut w, inertia, arm, delta);
             }
