@@ -128,11 +128,11 @@ impl LoadSum {
     }
 }
 
-/// Lets `count` timings take turns in so many rounds: `turn(timing, round)` for each of them.
+/// Lets `count` settings take turns in so many rounds: `turn(setting, round)` for each of them.
 ///
 /// The order of a round is the last one's, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
 /// and every second round is read backwards (Williams 1949), so that who comes after whom changes,
-/// too: an timing that leaves the caches full of its own does not always leave them to the same one.
+/// too: a setting that leaves the caches full of its own does not always leave them to the same one.
 /// It rotates by the golden section of the count, so that after any number of rounds everybody has
 /// been early and late about as often.
 pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize)) {
@@ -381,9 +381,9 @@ pub(crate) mod tests {
             let rounds = 60;
             let mut places = vec![vec![0; count]; count];
             let mut order: Vec<Vec<usize>> = vec![Vec::new(); rounds];
-            take_turns(count, rounds, |timing, round| {
-                places[timing][order[round].len()] += 1;
-                order[round].push(timing);
+            take_turns(count, rounds, |setting, round| {
+                places[setting][order[round].len()] += 1;
+                order[round].push(setting);
             });
             for round in &order {
                 let mut sorted = round.clone();

@@ -187,8 +187,8 @@ impl StudyPlan {
         let name = sweep.scene_name(value, name)?;
         let Some(dt) = sweep.dt(value) else { return Ok(sweep.adapt(value, self.open(&name)?)) };
         let Scene { steps, dt: own, .. } = self.open(&name)?.scene;
-        // As long a time; the last step may begin before its end.
-        let steps = (f64::from(steps) * own / dt).ceil().max(1.0);
+        // As long a time, up to rounding; the last step may begin before its end.
+        let steps = (f64::from(steps) * own / dt * (1.0 - 1e-9)).ceil().max(1.0);
         open_scene(&name, Some(self.seed), Some(steps as u32), Some(dt))
     }
 
