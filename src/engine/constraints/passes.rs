@@ -300,7 +300,10 @@ impl<'a> Passes<'a> {
 
     /// Body pass: marks where bodies are, for [`Self::displacing_sweep`] to displace them from there.
     pub fn begin_displacing(&mut self) {
-        self.over_bodies(Phase::Integrate, |work| work.sums.clone_from(&work.rows));
+        self.over_bodies(Phase::Integrate, |work| {
+            work.sums.clone_from(&work.rows);
+            work.motion.hidden_turns(&mut work.sums);
+        });
     }
 
     /// Constraint pass: displaces bodies that overlap or slip, see `positional.rs`; `first` in each
