@@ -69,7 +69,7 @@ fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
         Scene::from_json(&text, "scene.json".as_ref()).unwrap()
     };
     let column: Vec<[f64; 2]> = (0..15).map(|i| [0.0, f64::from(i) + 0.5]).collect();
-    let sway = |i: usize| if i % 2 == 0 { -0.01 } else { 0.01 };
+    let sway = |i: usize| if i.is_multiple_of(2) { -0.01 } else { 0.01 };
     let scene = match name {
         "pyramid20" => crate::common::scene("pyramid:20"),
         "pyramid50" => crate::common::scene("pyramid:50"),
