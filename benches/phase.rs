@@ -3,12 +3,18 @@
 //! The phase runs alone, all its passes of a step; what it changes is brought back every 100
 //! times, outside of the times. Before a scene is timed at a width, 30 steps must give the bits that
 //! scalar lanes give.
+//!
+//! `sweep/<phase>/<scene>/<solver>` are the passes of every solver beside each other, at the widest
+//! native lanes and standard budgets, on a state that `soft_step` has settled; all work of the phase
+//! counts. Their throughput is in contacts times passes, so `elem/s` inverts to ns per contact and pass.
 
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use simpulse::engine::clock::Phase;
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::{LaneWidth, native_width};
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::world::HeldWorld;
 use std::time::{Duration, Instant};
 
 const PHASES: [Phase; 9] = [
@@ -40,16 +46,7 @@ fn bench(c: &mut Criterion) {
                 let mut group = c.benchmark_group(format!("phase/{name}"));
                 group.throughput(Throughput::Elements(contacts));
                 group.bench_function(BenchmarkId::new(scene, &id), |b| {
-                    b.iter_custom(|count| {
-                        let mut spent = Duration::ZERO;
-                        for done in (0..count).step_by(REPEATS as usize) {
-                            let start = Instant::now();
-                            frozen.repeat(phase, (count - done).min(REPEATS) as u32);
-                            spent += start.elapsed();
-                            frozen.reset(phase);
-                        }
-                        spent
-                    });
+                    b.iter_custom(|count| repeated(&mut frozen, phase, count));
                 });
                 group.finish();
             }
@@ -57,5 +54,43 @@ fn bench(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, bench);
+/// Time that `count` repeats take.
+fn repeated(frozen: &mut HeldWorld<'_>, phase: Phase, count: u64) -> Duration {
+    let mut spent = Duration::ZERO;
+    for done in (0..count).step_by(REPEATS as usize) {
+        let start = Instant::now();
+        frozen.repeat(phase, (count - done).min(REPEATS) as u32);
+        spent += start.elapsed();
+        frozen.reset(phase);
+    }
+    spent
+}
+
+fn bench_solvers(c: &mut Criterion) {
+    let scene = common::KERNEL_SCENES[1];
+    for variant in VARIANTS {
+        let mut world = common::settled(scene, "soft_step", native_width());
+        world.settings.solver = variant;
+        world.settings.parameters = variant.defaults();
+        world.settings.budget = variant.budget;
+        let contacts = world.counts.contacts as u64;
+        let mut frozen = world.hold();
+        for probe in frozen.probes() {
+            if !matches!(probe.phase, Phase::Solve | Phase::Relax | Phase::Position) {
+                continue;
+            }
+            let name = probe.phase.name().replace(' ', "_");
+            let mut group = c.benchmark_group(format!("sweep/{name}"));
+            group.sample_size(10).warm_up_time(Duration::from_millis(300));
+            group.measurement_time(Duration::from_secs(1));
+            group.throughput(Throughput::Elements(contacts * u64::from(probe.passes)));
+            group.bench_function(BenchmarkId::new(scene, variant.name), |b| {
+                b.iter_custom(|count| repeated(&mut frozen, probe.phase, count));
+            });
+            group.finish();
+        }
+    }
+}
+
+criterion_group!(benches, bench, bench_solvers);
 criterion_main!(benches);

@@ -71,6 +71,18 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
         (&["study", "--set", "contact_hertz=nan"], &["contact_hertz", "NaN"]),
         (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
+        (&["study", "--scenes="], &["--scenes: the list is empty"]),
+        (&["study", "--solvers", ""], &["--solvers: the list is empty"]),
+        (&["study", "--lanes="], &["--lanes: the list is empty"]),
+        (&["study", "--scenes", "arch,,stack"], &["--scenes: a value between the commas is empty"]),
+        (&["verify", "--cases="], &["--cases: the list is empty"]),
+        (&["run", "arch", "--lanes="], &["--lanes: the value is empty"]),
+        (&["study", "--sweep", "contact-herz=30"], &["'contact_herz'", "'contact_hertz'", "mass_ratio"]),
+        (&["study", "--sweep", "dt="], &["list of values of dt is empty"]),
+        (&["study", "--sweep", "dt=5 furlongs"], &["'furlongs'", "ms"]),
+        (&["study", "--solvers", "pgs", "--sweep", "contact-hertz=30"], &["pgs", "soft_step"]),
+        (&["study", "--scenes", "arch", "--sweep", "mass-ratio=10"], &["'arch'", "mass_ratio"]),
+        (&["study", "--scenes", "mass_ratio", "--sweep", "mass-ratio=0"], &["'0'", "1 to 10000"]),
         (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
         (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
         (
@@ -250,6 +262,45 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
     assert!(widest <= Some(160), "{answer}");
 }
 
+#[test]
+fn a_sweep_leaves_a_curve_per_solver() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("o");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("profiles.svg"), "of an earlier study").unwrap();
+    let args = ["--quick", "--scenes", "stack:3", "--solvers", "pgs,soft_step,tgs_soft", "--out", "o"];
+    let output = simpulse(folder.path(), &[&args[..], &["--sweep", "contact-hertz=60,15,30"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr), "left out, without contact_hertz: pgs\n");
+    let shown = text(&output.stdout);
+    let lines = shown.lines().filter(|line| line.starts_with("soft_step ") || line.starts_with("tgs_soft "));
+    assert_eq!(lines.count(), 2 * 3, "{shown}");
+
+    let files = entries(&out);
+    assert!(files.contains(&"sweep.svg".to_string()) && !files.contains(&"profiles.svg".to_string()));
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("--sweep contact_hertz=15,30,60") && page.contains("contact_hertz"), "{page}");
+    let study = StudyFile::read(&out).unwrap();
+    let values: Vec<f64> = study.records.iter().filter_map(|r| Some(r.swept?.value)).collect();
+    assert_eq!(values, [15.0, 15.0, 30.0, 30.0, 60.0, 60.0]);
+    // A softer contact gives way more.
+    let depth = |i: usize| study.records[i].errors.unwrap().penetration_max;
+    assert!(depth(0) > depth(2), "{} {}", depth(0), depth(2));
+
+    // The step changes, the duration does not.
+    let dt = ["study", "--scenes", "stack:2", "--solvers", "pgs", "--sweep", "dt=10ms,0.02", "--out", "dt"];
+    let output = simpulse(folder.path(), &dt);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let study = StudyFile::read(&folder.path().join("dt")).unwrap();
+    let runs: Vec<(f64, u64)> = study.records.iter().map(|r| (r.dt, r.errors.unwrap().steps)).collect();
+    assert_eq!(runs, [(0.01, 500), (0.02, 250)]);
+
+    // The same sweep again has the same errors.
+    let compared = simpulse(folder.path(), &["compare", "o", "o", "--json"]);
+    let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert_eq!(compared["pairs"].as_array().unwrap().len(), 6);
+}
+
 /// The header of a CSV file.
 fn header(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap().lines().next().unwrap().to_string()
@@ -384,7 +435,14 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
     let solvers = simpulse(folder.path(), &["solvers"]);
-    assert_eq!(text(&solvers.stdout).lines().count(), 1 + VARIANTS.len());
+    let (list, parameters) = text(&solvers.stdout).split_once("\n\n").unwrap();
+    assert_eq!(list.lines().count(), 1 + VARIANTS.len());
+    for parameter in VARIANTS.iter().flat_map(|v| v.parameters) {
+        assert!(
+            parameters.contains(parameter.name) && parameters.contains(parameter.meaning),
+            "{parameter:?}"
+        );
+    }
     let scenes = simpulse(folder.path(), &["scenes"]);
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 

@@ -5,13 +5,13 @@ use super::progress::Bar;
 use super::values::{self, Solvers, scene_help};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
-use crate::lab::advise::limits::{Limits, quantity};
+use crate::lab::advise::limits::Limits;
 use crate::lab::advise::{Advice, Plan, Setting, Trial, advise};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::{error_list, finish, table};
-use crate::lab::report::units::{self, digits, ratio, si, si_short};
+use crate::lab::report::units::{self, digits, quantity, ratio, si, si_short};
 use crate::lab::study::open_scene;
 use clap::Args;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 ///
 /// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
 /// of doublings first, then values in between. What should only cost more than something known is
-/// left out. The best few are raced again side by side, and the fastest of those that keep every
+/// left out. The best few are timed again in turns, and the fastest of those that keep every
 /// limit is printed with all its errors, with those that come next, and with the command that runs it.
 ///
 /// Exit code 0: there is one; 1: there is none, and the nearest is printed; 2: a request that
@@ -235,7 +235,7 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
     let mut text = String::new();
     if let Some(time) = trial.time {
         let value = format!("{} ± {} µs", digits(1e-3 * time.median_ns), digits(1e-3 * time.spread_ns));
-        let [repeats, steps] = advice.race;
+        let [repeats, steps] = advice.timing;
         text += &format!("  {:<36}{value:>12} ({repeats} × {steps} steps)\n", "time of a step, median");
     }
     if let Some(failure) = trial.failure {
@@ -252,7 +252,7 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
     text
 }
 
-/// Everything that was raced, a line each.
+/// Everything that was timed, a line each.
 fn finalists(advice: &Advice) -> String {
     let mut rows = table(&[
         "compared",
@@ -325,8 +325,8 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
         "environment": Environment::current(),
         "scene": plan.scene,
         "limits": plan.limits,
-        "repeats": advice.race[0],
-        "race_steps": advice.race[1],
+        "repeats": advice.timing[0],
+        "timing_steps": advice.timing[1],
         "steps": plan.steps,
         "seed": plan.seed,
         "best": advice.best().map(trial),

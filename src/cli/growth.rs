@@ -1,11 +1,12 @@
 //! `simpulse growth`: the cost of a contact from a thousand contacts to a million.
 
-use super::output::{print, print_json};
+use super::output::{note, print, print_json};
 use super::progress::Bar;
 use super::settled;
 use super::values::{Lanes, SettingArgs};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
+use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files;
 use crate::lab::profile::growth::{Entry, Measurement, measure, size_for, verdicts};
 use crate::lab::profile::growth_report;
@@ -14,6 +15,7 @@ use crate::lab::profile::records::growth_json;
 use crate::lab::profile::waiting;
 use crate::lab::report::units::lanes;
 use crate::lab::scenes::{CATALOG, MAX_BODIES, Scene, Size};
+use crate::lab::study::cost::sweeps;
 use crate::lab::study::{is_path, open_scene};
 use clap::Args;
 use std::path::PathBuf;
@@ -133,7 +135,7 @@ impl Family {
     }
 }
 
-/// Most contacts that can be asked for.
+/// Most contacts of a size.
 const MAX_CONTACTS: f64 = 1e8;
 
 /// Ascending, each once.
@@ -153,11 +155,22 @@ fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
     Ok(targets)
 }
 
-/// Bytes that the system can still give; none where it does not say.
-fn free_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    Some(1024.0 * line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()?)
+/// Contacts of a body in a pile of boxes, and memory of a world per contact (B).
+const CONTACTS_PER_BODY: f64 = 3.0;
+const BYTES_PER_CONTACT: f64 = 1250.0;
+
+/// Steps that one timing run of a size comes to, with bringing the state back.
+const STEPS_PER_REPEAT: u32 = 4;
+
+/// What all sizes take together. What is too large for the memory is left out one by one, with a word.
+fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate {
+    let possible = |target: &&f64| **target <= CONTACTS_PER_BODY * MAX_BODIES as f64;
+    let contacts: f64 = targets.iter().filter(possible).sum();
+    let sweeps = sweeps(&settings.budget, settings.solver);
+    let bodies = (contacts / CONTACTS_PER_BODY) as usize;
+    let steps = args.settle.saturating_add(args.repeats.saturating_mul(STEPS_PER_REPEAT));
+    let seconds = f64::from(steps) * estimate::step(bodies, sweeps, settings.width.lanes());
+    Estimate { seconds, bytes: contacts * BYTES_PER_CONTACT }
 }
 
 /// Runs the command.
@@ -175,6 +188,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         named(&args.scene)?;
     }
     let family = Family::new(&args.scene, &settings, args.settle)?;
+    let estimate = estimate(&targets, args, &settings);
+    note(&estimate.note("growth", None)?);
     files::prepare_folder(&args.out)?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut notes = String::new();

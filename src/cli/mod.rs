@@ -30,9 +30,11 @@ use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{CATALOG, SCHEMA};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
+use crate::lab::units::{bodies, si};
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
 use output::{note, print, print_json};
 use serde_json::{Value, json};
@@ -50,7 +52,8 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            note(&format!("error: {}\n", one_line(&error.to_string())));
+            let message = empty(&error).unwrap_or_else(|| error.to_string());
+            note(&format!("error: {}\n", one_line(&message)));
             return ExitCode::from(2);
         }
     };
@@ -88,6 +91,25 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Columns(args)) => columns(&args),
         Some(Command::Completions(args)) => completions(&args),
     }
+}
+
+/// What to say about an option without a value: clap has several messages, and one of them is
+/// about the value ''.
+fn empty(error: &clap::Error) -> Option<String> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let argument = text(ContextKind::InvalidArg).filter(|_| text(ContextKind::InvalidValue) == Some(""))?;
+    let (name, value) = argument.split_once(' ').unwrap_or((argument, ""));
+    let given: Vec<_> = std::env::args().collect();
+    let all =
+        given.contains(&format!("{name}=")) || given.windows(2).any(|w| w[0] == name && w[1].is_empty());
+    Some(match (value.contains('…'), all) {
+        (true, true) => format!("{name}: the list is empty"),
+        (true, false) => format!("{name}: a value between the commas is empty"),
+        (false, _) => format!("{name}: the value is empty"),
+    })
 }
 
 /// A message without its own prefix and without advice on usage, on one line.
@@ -139,10 +161,30 @@ fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
     let line = |v: &&Variant| {
         let standard = budget::brief(&v.budget, v);
         let star = if is_default(v) { "*" } else { " " };
-        format!("{star} {:<width$}  {} [{}; standard {standard}]\n", v.name, v.summary, v.source)
+        let own: String = v.parameters.iter().map(|p| format!("; {}={}", p.name, p.default)).collect();
+        format!("{star} {:<width$}  {} [{}; standard {standard}{own}]\n", v.name, v.summary, v.source)
     };
     let lines: String = VARIANTS.iter().map(line).collect();
-    print(&format!("* in the default study; --solvers all runs every solver\n{lines}"))
+    print(&format!("* in the default study; --solvers all runs every solver\n{lines}\n{}", parameters()))
+}
+
+/// What `--set` and `--sweep` take: each parameter with its range and what it does, where solvers differ in
+/// that, several times.
+fn parameters() -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for p in VARIANTS.iter().flat_map(|v| v.parameters) {
+        let [low, high] = p.range;
+        let range = format!("{low} to {high} {}", p.unit);
+        let line = format!("  {:<16}  {:<22}  {}\n", p.name, range.trim_end(), p.meaning);
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
+    }
+    lines.sort();
+    format!(
+        "Parameters (--set NAME=VALUE; study --sweep NAME=VALUE,VALUE,…) with their ranges\n{}",
+        lines.concat()
+    )
 }
 
 fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
@@ -170,38 +212,47 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
         Some(name) if !args.schema => name,
         _ => return Ok(SCHEMA.to_string()),
     };
-    let loaded = open_scene(name, args.seed, None, None)?;
-    let scene = loaded.scene;
-    if args.json {
-        return Ok(scene.to_json());
+    let scene = match args.json || is_path(name) {
+        true => open_scene(name, args.seed, None, None)?,
+        false => return Ok(described(&scenes::describe(name, args.seed)?)),
+    };
+    match args.json {
+        true => Ok(scene.scene.to_json()),
+        false => Ok(described(&Description::of(&scene))),
     }
+}
+
+/// A scene in words.
+fn described(scene: &Description) -> String {
     let [gx, gy] = scene.gravity;
     let mut text = format!(
-        "{}: {} bodies, {} steps of {} s, gravity ({gx}, {gy})\n",
+        "{}: {}, {} steps of {}, gravity ({gx}, {gy}) m/s²\n",
         scene.name,
-        scene.bodies.len(),
+        bodies(scene.bodies),
         scene.steps,
-        scene.dt
+        si(scene.dt, "s")
     );
-    if let Some(truth) = &loaded.truth {
-        text += &format!("reference value: {} = {} {}\n", truth.quantity, truth.expected, truth.unit);
+    if let Some((quantity, expected, unit)) = scene.reference {
+        text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
     }
     text += "holds if nothing blows up and no body passes through a static one";
-    for demand in loaded.demands {
+    for demand in scene.demands {
         text += &format!("; {}", demand.meaning());
     }
     text += "\ntolerances\n";
-    let (own, unit) = (loaded.tolerances, loaded.truth.as_ref().map_or("", |t| t.unit));
+    let own = scene.tolerances;
+    let unit = scene.reference.map_or("", |(_, _, unit)| unit);
     let lines = [
         ("penetration", Some((own.penetration, "m"))),
-        ("residual", Some((own.residual, "body weights"))),
+        ("residual", Some((own.residual, ""))),
         ("reference", own.truth.map(|t| (t, unit))),
     ];
     for (name, line) in lines {
         let Some((Tolerance { value, reason }, unit)) = line else { continue };
-        text += &format!("  {name:<12} {:>10.4} {unit}: {reason}\n", value);
+        let value = if unit.is_empty() { format!("{value} body weights") } else { si(value, unit) };
+        text += &format!("  {name:<12} {value}: {reason}\n");
     }
-    Ok(text)
+    text
 }
 
 /// Runs `steps` steps; the errors of the last `observed` of them, none without steps.

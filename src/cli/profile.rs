@@ -83,7 +83,7 @@ const OBSERVED_STEPS: u32 = 10;
 /// Longest measurement (s).
 const MAX_SECONDS: f64 = 86_400.0;
 
-/// Names of all phases, as they are asked for.
+/// Names of all phases, as `--phase` takes them.
 fn names(phases: impl Iterator<Item = Phase>) -> String {
     phases.map(key).chain(["all".to_string()]).collect::<Vec<_>>().join(", ")
 }

@@ -25,7 +25,7 @@ pub struct ReplayArgs {
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Page to write
-    #[arg(short, long, value_name = "FILE.html", default_value = "replay.html")]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.html", default_value = "replay.html")]
     pub output: PathBuf,
 }
 

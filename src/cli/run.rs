@@ -7,6 +7,7 @@ use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
+use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
@@ -15,9 +16,10 @@ use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{digits, lanes, ratio, si};
+use crate::lab::report::units::{bodies, digits, lanes, ratio, si};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Watch};
+use crate::lab::study::cost::sweeps;
 use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
@@ -91,7 +93,7 @@ struct Found {
     broken: Option<Broken>,
 }
 
-/// Runs the scene that was asked for; writes its files once all of it has run.
+/// Runs the scene; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = settings(&args.setting, args.order, args.lanes)?;
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
@@ -116,6 +118,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
+    note(&estimate(scene, &settings).note("run", free_memory())?);
     let mut world = scene.build(settings)?;
     let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
     let mut contacts =
@@ -193,6 +196,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
+/// What the run will take: each step is timed and its errors are measured.
+fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
+    let bodies = scene.bodies.len();
+    let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
+    let seconds = f64::from(scene.steps) * (step + estimate::errors(bodies));
+    Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
+}
+
 /// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
 /// lanes.
 pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
@@ -217,6 +228,20 @@ pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -
 
 impl Found {
     /// The eight figures that people act on, by what they say.
+    ///
+    /// | figure | what one does about it |
+    /// |---|---|
+    /// | time of a step | whether the budget can be afforded at all |
+    /// | longest phase | whether fewer sweeps, more lanes or another broad phase would help |
+    /// | greatest penetration | more substeps or stiffer contacts: it is what is seen |
+    /// | contact-law residual | more sweeps: loads and friction are as good as this |
+    /// | distance to reference value | another solver: a small residual of the wrong law is wrong, too |
+    /// | holds | nothing else counts where it does not |
+    /// | residual speed | whether bodies can be put to sleep, or jitter |
+    /// | energy change | damping: gained energy ends in an explosion, lost energy looks like syrup |
+    ///
+    /// All others (mean and percentiles of penetration, parts of the residual, momentum, creep, counts)
+    /// explain one of these, and are for those who look for a cause: `--all`.
     fn figures(&self) -> String {
         let e = &self.errors;
         let line = |name: &str, value: String, note: String| {
@@ -302,9 +327,9 @@ fn how(s: &Settings) -> String {
 fn head(world: &World, scene: &Scene) -> String {
     let s = &world.settings;
     format!(
-        "{}: {} bodies, {} steps of {} · {}, {}\n\n",
+        "{}: {}, {} steps of {} · {}, {}\n\n",
         scene.name,
-        scene.bodies.len(),
+        bodies(scene.bodies.len()),
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,

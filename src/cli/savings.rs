@@ -11,6 +11,7 @@ use crate::lab::report::savings::savings_table;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::savings::savings;
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -31,6 +32,7 @@ pub struct SavingsArgs {
         long,
         value_delimiter = ',',
         value_name = "SCENE,…",
+        value_parser = NonEmptyStringValueParser::new(),
         default_value = "card_house,pyramid:40,circle_pile:500"
     )]
     pub scenes: Vec<String>,

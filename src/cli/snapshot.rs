@@ -6,7 +6,7 @@ use super::values::{self, SettingArgs, scene_help};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
-use crate::lab::files;
+use crate::lab::files::{self, is_standard_output};
 use crate::lab::metrics::overlaps::Overlaps;
 use crate::lab::picture::draw::{WIDTHS, draw};
 use crate::lab::picture::frame::{Frame, Stage};
@@ -34,8 +34,8 @@ pub struct SnapshotArgs {
     /// The step after which the frame is taken; 0 is the start
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub step: u32,
-    /// File to write: .svg or .png
-    #[arg(short, long, value_name = "FILE")]
+    /// File to write: .svg or .png; `-` is standard output, as SVG
+    #[arg(short, long = "out", alias = "output", value_name = "FILE")]
     pub output: PathBuf,
     /// Width of the picture in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
@@ -57,12 +57,15 @@ pub struct SnapshotArgs {
     pub seed: Option<u64>,
 }
 
-/// What a file name asks for.
+/// The format that a file name means.
 fn encoder(path: &Path) -> Result<fn(&Picture) -> Vec<u8>, Error> {
+    if is_standard_output(path) {
+        return Ok(|picture| svg::svg(picture).into_bytes());
+    }
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("svg") => Ok(|picture| svg::svg(picture).into_bytes()),
         Some("png") => Ok(|picture| png::png(picture.size, &raster::pixels(picture))),
-        _ => Err(Error::invalid("output", format!("'{}' ends neither in .svg nor in .png", path.display()))),
+        _ => Err(Error::invalid("--out", format!("'{}' ends neither in .svg nor in .png", path.display()))),
     }
 }
 

@@ -4,18 +4,22 @@ use super::interrupt::on_interrupt;
 use super::output::{note, print};
 use super::progress::Bar;
 use super::values::{self, Solvers};
-use crate::engine::lanes::LaneWidth;
+use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
-use crate::lab::advise::limits::quantity;
 use crate::lab::error::Error;
+use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::Override;
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer, html};
+use crate::lab::report::{self, answer, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
+use crate::lab::study::sweep::Sweep;
 use crate::lab::study::{self, Record, StudyPlan, telling};
+use crate::lab::units::quantity;
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -25,18 +29,22 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub const EXAMPLES: &str = "\
 Without any budget option, each solver runs at half its standard budget, at that budget,
 and at its double. With some, every combination runs; what a solver ignores is left out.
+A sweep runs at each solver's standard budget, in coloured order at the widest native lanes,
+unless other options say so.
 
 Examples:
   simpulse study --quick
   simpulse study --solvers all --out results/all
   simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
+  simpulse study --scenes stack:10,arch --sweep contact-hertz=15,30,60 --out results/hertz
+  simpulse study --scenes mass_ratio --sweep mass-ratio=1,10,100,1000 --out results/ratio
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
     /// Scenes
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", help = values::scenes_help())]
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = NonEmptyStringValueParser::new(), help = values::scenes_help())]
     pub scenes: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -63,9 +71,15 @@ pub struct StudyArgs {
     /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
+    /// A curve per solver: one quantity takes several values and everything else stays as it is. It is a
+    /// parameter of solvers (contact-hertz), substeps, iterations (velocity sweeps; position sweeps of solvers
+    /// without), velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every
+    /// shape), or mass-ratio (scene mass_ratio)
+    #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
+    pub sweep: Option<Sweep>,
     /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,reference=0.1
     /// (`simpulse scene NAME` lists them; the reference value's in its own unit)
-    #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…")]
+    #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
@@ -94,9 +108,13 @@ pub struct StudyArgs {
 }
 
 impl StudyArgs {
-    /// The plan that was asked for. Errors: unknown names, widths that do not exist.
+    /// The plan of these arguments. Errors: unknown names, widths that do not exist.
     pub fn plan(&self) -> Result<StudyPlan, Error> {
-        let base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
+        let mut base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
+        if self.sweep.is_some() {
+            // A curve per solver.
+            (base.widths, base.orders) = (vec![native_width()], vec![Order::Colored]);
+        }
         let or = |given: &[String], own: Vec<String>| if given.is_empty() { own } else { unique(given) };
         Ok(StudyPlan {
             scenes: or(&self.scenes, base.scenes),
@@ -110,6 +128,7 @@ impl StudyArgs {
                 position_iterations: self.position_iterations.clone(),
             },
             overrides: self.set.clone(),
+            sweep: self.sweep.clone(),
             tolerances: tolerances(&self.tolerance)?,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
@@ -187,14 +206,20 @@ impl Shard {
 /// Runs the command.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let mut plan = args.plan()?;
+    let without = match plan.sweep.clone() {
+        Some(sweep) => keep_concerned(&sweep, &mut plan.solvers),
+        None => String::new(),
+    };
     let mut elsewhere = Vec::new();
     if let Some(shard) = args.shard {
         (plan.scenes, elsewhere) = shard.split(plan.scenes)?;
     }
     plan.check()?;
+    let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     html::write_recordings(&args.out, &[])?;
+    note(&(without + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
         let (plan, out, finished, elsewhere) =
@@ -222,9 +247,28 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     print(&text(&study, plan.steps, &args.out, &paths, args.verbose))
 }
 
-/// The answer, and where the files are.
+/// Leaves out solvers that do not have the swept quantity, and says so.
+fn keep_concerned(sweep: &Sweep, solvers: &mut Vec<&'static Variant>) -> String {
+    let (own, others): (Vec<_>, Vec<_>) = solvers.iter().copied().partition(|v| sweep.concerns(v));
+    if own.is_empty() {
+        // The check names those that have it.
+        return String::new();
+    }
+    *solvers = own;
+    let names: Vec<&str> = others.iter().map(|v| v.name).collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!("left out, without {}: {}\n", sweep.name, names.join(", ")),
+    }
+}
+
+/// The answer, or the curves of a sweep, and where the files are.
 pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
-    let mut text = study.caution() + &answer::text(&study.records, &study.environment, steps);
+    let answer = match sweep::is_sweep(&study.records) {
+        true => sweep::text(&study.records, &study.environment),
+        false => answer::text(&study.records, &study.environment, steps),
+    };
+    let mut text = study.caution() + &answer;
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &format!("\nwrote {} in {}\n", names.join(", "), out.display());

@@ -5,10 +5,12 @@ use super::progress::Bar;
 use super::values::{self, Solvers};
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
+use crate::lab::estimate::Estimate;
 use crate::lab::verify::{
     self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Required, Sweep, SweepRow,
 };
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -32,7 +34,7 @@ Examples:
   simpulse verify --list")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "ID,…")]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new())]
     pub cases: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -59,6 +61,8 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     }
     let solvers = args.solvers.chosen();
     let note = values::left_out(&solvers);
+    let seconds = SECONDS_PER_CASE * (cases.len() * solvers.len()) as f64 / f64::from(args.threads);
+    output::note(&Estimate { seconds, bytes: 0.0 }.time_note("verify"));
     let bar = Bar::new();
     let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
     let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &tell);
@@ -69,6 +73,9 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     }
     print(&(text(&matrix) + &note + &verdict(&matrix)), exit_code(&matrix))
 }
+
+/// Mean time of a case on one Zen 5 core (s).
+const SECONDS_PER_CASE: f64 = 0.25;
 
 /// 1 if the default solver ran and broke a promise.
 fn exit_code(matrix: &Matrix) -> ExitCode {

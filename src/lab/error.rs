@@ -116,8 +116,9 @@ impl Error {
 
     /// An unknown `name`, with the nearest of `known` as the suggestion.
     pub fn unknown<'a>(kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Self {
-        // Of a long name all of the message is the name.
-        let known: Vec<&str> = known.filter(|_| name.len() <= LONGEST_MISSPELT).collect();
+        // Of a name that is long as it is shown all of the message is the name.
+        let is_short = name.len() <= LONGEST_MISSPELT && plain(name).len() <= LONGEST_MISSPELT;
+        let known: Vec<&str> = known.filter(|_| is_short).collect();
         let nearest = known
             .iter()
             .map(|&k| (strsim::damerau_levenshtein(k, name), k))
@@ -154,6 +155,10 @@ mod tests {
         assert!(
             Error::unknown("scene", &"a".repeat(30_000_000), ["arch"].into_iter()).to_string().len() < 500
         );
+        // Escapes make a short name long.
+        let names = ["a name of twenty-one c"; 20].into_iter();
+        let message = Error::unknown("scene", &"\u{12}".repeat(60), names).to_string();
+        assert!(message.len() < 400, "{}", message.len());
         let message = Error::unknown("scene", "no\nsuch", ["arch"].into_iter()).to_string();
         assert_eq!(message, "unknown scene 'no\\nsuch' [arch]");
     }

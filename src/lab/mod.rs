@@ -3,14 +3,15 @@
 //! Floors, each importing from those before it only:
 //!
 //! ```text
-//! error  files  overrides        what can go wrong; result files; parameters by name
-//! units                          numbers for people
+//! error                          what can go wrong
+//! files  overrides  interned     result files; parameters by name; names read from files
+//! units  estimate                numbers for people; what a run will take
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! recording                      whole runs in a file, and the page that plays them
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
-//! profile                        phases against the roofline; cost by size
+//! profile  compare               phases against the roofline, cost by size; two studies side by side
 //! ```
 
 pub mod advise;
@@ -18,6 +19,7 @@ pub mod capture;
 pub mod compare;
 pub mod converge;
 pub mod error;
+pub mod estimate;
 pub mod files;
 pub mod interned;
 pub mod metrics;

@@ -1,6 +1,7 @@
-//! Numbers for people: three digits, with the prefix that fits.
+//! Numbers for people, three digits with the prefix that fits, and numbers from people.
 
 use crate::engine::lanes::native_width;
+use crate::lab::error::Error;
 
 /// `value` of a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
 pub fn si(value: f64, unit: &str) -> String {
@@ -44,17 +45,68 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// So many of something: `1 scene`, `2 scenes`.
+pub fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// `1 body`, `2 bodies`.
+pub fn bodies(number: usize) -> String {
+    if number == 1 { "1 body".to_string() } else { format!("{number} bodies") }
+}
+
 /// A lane width in words: `1 lane`, `8 lanes`, `16 lanes, emulated` where the build has no
 /// instructions that wide.
-pub fn lanes(count: usize) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    let emulated = if is_emulated(count) { ", emulated" } else { "" };
-    format!("{count} lane{plural}{emulated}")
+pub fn lanes(lanes: usize) -> String {
+    let emulated = if is_emulated(lanes) { ", emulated" } else { "" };
+    count(lanes, "lane") + emulated
 }
 
 /// Whether lanes of this width are wider than what this build has instructions for.
 pub fn is_emulated(lanes: usize) -> bool {
     lanes > native_width().lanes()
+}
+
+const LENGTHS: [(&str, f64); 7] =
+    [("nm", 1e-9), ("um", 1e-6), ("µm", 1e-6), ("μm", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+
+const TIMES: [(&str, f64); 6] =
+    [("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("μs", 1e-6), ("ms", 1e-3), ("s", 1.0)];
+
+/// A value of the option `option` in `unit`: lengths (`m`) and times (`s`) need one of their
+/// units behind the number, other quantities may have just their own.
+///
+/// Errors: what is no number ≥ 0, or has another unit.
+pub fn quantity(option: &str, text: &str, unit: &str) -> Result<f64, Error> {
+    let refused = |why: String| Err(Error::invalid(option, format!("'{text}' {why}")));
+    let own = [(unit, 1.0), ("", 1.0)];
+    let units: &[(&str, f64)] = match unit {
+        "m" => &LENGTHS,
+        "s" => &TIMES,
+        _ => &own,
+    };
+    let text = text.trim();
+    // What may stand in a number ends at the first letter that is not an exponent.
+    let is_number = |part: &str| part.trim().parse::<f64>().is_ok();
+    let Some(split) = (1..=text.len()).rev().find(|&i| text.is_char_boundary(i) && is_number(&text[..i]))
+    else {
+        return refused("is not a number with a unit".to_string());
+    };
+    let (number, given) = (text[..split].trim(), text[split..].trim());
+    let Some((_, factor)) = units.iter().find(|(name, _)| *name == given) else {
+        let known: Vec<&str> = units.iter().map(|u| u.0).filter(|u| !u.is_empty()).collect();
+        let which =
+            if given.is_empty() { "has no unit".to_string() } else { format!("has the unit '{given}'") };
+        return refused(match known[..] {
+            [] => format!("{which}, but needs none"),
+            [only] => format!("{which}, but needs {only}"),
+            _ => format!("{which}, but needs one of {}", known.join(", ")),
+        });
+    };
+    match number.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value * factor),
+        _ => refused("must be a finite number that is not negative".to_string()),
+    }
 }
 
 #[cfg(test)]
@@ -90,5 +142,39 @@ mod tests {
     #[test]
     fn three_digits() {
         assert_eq!([9.999, 99.97, 0.1234, 1234.5].map(digits), ["10.0", "100", "0.12", "1234"]);
+    }
+
+    #[test]
+    fn units_are_read() {
+        let length = |text| quantity("x", text, "m").unwrap();
+        assert_eq!(
+            [length("1mm"), length("250 um"), length("2e-3m"), length("1.5cm")],
+            [1e-3, 250.0 * 1e-6, 2e-3, 0.015]
+        );
+        assert_eq!([length("3µm"), length("3μm"), length("0nm")], [3.0 * 1e-6, 3.0 * 1e-6, 0.0]);
+        assert_eq!(quantity("x", "500us", "s").unwrap(), 500.0 * 1e-6);
+        assert_eq!(quantity("x", "1e-3", "").unwrap(), 1e-3);
+        assert_eq!([quantity("x", "5", "N").unwrap(), quantity("x", "5 N", "N").unwrap()], [5.0, 5.0]);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_named() {
+        let message = |text, unit| quantity("max-x", text, unit).unwrap_err().to_string();
+        for (text, unit, part) in [
+            ("5", "m", "'5' has no unit, but needs one of nm, um"),
+            ("5parsec", "m", "'parsec'"),
+            ("5us", "m", "'us'"),
+            ("1mm", "s", "'mm'"),
+            ("-1mm", "m", "'-1mm'"),
+            ("infm", "m", "'infm'"),
+            ("nan", "", "'nan'"),
+            ("mm", "m", "'mm' is not a number"),
+            ("", "m", "''"),
+            ("1%", "", "'%', but needs none"),
+            ("5 m", "N", "'m', but needs N"),
+        ] {
+            let text = message(text, unit);
+            assert!(text.starts_with("max-x: ") && text.contains(part), "{text} / {part}");
+        }
     }
 }

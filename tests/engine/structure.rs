@@ -79,7 +79,7 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "interned", "overrides", "units"],
+    &["estimate", "files", "interned", "overrides", "units"],
     &["metrics", "reference"],
     &["scenes", "capture", "picture"],
     &["recording"],

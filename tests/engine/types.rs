@@ -43,6 +43,10 @@ impl ConstraintType for Rods {
             LaneWidth::W16 => self.at::<wide::f32x16>(on),
         }
     }
+
+    fn boxed(&self) -> Box<dyn ConstraintType> {
+        Box::new(Rods { ends: self.ends.clone(), state: self.state.clone(), seen: self.seen.clone() })
+    }
 }
 
 impl Rods {
@@ -180,4 +184,22 @@ fn rods_are_in_the_passes_and_colours_of_the_contacts() {
     for (phase, rods) in expected {
         assert_eq!(of(phase), rods, "{phase:?}");
     }
+}
+
+#[test]
+fn a_held_world_brings_back_what_rods_keep() {
+    let (mut held, _) = chain(find("soft_step").unwrap(), LaneWidth::W8, Order::Colored);
+    let (mut free, _) = chain(find("soft_step").unwrap(), LaneWidth::W8, Order::Colored);
+    run(&mut held, 10);
+    run(&mut free, 10);
+    let mut still = held.hold();
+    for phase in [Phase::Prepare, Phase::WarmStart, Phase::Solve, Phase::Store] {
+        still.repeat(phase, 7);
+        still.reset(phase);
+    }
+    still.step(false);
+    drop(still);
+    run(&mut held, 10);
+    run(&mut free, 10);
+    assert_eq!(held.state_hash(), free.state_hash());
 }

@@ -9,7 +9,6 @@ use simpulse::engine::constraints::motion::{Integrator, RotationUpdate};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::{Order, Settings, World};
-use simpulse::lab::advise::limits;
 use simpulse::lab::capture::capture;
 use simpulse::lab::converge::{self, Options};
 use simpulse::lab::error::Error;
@@ -18,6 +17,7 @@ use simpulse::lab::overrides::{self, Override};
 use simpulse::lab::reference::certify::reference;
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::scenes::{self, Scene};
+use simpulse::lab::units;
 use std::path::Path;
 
 /// Scenes of more shapes are read, but not run: all of them may touch all others.
@@ -183,7 +183,7 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
 pub fn word(input: &[u8], salt: u64) -> Result<String, String> {
     let text = String::from_utf8_lossy(input);
     let unit = bytes::one(&mut Random::seed_from_u64(salt), &["m", "s", "N", "", "m/s"]);
-    let number = limits::quantity("max", &text, unit);
+    let number = units::quantity("max", &text, unit);
     let set = text.parse::<Override>().and_then(|given| overrides::check(&VARIANTS, &[given]));
     let size = text.split_once(':').and_then(|(_, size)| size.parse::<u32>().ok());
     // Large scenes are slow to make.

@@ -50,7 +50,7 @@ fn what_is_recommended_keeps_the_limits_when_it_is_run_again() {
     let times: Vec<f64> =
         advice.finalists.iter().filter(|t| t.is_good()).map(|t| t.time.unwrap().median_ns).collect();
     assert!(times.is_sorted(), "{times:?}");
-    // Both solvers can do it, so both are raced.
+    // Both solvers can do it, so both are timed.
     let solvers = |t: &Trial| t.setting.solver.name;
     for name in ["pgs", "soft_step"] {
         assert!(advice.finalists.iter().any(|t| solvers(t) == name), "{name}");

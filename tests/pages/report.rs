@@ -33,43 +33,75 @@ fn the_page_is_made_again_from_the_records() {
     refused(path, &["report", "r"], &["study.json"]);
 }
 
+/// Texts that reach out of their plot, and pairs of axis labels that touch.
+const TEXTS: &str = r#"
+    const plots = [...document.querySelectorAll("svg[role=img]")];
+    const outside = [], touching = [];
+    for (const svg of plots) {
+        const [, , w, h] = svg.getAttribute("viewBox").split(" ").map(Number);
+        for (const text of svg.querySelectorAll("text")) {
+            if (text.getAttribute("transform") || text.classList.contains("dot-name")) continue;
+            const b = text.getBBox();
+            if (b.x < -1 || b.y < -1 || b.x + b.width > w + 1 || b.y + b.height > h + 1) outside.push(text.textContent);
+        }
+        const labels = [...svg.querySelectorAll("text.x")].map((t) => [t.getBBox(), t.textContent]);
+        for (const [i, [a, one]] of labels.entries()) for (const [b, other] of labels.slice(i + 1)) {
+            if (Math.abs(a.y - b.y) < 8 && a.x < b.x + b.width && b.x < a.x + a.width) touching.push(one + "|" + other);
+        }
+    }
+"#;
+
+#[test]
+fn the_page_of_a_sweep_is_whole_in_a_browser() {
+    let Some(browser) = or_skip("the_page_of_a_sweep_is_whole_in_a_browser") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = ["study", "--quick", "--scenes", "stack:12,mass_ratio", "--sweep", "substeps=1,2,4,8,16"];
+    succeeds(folder.path(), &[&sweep[..], &["--out", "r"]].concat());
+    let page = folder.path().join("r/report.html");
+    let script = format!(
+        r#"{TEXTS}
+        return {{
+            plots: plots.length, outside, touching, curves: document.querySelectorAll("svg .curve").length,
+            wide: document.body.scrollWidth - document.body.clientWidth,
+        }};"#
+    );
+    let found = drive(&browser, &page, "", &script);
+    for name in ["errors", "outside", "touching"] {
+        assert_eq!(found[name], serde_json::json!([]), "{name}: {found}");
+    }
+    // Time and three errors on two scenes, a curve or two for most of seven solvers.
+    assert_eq!((found["plots"].as_u64(), found["wide"].as_i64()), (Some(2 * 4), Some(0)), "{found}");
+    assert!(found["curves"].as_u64().unwrap() >= 8 * 5, "{found}");
+}
+
 #[test]
 fn the_page_is_whole_in_a_browser() {
     let Some(browser) = or_skip("the_page_is_whole_in_a_browser") else { return };
     let folder = tempfile::tempdir().unwrap();
     study(folder.path());
     let page = folder.path().join("r/report.html");
-    let found = drive(
-        &browser,
-        &page,
-        "",
-        r#"
-        const plots = [...document.querySelectorAll("svg[role=img]")];
-        const outside = [];
-        for (const svg of plots) {
-            const [, , w, h] = svg.getAttribute("viewBox").split(" ").map(Number);
-            for (const text of svg.querySelectorAll("text")) {
-                if (text.getAttribute("transform") || text.classList.contains("dot-name")) continue;
-                const b = text.getBBox();
-                if (b.x < -1 || b.y < -1 || b.x + b.width > w + 1 || b.y + b.height > h + 1) outside.push(text.textContent);
-            }
-        }
+    let script = format!(
+        r#"{TEXTS}
         const player = document.querySelector(".replay").player;
         player.seek(0);
         player.step(5);
-        return {
-            plots: plots.length, outside, empty: plots.filter((s) => s.getBoundingClientRect().height < 40).length,
+        return {{
+            plots: plots.length, outside, touching, empty: plots.filter((s) => s.getBoundingClientRect().height < 40).length,
             titles: document.querySelectorAll("svg title").length,
             links: [...document.querySelectorAll("nav a, th a")].filter((a) => !document.querySelector(a.getAttribute("href"))).length,
             wide: document.body.scrollWidth - document.body.clientWidth,
             time: player.state.time, tick: player.tick,
-        };
-        "#,
+        }};"#
     );
+    let found = drive(&browser, &page, "", &script);
     assert_eq!(found["errors"], serde_json::json!([]), "{found}");
-    for (name, value) in
-        [("outside", serde_json::json!([])), ("empty", 0.into()), ("links", 0.into()), ("wide", 0.into())]
-    {
+    for (name, value) in [
+        ("outside", serde_json::json!([])),
+        ("touching", serde_json::json!([])),
+        ("empty", 0.into()),
+        ("links", 0.into()),
+        ("wide", 0.into()),
+    ] {
         assert_eq!(found[name], value, "{name}: {found}");
     }
     // One over all, three or two by scene, three profiles, two of lanes, phases, two of iterations.

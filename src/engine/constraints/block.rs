@@ -33,12 +33,12 @@
 //! by the new ones, so that the cone holds and what slides feels the load of now.
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::NormalRule;
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
-    over_moving_segments, spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
+    spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
@@ -97,7 +97,7 @@ fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, W: RowOrder>(
     batches: &mut Batches,
     rule: R,
 ) {
-    over_moving_segments!(segment, L, N, R, W; rows, batches, rule);
+    over_segments!(segment, L, N, R, W; rows, batches, rule);
 }
 
 /// Velocities of a contact while its rows are solved, and what they have applied.
@@ -144,10 +144,11 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
     rule: R,
 ) {
     let layout = const { Layout::of::<N, O>() };
+    let pushes_a = segment.pushes_a();
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut progress = Progress { along_t, w: [a[W], b[W]], sum: [L::zero(); 2] };
@@ -168,7 +169,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             old[p] = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
-            [constant[p], slope[p]] = rule.line(!O::MOVES, separation, mass, old[p]);
+            [constant[p], slope[p]] = rule.line(!pushes_a, separation, mass, old[p]);
             v[p] = with_arms::<L, N, O>(along_n, progress.w, arm[p]);
         }
         let mut coupling = L::zero();
@@ -176,7 +177,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
             coupling = mass_sum;
             if N::ROTATION {
                 coupling = (inertia[1] * arm[0][1]).mul_add(arm[1][1], coupling);
-                if O::MOVES {
+                if O::HAS_ROW {
                     coupling = (inertia[0] * arm[0][0]).mul_add(arm[1][0], coupling);
                 }
             }
@@ -192,7 +193,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
             friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
         }
         apply::<L, O>(&mut a, &mut b, n, progress.sum, progress.w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
     });
 }
 

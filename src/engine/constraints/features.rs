@@ -72,41 +72,31 @@ impl<const R: bool, const F: bool, const P: usize> KernelFeatures for Kernel<R, 
 pub trait Opposite: Copy + 'static {
     /// Body a has a velocity and a motion: its row is gathered.
     const HAS_ROW: bool;
-    /// Body a answers to impulses: its row is written back.
-    const MOVES: bool;
 }
 
-/// A dynamic body.
+/// A body that moves. Whether impulses change that is known per segment ([`OppositeKind`]): a dynamic
+/// body's row is written back, a kinematic one's, with inverse masses of zero, is not.
 #[derive(Clone, Copy, Debug)]
-pub struct OnDynamic;
-/// A kinematic body: it moves, but no impulse changes that.
-#[derive(Clone, Copy, Debug)]
-pub struct OnKinematic;
-/// A static body: no row is read or written for it.
+pub struct OnMoving;
+/// A static body.
 #[derive(Clone, Copy, Debug)]
 pub struct OnStatic;
 
-impl Opposite for OnDynamic {
+impl Opposite for OnMoving {
     const HAS_ROW: bool = true;
-    const MOVES: bool = true;
-}
-impl Opposite for OnKinematic {
-    const HAS_ROW: bool = true;
-    const MOVES: bool = false;
 }
 impl Opposite for OnStatic {
     const HAS_ROW: bool = false;
-    const MOVES: bool = false;
 }
 
 /// [`Opposite`] as a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OppositeKind {
-    /// [`OnDynamic`]
+    /// A dynamic body: impulses change its velocity.
     Dynamic,
-    /// [`OnKinematic`]
+    /// A kinematic body: it moves, but no impulse changes that.
     Kinematic,
-    /// [`OnStatic`]
+    /// A static body: no row is read or written for it.
     Static,
 }
 

@@ -6,23 +6,23 @@
 //! width; in exact arithmetic no order matters. The kernel is that of [`super::sweep`], given a store
 //! of rows that reads from one place and adds up in another.
 
-use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, OppositeKind};
-use super::pass::{AnyPass, Pass, PassInput, PerLane};
-use super::rules::{Relaxed, Rigid, Rule, Soft};
-use super::sweep::{INV_MASS, NormalRule, Sweep, VX, VY, W, over_segments, sweep_segment};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind};
+use super::pass::{Pass, PassInput, PerLane};
+use super::rules::{Relaxed, Soft};
+use super::sweep::{INV_MASS, VX, VY, W, over_segments, sweep_segment};
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
-/// A Jacobi sweep under a rule.
+/// A Jacobi sweep under the soft rule, which without springs is the rigid one.
 #[derive(Clone, Copy, Debug)]
-struct JacobiSweep<R> {
-    rule: R,
-    relaxation: f32,
+pub(super) struct JacobiSweep {
+    pub(super) rule: Soft,
+    pub(super) relaxation: f32,
 }
 
-impl<R: NormalRule> Pass for JacobiSweep<R> {
+impl Pass for JacobiSweep {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         // Both bodies once for their velocities and once for their sums.
-        let sweep = PerLane::of_sweep(layout, R::FRICTION, opposite);
+        let sweep = PerLane::of_sweep(layout, true, opposite);
         PerLane { rows: sweep.rows + sweep.halves, ..sweep }
     }
 
@@ -30,34 +30,7 @@ impl<R: NormalRule> Pass for JacobiSweep<R> {
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         let mut store = SummedRows { before: on.rows, sums: on.sums };
         let rule = Relaxed { rule: self.rule, factor: self.relaxation };
-        over_segments!(sweep_segment, L, F, Relaxed<R>, SummedRows; &mut store, on.batches, rule);
-    }
-}
-
-/// A rule that a Jacobi sweep is compiled for, as a value.
-#[derive(Clone, Copy, Debug)]
-pub enum JacobiRule {
-    /// [`Soft`]
-    Soft(Soft),
-    /// [`Rigid`]
-    Rigid(Rigid),
-}
-
-impl JacobiRule {
-    /// The same rule of a Gauss–Seidel sweep.
-    pub(super) fn rule(self) -> Rule {
-        match self {
-            JacobiRule::Soft(rule) => Rule::Soft(Sweep(rule)),
-            JacobiRule::Rigid(rule) => Rule::Rigid(Sweep(rule)),
-        }
-    }
-
-    /// Calls `then` with the Jacobi sweep.
-    pub(super) fn with_pass(self, relaxation: f32, then: impl FnOnce(&dyn AnyPass)) {
-        match self {
-            JacobiRule::Soft(rule) => then(&JacobiSweep { rule, relaxation }),
-            JacobiRule::Rigid(rule) => then(&JacobiSweep { rule, relaxation }),
-        }
+        over_segments!(sweep_segment, L, F, Relaxed<Soft>, SummedRows; &mut store, on.batches, rule);
     }
 }
 

@@ -6,9 +6,9 @@
 //! I_b⁻¹ (r_b × u)².
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::{BodyPair, INV_INERTIA, INV_MASS, arms, for_each_batch, over_moving_segments};
+use super::sweep::{BodyPair, INV_INERTIA, INV_MASS, arms, for_each_batch, over_segments};
 use crate::engine::lanes::{BodyRow, Lanes};
 
 /// Recomputes the effective masses of all records from the rows.
@@ -23,7 +23,7 @@ impl Pass for EffectiveMasses {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_moving_segments!(segment, L, F; on.rows, on.batches);
+        over_segments!(segment, L, F; on.rows, on.batches);
     }
 }
 
@@ -36,7 +36,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         for p in 0..N::POINTS {
             for (axis, at) in [layout.normal_mass, layout.tangent_mass].into_iter().enumerate() {
                 if axis == 1 && !N::FRICTION {
@@ -46,7 +46,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let mut k = mass_sum;
                 if N::ROTATION {
                     k = (b[INV_INERTIA] * arm[1]).mul_add(arm[1], k);
-                    if O::MOVES {
+                    if O::HAS_ROW {
                         k = (a[INV_INERTIA] * arm[0]).mul_add(arm[0], k);
                     }
                 }

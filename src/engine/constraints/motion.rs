@@ -217,6 +217,14 @@ impl Motion {
         }
     }
 
+    /// Writes the turns of round bodies since the step began (rad) to `rows`, as spins; zero for others.
+    pub(super) fn hidden_turns(&self, rows: &mut [BodyRow]) {
+        rows.iter_mut().for_each(|row| row.velocity[2] = 0.0);
+        for &(body, turned) in &self.round {
+            rows[body as usize].velocity[2] = turned;
+        }
+    }
+
     /// Puts the turns of round bodies back into their rows, at the end of a step.
     pub fn finish(&self, rows: &mut [BodyRow]) {
         for &(body, turned) in &self.round {

@@ -7,7 +7,7 @@ use super::descent::Blocks;
 use super::features::{Features, Layout};
 use super::graph::Graph;
 use super::impact;
-use super::jacobi::{self, JacobiRule};
+use super::jacobi::{self, JacobiSweep};
 use super::kept::Kept;
 use super::masses::EffectiveMasses;
 use super::motion::Motion;
@@ -266,18 +266,18 @@ impl<'a> Passes<'a> {
 
     /// Constraint pass: every contact reads the velocities from before the pass, and what all of
     /// them add to a body, times `relaxation`, is summed up; see [`super::jacobi`].
-    pub fn jacobi_sweep(&mut self, phase: Phase, rule: JacobiRule, relaxation: f32) {
+    pub fn jacobi_sweep(&mut self, phase: Phase, rule: Soft, relaxation: f32) {
         if !self.input.phases.runs(phase) {
             return;
         }
         jacobi::begin(&self.work.rows, &mut self.work.sums);
-        rule.with_pass(relaxation, |pass| self.over_batches(phase, pass));
+        self.over_batches(phase, &JacobiSweep { rule, relaxation });
         // Sums are cleared, read, and added to velocities.
         let row = size_of::<BodyRow>() as f64;
         self.book_rows([row, 1.5 * row]);
         jacobi::finish(&mut self.work.rows, &self.work.sums, &self.work.masses);
         self.clock.lap(phase);
-        self.solved(rule.rule().sweep());
+        self.solved(&Sweep(rule));
     }
 
     /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart; the law of the
@@ -316,7 +316,10 @@ impl<'a> Passes<'a> {
 
     /// Body pass: marks where bodies are, for [`Self::displacing_sweep`] to displace them from there.
     pub fn begin_displacing(&mut self) {
-        self.over_bodies(Phase::Integrate, |work| work.sums.clone_from(&work.rows));
+        self.over_bodies(Phase::Integrate, |work| {
+            work.sums.clone_from(&work.rows);
+            work.motion.hidden_turns(&mut work.sums);
+        });
     }
 
     /// Constraint pass: displaces bodies that overlap or slip, see `positional.rs`; `first` in each
@@ -627,7 +630,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Counts a velocity sweep, and keeps its rule where that is asked for.
+    /// Counts a velocity sweep, and keeps its rule if `observe` is set.
     fn solved(&mut self, sweep: &dyn VelocitySweep) {
         let friction = self.input.features.friction && sweep.has_friction();
         self.count_sweep(if friction { 2 } else { 1 });

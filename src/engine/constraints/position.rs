@@ -23,11 +23,11 @@
 //! arms in the record are enough, and 1/m_eff = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (R r_a × n)² + I_b⁻¹ (R r_b × n)².
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, for_each_batch, over_moving_segments, spin,
-    to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, for_each_batch, over_segments, spin, to_frame, turn,
+    with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
@@ -67,7 +67,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let mut moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
         let mut angle = [a[TURN], b[TURN]];
@@ -86,7 +86,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 };
                 arm_n = [turned(sine_a, versine_a, 0), turned(sine_b, versine_b, 1)];
                 let mut k = (inertia[1] * arm_n[1]).mul_add(arm_n[1], mass_sum);
-                if O::MOVES {
+                if O::HAS_ROW {
                     k = (inertia[0] * arm_n[0]).mul_add(arm_n[0], k);
                 }
                 // A point that is not there has no mass, and keeps none.
@@ -103,7 +103,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
         L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::MOVES {
+        if O::HAS_ROW && segment.pushes_a() {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
             L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
@@ -118,5 +118,5 @@ pub fn position_sweep<L: Lanes, N: KernelFeatures>(
     batches: &mut Batches,
     sweep: PositionSweep,
 ) {
-    over_moving_segments!(position_segment, L, N; rows, batches, sweep);
+    over_segments!(position_segment, L, N; rows, batches, sweep);
 }

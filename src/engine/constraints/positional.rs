@@ -5,13 +5,15 @@
 //!
 //! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse
 //! Δλ = −C/k (kg·m) along n, C = max(s, −v_max h), on arms that have turned; then, if what it needs is
-//! within the cone of its λ, the one along t that takes back its slide d since the substep began,
+//! within the cone of its λ, the one along t that takes back its slide d since the step began,
 //!
 //! ```text
-//! d = h (t·(v_b − v_a) + ω_b (r_b × t) − ω_a (r_a × t)) + the same of all displacements since
+//! d = t·(Δx_b − Δx_a) + σ_b (r_b × t) − κ_b (r_b × n) − σ_a (r_a × t) + κ_a (r_a × n)
 //! ```
 //!
-//! (first order in the turn of one substep). Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
+//! with σ = sin Δθ and κ = 1 − cos Δθ, as t·r = r × n. The contact point of a disc stays on the line of
+//! centres: its turn counts by Δθ (r × t). Slides since the substep began, as `muller2020` has them, let
+//! stacks of three boxes rock with growing energy; `catto2024solver2d` takes those of the step. Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
 //! the next point sees it. Records hold λ/h, an impulse (N·s).
 //!
 //! # Velocities
@@ -22,11 +24,11 @@
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
 
 use super::batches::{Batches, Segment};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch,
-    over_moving_segments, spin, to_frame, turn, turned, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
+    spin, to_frame, turn, turned, with_arms,
 };
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
@@ -55,7 +57,7 @@ impl Pass for Displace {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         let mut store = Displaced { rows: on.rows, before: on.sums };
-        over_moving_segments!(displace, L, F; &mut store, on.batches, *self);
+        over_segments!(displace, L, F; &mut store, on.batches, *self);
     }
 }
 
@@ -66,11 +68,11 @@ impl Pass for AfterDisplacing {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_moving_segments!(correct, L, F; on.rows, on.batches);
+        over_segments!(correct, L, F; on.rows, on.batches);
     }
 }
 
-/// Bodies, and what their motions were before displacements.
+/// Bodies, and the turns of round ones, which their rows do not show, as spins.
 struct Displaced<'a> {
     rows: &'a mut [BodyRow],
     before: &'a [BodyRow],
@@ -102,23 +104,19 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
     Displace { h, push_speed, first }: Displace,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let (h, inv_h) = (L::splat(h), L::splat(1.0 / h));
-    let deepest = L::splat(-push_speed) * h;
+    let inv_h = L::splat(1.0 / h);
+    let deepest = L::splat(-push_speed * h);
     let zero = L::zero();
     for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
         let before = BodyPair::<L>::gather::<O, _>(store.before, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let frame =
-            |at: usize, a: &[L; 8], b: &[L; 8]| to_frame::<L, O>([a[at], a[at + 1]], [b[at], b[at + 1]], n);
-        let [mut moved, along_t] = frame(DX, &a, &b);
-        // Slide of the centres since the substep began.
-        let mut slide = h.mul_add(frame(VX, &a, &b)[1], along_t - frame(DX, &before.a, &before.b)[1]);
+        // Of the centres, since the step began.
+        let [mut moved, mut slide] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n);
         let mut angle = [a[TURN], b[TURN]];
-        let turn_of =
-            |k: usize, row: &[L; 8], old: &[L; 8], angle: [L; 2]| h.mul_add(row[W], angle[k] - old[TURN]);
+        let hidden = [before.a[W], before.b[W]];
         let mut sum = [zero; 2];
         for p in 0..N::POINTS {
             let (arm_n, arm_t) =
@@ -127,12 +125,13 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             let mut separation = record[layout.at(p, layout.separation)] + moved;
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            let at_first = [arm_n, arm_t];
             let [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
             let answer = |arm: [L; 2]| {
                 let mut k = mass_sum;
                 if N::ROTATION {
                     k = (inertia[1] * arm[1]).mul_add(arm[1], k);
-                    if O::MOVES {
+                    if O::HAS_ROW && segment.pushes_a() {
                         k = (inertia[0] * arm[0]).mul_add(arm[0], k);
                     }
                 }
@@ -150,8 +149,10 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             moved = mass_sum.mul_add(push, moved);
             spin::<L, N, O>(&mut angle, inertia, arm_n, push);
             if N::FRICTION {
-                let turns = [turn_of(0, &a, &before.a, angle), turn_of(1, &b, &before.b, angle)];
-                let drift = with_arms::<L, N, O>(slide, turns, arm_t);
+                let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
+                let turns = [sine_a + hidden[0], sine_b + hidden[1]];
+                let drift = with_arms::<L, N, O>(slide, turns, at_first[1]);
+                let drift = with_arms::<L, N, O>(drift, [-versine_a, -versine_b], at_first[0]);
                 let wanted = is_there.select_positive(-(drift / answer(arm_t)), zero);
                 let at = layout.at(p, layout.tangent_impulse);
                 let old = if first { zero } else { record[at] };
@@ -171,7 +172,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
         L::scatter_delta(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::MOVES {
+        if O::HAS_ROW && segment.pushes_a() {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
             L::scatter_delta(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
@@ -189,7 +190,7 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite>(
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut w = [a[W], b[W]];
@@ -215,6 +216,6 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite>(
             }
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
     });
 }

@@ -1,7 +1,7 @@
 //! Contacts into constraint records at the start of a step, impulses back at its end.
 
 use super::batches::{Batches, Segment, SegmentRecords};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnKinematic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::over_segments;
 use crate::engine::contacts::{Contact, quad};
@@ -47,7 +47,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
             floats[filled..].fill(0.0);
         }
         let [nx, ny, count, friction] = L::gather_quads::<STRIDE, HEADER>(quads, index);
-        let a = if O::MOVES { L::gather(rows, row_a) } else { [L::zero(); 8] };
+        let a = if O::HAS_ROW { L::gather(rows, row_a) } else { [L::zero(); 8] };
         let b = L::gather(rows, row_b);
         let filled = |value: L| present.select_positive(value, L::zero());
         (record[0], record[1]) = (filled(nx), filled(ny));
@@ -80,7 +80,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let mut k = a[INV_MASS] + b[INV_MASS];
                 if N::ROTATION {
                     k = (b[INV_INERTIA] * arms_b[axis]).mul_add(arms_b[axis], k);
-                    if O::MOVES {
+                    if O::HAS_ROW {
                         k = (a[INV_INERTIA] * arms_a[axis]).mul_add(arms_a[axis], k);
                     }
                 }
@@ -110,9 +110,8 @@ pub struct Prepare;
 
 impl Pass for Prepare {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // The index of the contact; the masses of bodies that have one.
-        let rows = 1 + usize::from(opposite == OppositeKind::Dynamic);
-        PerLane { floats_read: 1, floats_written: layout.stride, rows, halves: 0 }
+        // The index of the contact; the masses of bodies.
+        PerLane { halves: 0, ..PerLane::of_bodies(1, layout.stride, opposite) }
     }
 
     #[inline(always)]

@@ -29,6 +29,12 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// Impulses change body a as well: its row is written back.
+    #[inline(always)]
+    pub fn pushes_a(&self) -> bool {
+        self.opposite == OppositeKind::Dynamic
+    }
+
     /// How many lanes of a batch hold a contact.
     #[inline(always)]
     pub fn filled(&self, batch: usize, width: usize) -> usize {

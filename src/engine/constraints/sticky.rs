@@ -17,12 +17,12 @@
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
 
 use super::batches::{Batches, Segment, SegmentRecords};
-use super::features::{KernelFeatures, Layout, OnDynamic, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::kept::Kept;
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_moving_segments, spin,
-    to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_segments, spin, to_frame,
+    turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes, RowStore};
 
@@ -61,7 +61,7 @@ impl Pass for StickySweep {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_moving_segments!(sweep, L, F; on.rows, on.batches, on.kept, *self);
+        over_segments!(sweep, L, F; on.rows, on.batches, on.kept, *self);
     }
 }
 
@@ -73,7 +73,7 @@ impl Pass for BookDrift {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_moving_segments!(book, L, F; on.rows, on.batches, on.kept, self.reach);
+        over_segments!(book, L, F; on.rows, on.batches, on.kept, self.reach);
     }
 }
 
@@ -141,7 +141,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
         let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
-        let mass_sum = if O::MOVES { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut w = [a[W], b[W]];
@@ -189,7 +189,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
             }
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
     }
 }
 

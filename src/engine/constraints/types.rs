@@ -37,6 +37,9 @@ pub trait ConstraintType: fmt::Debug {
 
     /// Runs one pass. Every width is to give the same bits.
     fn run(&mut self, on: TypeInput<'_>);
+
+    /// A copy, with what it keeps from step to step: a world that is held still gets it back.
+    fn boxed(&self) -> Box<dyn ConstraintType>;
 }
 
 /// A type and the lanes of its constraints.
@@ -54,6 +57,11 @@ impl Joined {
     /// A type that no lanes have been assigned for.
     pub fn new(kind: Box<dyn ConstraintType>) -> Self {
         Joined { kind, lanes: Batches::default(), serial: Batches::default() }
+    }
+
+    /// Its batches, coloured and serial.
+    pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
+        [&mut self.lanes, &mut self.serial]
     }
 
     pub(super) fn arrange(&mut self, order: SweepOrder) {

@@ -20,9 +20,8 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
-use crate::engine::constraints::jacobi::JacobiRule;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::constraints::rules::Soft;
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, Parameter, Parameters};
 use std::f32::consts::TAU;
 
@@ -76,8 +75,8 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, relaxation, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-    let soft = JacobiRule::Soft(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
-    let rigid = JacobiRule::Rigid(Rigid::new(h));
+    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let rigid = Soft::without_springs(h);
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

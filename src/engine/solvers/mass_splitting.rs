@@ -27,9 +27,8 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
-use crate::engine::constraints::jacobi::JacobiRule;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::constraints::rules::Soft;
 use crate::engine::params::{
     Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, MAX_PUSH_SPEED, Parameter, Parameters,
 };
@@ -77,8 +76,8 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let soft = JacobiRule::Soft(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
-    let rigid = JacobiRule::Rigid(Rigid::new(h));
+    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let rigid = Soft::without_springs(h);
     passes.build_graph();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
@@ -91,7 +90,7 @@ fn step(passes: &mut Passes<'_>) {
 }
 
 /// Sweeps on split bodies.
-fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: JacobiRule, times: u32) {
+fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
     passes.scale_masses(phase, |body, graph| graph.edges_of(body).len().max(1) as f32);
     for _ in 0..times {
         passes.jacobi_sweep(phase, rule, 1.0);

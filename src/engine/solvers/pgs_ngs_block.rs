@@ -16,7 +16,7 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Rigid;
+use crate::engine::constraints::rules::Soft;
 use crate::engine::constraints::{Passes, PositionSweep};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
 
@@ -48,7 +48,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rigid = Rigid::new(passes.h());
+    let rigid = Soft::without_springs(passes.h());
     let positions = PositionSweep {
         fraction: passes.parameter(0),
         slop: LINEAR_SLOP,

@@ -18,7 +18,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Frictionless, Rigid, Soft};
+use crate::engine::constraints::rules::{Frictionless, Soft};
 use crate::engine::params::{
     Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, MAX_PUSH_SPEED, Parameter,
     Parameters,
@@ -62,7 +62,7 @@ fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
     let soft = Frictionless(Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h));
-    let rigid = Rigid::new(h);
+    let rigid = Soft::without_springs(h);
     for substep in 0..budget.substeps {
         if substep == 0 {
             passes.integrate_velocities();

@@ -94,7 +94,7 @@ fn step(passes: &mut Passes<'_>) {
 }
 
 /// ω of contacts between dynamic bodies and of those with others (rad/s), where `hertz` (Hz) is
-/// asked for and the substep is `h` (s): capped by the substep rate, and twice as much with others.
+/// set and the substep is `h` (s): capped by the substep rate, and twice as much with others.
 fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
     let omega = std::f32::consts::TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
     [omega, 2.0 * omega]

@@ -4,8 +4,8 @@
 //! **Source.** `muller2020`; `macklin2016` (compliance, here zero); `catto2024solver2d`, `solve_xpbd`.
 //!
 //! **Departures.** Velocities are corrected by (x − x_before contacts)/h, which is (x − x₀)/h in exact
-//! arithmetic, so that contacts without overlap change no bit. Slides are of first order in the turn
-//! of a substep. Bounces are this crate's pass at the end of the step.
+//! arithmetic, so that contacts without overlap change no bit. Friction holds places of the start of the
+//! step (`catto2024solver2d`), not of the substep. Bounces are this crate's pass at the end of the step.
 //!
 //! **Cost.** Per substep 4 body passes, `position_iterations` displacing sweeps, which gather bodies
 //! twice, and 1 velocity sweep.

@@ -22,7 +22,8 @@ use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kept::Kept;
-use crate::engine::constraints::{Features, OppositeKind, WorkCount, Workspace};
+use crate::engine::constraints::types::ConstraintType;
+use crate::engine::constraints::{Batches, Features, OppositeKind, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
@@ -34,7 +35,8 @@ pub struct HeldWorld<'w> {
     /// Contacts of the step that is held still, with the impulses it ended with.
     contacts: Vec<Contact>,
     rows: Vec<BodyRow>,
-    buffers: [Vec<Block>; 2],
+    /// Records of contacts, coloured and serial, and of each other type.
+    buffers: Vec<Vec<Block>>,
 }
 
 /// What a step starts from, as far as phases write to it.
@@ -45,6 +47,7 @@ struct Saved {
     fat_boxes: FatBoxes,
     counts: StepCounts,
     kept: Kept,
+    types: Vec<Box<dyn ConstraintType>>,
 }
 
 /// What a step does in one phase.
@@ -77,12 +80,13 @@ impl World {
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
             kept: self.work.kept.clone(),
+            types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
         self.frozen_step();
         self.timings = timings;
         let rows = self.work.rows.clone();
-        let buffers = [&self.work.lanes, &self.work.serial].map(|batches| batches.records().to_vec());
+        let buffers = all_batches(&mut self.work).map(|batches| batches.records().to_vec()).collect();
         let contacts = self.contacts.clone();
         HeldWorld { world: self, before, contacts, rows, buffers }
     }
@@ -148,6 +152,7 @@ impl HeldWorld<'_> {
     /// some microseconds a pass beside the times.
     pub fn step(&mut self, net: bool) -> Timings {
         self.restore_bodies();
+        self.restore_types();
         self.world.put_back(&self.before.contacts);
         let mut clock = if net { Clock::without_pauses() } else { Clock::start(true) };
         self.world.pairs_are_stale = true;
@@ -169,9 +174,8 @@ impl HeldWorld<'_> {
             }
             _ => {}
         }
-        let Workspace { rows, lanes, serial, .. } = &mut self.world.work;
-        rows.clone_from(&self.rows);
-        for (batches, saved) in [lanes, serial].into_iter().zip(&self.buffers) {
+        self.world.work.rows.clone_from(&self.rows);
+        for (batches, saved) in all_batches(&mut self.world.work).zip(&self.buffers) {
             batches.records_mut()[..saved.len()].copy_from_slice(saved);
         }
     }
@@ -189,6 +193,7 @@ impl HeldWorld<'_> {
         let probes = Phase::ALL.into_iter().filter_map(|phase| self.probe(phase)).collect();
         (self.world.settings.width, self.world.settings.order) = (width, order);
         self.restore_bodies();
+        self.restore_types();
         self.world.put_back(&self.before.contacts);
         self.world.frozen_step();
         probes
@@ -238,6 +243,13 @@ impl HeldWorld<'_> {
         self.world.kernel_features()
     }
 
+    /// Brings back what constraints of other types keep.
+    fn restore_types(&mut self) {
+        for (joined, before) in self.world.work.types.iter_mut().zip(&self.before.types) {
+            joined.kind = before.boxed();
+        }
+    }
+
     /// Brings back what a step moves, into the memory that it has: a new place would cost
     /// the next step page faults.
     fn restore_bodies(&mut self) {
@@ -261,6 +273,7 @@ impl HeldWorld<'_> {
 impl Drop for HeldWorld<'_> {
     fn drop(&mut self) {
         self.restore_bodies();
+        self.restore_types();
         self.world.put_back(&self.before.contacts);
         // Bounds may have followed bodies that repeats have moved.
         self.world.proxies.clone_from(&self.before.proxies);
@@ -268,5 +281,12 @@ impl Drop for HeldWorld<'_> {
         self.world.pairs_are_stale = true;
         self.world.counts = self.before.counts;
         self.world.work.kept.clone_from(&self.before.kept);
+        self.restore_types();
     }
+}
+
+/// Batches of contacts, coloured and serial, then those of each other type.
+fn all_batches(work: &mut Workspace) -> impl Iterator<Item = &mut Batches> {
+    let Workspace { lanes, serial, types, .. } = work;
+    [lanes, serial].into_iter().chain(types.iter_mut().flat_map(|joined| joined.batches_mut()))
 }

@@ -144,8 +144,7 @@ impl World {
         index
     }
 
-    /// Adds constraints of another type than contacts. They take part in every pass of the solver; a
-    /// [`HeldWorld`] does not bring back what they keep.
+    /// Adds constraints of another type than contacts. They take part in every pass of the solver.
     pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
         self.work.types.push(Joined::new(kind));
         self.lanes_are_for = None;

@@ -5,7 +5,7 @@
 //!
 //! 1. tries a grid in which every part of the budget is doubled, the least work first;
 //! 2. refines what is good enough: each part is lowered by bisection towards its half;
-//! 3. races the best few again, side by side and several times, and lets that decide.
+//! 3. times the best few again, in turns and several times, and lets that decide.
 //!
 //! Left out is what should only cost more than something known: a budget that contains, in
 //! every part, one of the same solver, order and stiffness that is good enough already; or one
@@ -25,7 +25,7 @@ use crate::lab::metrics::Errors;
 use crate::lab::overrides;
 use crate::lab::scenes::holds::Broken;
 use crate::lab::study::compare::compare;
-use crate::lab::study::interleave::{Sample, race};
+use crate::lab::study::interleave::{Sample, time_in_turns};
 use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
 use limits::Limits;
 use search::Search;
@@ -43,19 +43,19 @@ pub struct Plan {
     pub widths: Vec<LaneWidth>,
     /// Steps of the runs that measure errors; where none, the scene's own.
     pub steps: Option<u32>,
-    /// Timing runs of the final race.
+    /// Timing runs of the final timing.
     pub repeats: u32,
-    /// Lays out scenes that have chance in them, and shuffles races.
+    /// Lays out scenes that have chance in them, and shuffles timing runs.
     pub seed: u64,
     /// No trial begins after this long (s).
     pub seconds: f64,
 }
 
-/// Steps of a trial's timing, and of the final race.
+/// Steps of a trial's timing, and of the final timing.
 const TRIAL_STEPS: u32 = 60;
 const RACE_STEPS: u32 = 200;
 
-/// Settings in the final race; the best of every other solver is in it too.
+/// Settings in the final timing; the best of every other solver is in it too.
 const FINALISTS: usize = 4;
 
 /// A solver, an order, a budget and parameters.
@@ -112,8 +112,8 @@ pub struct Trial {
     pub setting: Setting,
     /// At the fastest width; none if the run failed.
     pub time: Option<Time>,
-    /// Blocks of the final race at that width; none before it.
-    pub lap: Option<Sample>,
+    /// Blocks of the final timing at that width; none before it.
+    pub sample: Option<Sample>,
     /// None if the run failed.
     pub errors: Option<Errors>,
     /// Distance to what is known about the scene.
@@ -136,16 +136,16 @@ impl Trial {
         self.time.map_or(f64::INFINITY, |t| t.median_ns)
     }
 
-    /// Whether two trials of the final race are alike as far as can be told.
+    /// Whether two trials of the final timing are alike as far as can be told.
     pub fn ties(&self, other: &Trial) -> bool {
-        matches!((&self.lap, &other.lap), (Some(a), Some(b)) if compare(a, b).is_eq())
+        matches!((&self.sample, &other.sample), (Some(a), Some(b)) if compare(a, b).is_eq())
     }
 }
 
 /// What the search found.
 #[derive(Clone, Debug)]
 pub struct Advice {
-    /// The settings of the final race: those that are good enough, fastest first, then the
+    /// The settings of the final timing: those that are good enough, fastest first, then the
     /// others, nearest first. The first one is the advice if it is good enough.
     pub finalists: Vec<Trial>,
     /// Everything that was tried, in that order, with the times of the trials.
@@ -154,8 +154,8 @@ pub struct Advice {
     pub left_out: usize,
     /// Whether the time was up before the grid was done.
     pub is_cut_short: bool,
-    /// Timing runs and steps of the final race.
-    pub race: [u32; 2],
+    /// Timing runs and steps of the final timing.
+    pub timing: [u32; 2],
 }
 
 impl Advice {
@@ -175,7 +175,7 @@ impl Advice {
     }
 }
 
-/// Searches and races.
+/// Searches and times.
 ///
 /// Errors: an unknown scene; a bound on the reference error of a scene that has none.
 pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
@@ -196,14 +196,14 @@ pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error>
     let mut search = Search::new(plan, &loaded.scene, progress);
     search.coarse()?;
     search.refine()?;
-    progress(Progress { done: 1, total: 1, what: "final race".to_string() });
+    progress(Progress { done: 1, total: 1, what: "final timing".to_string() });
     let Search { trials, left_out, is_cut_short, .. } = search;
 
     let mut finalists = choose(&trials);
     let steps = loaded.scene.steps.min(RACE_STEPS);
     race_again(plan, &loaded.scene, &mut finalists, steps)?;
     rank(&mut finalists);
-    Ok(Advice { finalists, trials, left_out, is_cut_short, race: [plan.repeats, steps] })
+    Ok(Advice { finalists, trials, left_out, is_cut_short, timing: [plan.repeats, steps] })
 }
 
 /// The best few, and the best of every solver that is not among them. Where none is good, all
@@ -253,21 +253,21 @@ fn race_again(
         .flat_map(|(i, t)| widths(plan, t.setting.order).into_iter().map(move |w| (i, w)))
         .collect();
     let settings: Vec<Settings> = runs.iter().map(|&(i, w)| finalists[i].setting.settings(w)).collect();
-    let laps = race(scene, &settings, steps, plan.repeats, plan.seed)?;
+    let samples = time_in_turns(scene, &settings, steps, plan.repeats, plan.seed)?;
     for (i, trial) in finalists.iter_mut().enumerate() {
-        let own = runs.iter().zip(&laps).filter(|((j, _), _)| *j == i);
-        let laps = own.filter_map(|((_, width), lap)| Some((*width, lap.as_ref().ok()?)));
-        if let Some((time, lap)) = fastest(laps) {
-            (trial.time, trial.lap) = (Some(time), Some(lap.clone()));
+        let own = runs.iter().zip(&samples).filter(|((j, _), _)| *j == i);
+        let samples = own.filter_map(|((_, width), sample)| Some((*width, sample.as_ref().ok()?)));
+        if let Some((time, sample)) = fastest(samples) {
+            (trial.time, trial.sample) = (Some(time), Some(sample.clone()));
             trial.excess = excess(&plan.limits, trial);
         }
     }
     Ok(())
 }
 
-fn fastest<'a>(laps: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(Time, &'a Sample)> {
-    let (width, lap) = laps.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
-    Some((Time { lanes: width.lanes(), median_ns: lap.median_ns, spread_ns: lap.spread_ns }, lap))
+fn fastest<'a>(samples: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(Time, &'a Sample)> {
+    let (width, sample) = samples.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
+    Some((Time { lanes: width.lanes(), median_ns: sample.median_ns, spread_ns: sample.spread_ns }, sample))
 }
 
 fn excess(limits: &Limits, trial: &Trial) -> f64 {
@@ -288,7 +288,7 @@ mod tests {
         Trial {
             setting,
             time,
-            lap: None,
+            sample: None,
             errors: Some(Errors::default()),
             truth: None,
             failure: None,
@@ -307,7 +307,7 @@ mod tests {
             trials: Vec::new(),
             left_out: 0,
             is_cut_short: false,
-            race: [1, 1],
+            timing: [1, 1],
         };
         let time = |t: Option<&Trial>| t.map(Trial::time_ns);
         assert_eq!(time(advice.best()), Some(20.0));

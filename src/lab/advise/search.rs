@@ -6,7 +6,7 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
-use crate::lab::study::interleave::race;
+use crate::lab::study::interleave::time_in_turns;
 use crate::lab::study::{Failure, Progress, observe, open_scene};
 use std::time::Instant;
 
@@ -211,7 +211,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Errors from a whole run, time from a short race of all widths.
+    /// Errors from a whole run, time from a short interleaved timing of all widths.
     fn run(&self, setting: Setting) -> Result<Trial, Error> {
         let loaded = open_scene(&self.plan.scene, Some(self.plan.seed), self.plan.steps, None)?;
         let widths = widths(self.plan, setting.order);
@@ -220,7 +220,7 @@ impl<'a> Search<'a> {
         let mut trial = Trial {
             setting,
             time: None,
-            lap: None,
+            sample: None,
             errors: outcome.errors.ok(),
             truth: outcome.truth,
             failure: outcome.errors.err().map(Failure::from),
@@ -229,8 +229,10 @@ impl<'a> Search<'a> {
         };
         if trial.errors.is_some() {
             let settings: Vec<_> = widths.iter().map(|&w| setting.settings(w)).collect();
-            let laps = race(self.scene, &settings, self.scene.steps.min(TRIAL_STEPS), 1, self.plan.seed)?;
-            let finished = widths.iter().zip(&laps).filter_map(|(&w, lap)| Some((w, lap.as_ref().ok()?)));
+            let samples =
+                time_in_turns(self.scene, &settings, self.scene.steps.min(TRIAL_STEPS), 1, self.plan.seed)?;
+            let finished =
+                widths.iter().zip(&samples).filter_map(|(&w, sample)| Some((w, sample.as_ref().ok()?)));
             trial.time = fastest(finished).map(|(time, _)| time);
             trial.excess = excess(&self.plan.limits, &trial);
         }

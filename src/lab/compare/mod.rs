@@ -16,6 +16,7 @@ use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
+use crate::lab::study::sweep::Swept;
 use serde::Serialize;
 
 /// Errors below this share of their tolerance are as good as none (1).
@@ -69,7 +70,7 @@ pub struct ErrorChange {
 pub struct TimeChange {
     /// Median time of a step (ns), before and after.
     pub median_ns: [f64; 2],
-    /// Ratio over paired blocks, divided by the common one if that was wished.
+    /// Ratio over paired blocks, divided by the common one where times are relative.
     pub ratio: f64,
     /// Its interval.
     pub interval: [f64; 2],
@@ -193,8 +194,8 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
     }
 }
 
-fn key(r: &Record) -> (&str, &str, Budget, Order, usize) {
-    (&r.scene, r.solver, r.budget, r.order, r.lanes)
+fn key(r: &Record) -> (&str, &str, Budget, Option<Swept>, Order, usize) {
+    (&r.scene, r.solver, r.budget, r.swept, r.order, r.lanes)
 }
 
 fn pair(one: &Record, other: &Record) -> Pair {
@@ -211,7 +212,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         Some(ErrorChange { error, unit, values, negligible: NEGLIGIBLE * tolerance })
     });
     let time = || {
-        let samples = [one.lap.as_ref()?, other.lap.as_ref()?];
+        let samples = [one.sample.as_ref()?, other.sample.as_ref()?];
         let Ratio { median, interval } = Ratio::of(samples[1], samples[0])?;
         Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
     };
@@ -220,7 +221,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         solver: one.solver,
         order: one.order,
         lanes: one.lanes,
-        budget: one.budget_text.clone(),
+        budget: one.budget_text.clone() + &one.swept.map_or(String::new(), |s| format!(" {s}")),
         marks: [one.mark(), other.mark()],
         errors: errors.collect(),
         time: time(),
@@ -333,7 +334,7 @@ mod tests {
     fn noise_is_no_regression() {
         let noisy = |seed: u64| {
             let mut r = record(8, 1, 10.0, 1e-3);
-            let sample = r.lap.as_mut().unwrap();
+            let sample = r.sample.as_mut().unwrap();
             // ±30 %, and no trend.
             sample.blocks_ns[0].iter_mut().enumerate().for_each(|(i, ns)| {
                 *ns *= 1.0 + 0.3 * (((i as u64 * 7 + seed * 13) % 11) as f64 / 5.0 - 1.0);

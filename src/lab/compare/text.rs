@@ -5,7 +5,7 @@ use crate::engine::world::Order;
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, lanes, ratio, si};
 
-/// Rows of each list, unless all are wished.
+/// Rows of each list, unless `--all`.
 const ROWS: usize = 10;
 
 /// One change, and by how much it changed (1).

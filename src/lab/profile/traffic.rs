@@ -1,4 +1,4 @@
-//! Bytes that a pass asks for.
+//! Bytes that a pass requests.
 //!
 //! Counted is what the code names, each time it names it, in the layout that it is stored in:
 //!
@@ -109,7 +109,7 @@ fn used_by_sweeps(frozen: &HeldWorld<'_>) -> f64 {
     (work.lanes.bytes() + work.serial.bytes()) as f64
 }
 
-/// What a pass asks for of records, rows and vectors, padding included.
+/// What a pass requests of records, rows and vectors, padding included.
 fn constraints(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
     let work = frozen.workspace();
     let mut sum = Traffic { read: probe.bytes[0], written: probe.bytes[1], working_set: 0.0 };

@@ -38,7 +38,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// Begins with the world as it is, a frame every `every` steps, at least 1; with contact points
-    /// if asked for. Residuals need `Settings::record_impulses`.
+    /// if the caller wants them. Residuals need `Settings::record_impulses`.
     pub fn new(world: &World, caption: Caption, every: u32, contacts: bool) -> Self {
         let stage = Stage::of(world);
         let moving = stage.shapes.iter().filter(|(b, _)| stage.kinds[*b as usize] != BodyKind::Static);

@@ -385,7 +385,8 @@
         seek(end * (e.offsetX - 6) / Math.max(curves.clientWidth - 12, 1));
       });
     }
-    new ResizeObserver(draw).observe(root);
+    // On paper the frame is scaled: a canvas of another size would be empty until the next frame.
+    new ResizeObserver(() => { if (!matchMedia("print").matches) draw(); }).observe(root);
     draw();
     return { state, seek, step, toggle, draw, end, tick, recordings };
   }

@@ -109,7 +109,7 @@ fn cheapest(scenes: &[Answer]) -> String {
 /// Solver, budget, lanes, time with its deviation, and the three errors.
 fn setting(record: &Record) -> [String; 8] {
     let time = |ns: fn(&crate::lab::study::interleave::Sample) -> f64| {
-        record.lap.as_ref().map_or("–".to_string(), |lap| digits(ns(lap) / 1e3))
+        record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
     };
     let error = |axis: ErrorAxis, show: &dyn Fn(f64) -> String| axis.of(record).map_or("–".to_string(), show);
     [
@@ -120,8 +120,8 @@ fn setting(record: &Record) -> [String; 8] {
             Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
             Order::Colored => record.lanes.to_string(),
         },
-        time(|lap| lap.median_ns),
-        time(|lap| lap.spread_ns),
+        time(|sample| sample.median_ns),
+        time(|sample| sample.spread_ns),
         error(ErrorAxis::Penetration, &|e| si(e, "m")),
         error(ErrorAxis::Law, &ratio),
         error(ErrorAxis::Truth, &|e| si(e, record.truth.map_or("", |t| t.unit))),
@@ -153,7 +153,7 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
         return ["no other solver".to_string(), "–".to_string()];
     };
     let name = format!("{}, {}", next.solver, next.budget_text);
-    let ratio = next.lap.as_ref().zip(best.lap.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
+    let ratio = next.sample.as_ref().zip(best.sample.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
     let by = match ratio {
         _ if order(next, best).is_eq() => "tie".to_string(),
         Some(ratio) if ratio.median < 2.0 => format!("{:.0} %", 100.0 * (ratio.median - 1.0)),

@@ -35,7 +35,7 @@ const fn column(name: &'static str, unit: &'static str, meaning: &'static str) -
 pub static STUDY: Sheet = Sheet {
     file: "study.csv",
     command: "simpulse study",
-    line: "a scene, solver, budget, order and lane width",
+    line: "a scene, value of a sweep, solver, budget, order and lane width",
     columns: &[
         column("scene", "", "name with its size"),
         column("bodies", "", "bodies of the scene"),
@@ -48,6 +48,9 @@ pub static STUDY: Sheet = Sheet {
         column("velocity_iterations", "", "velocity sweeps of a substep"),
         column("relax_iterations", "", "relaxation sweeps of a substep"),
         column("position_iterations", "", "position sweeps of a substep"),
+        column("swept", "", "quantity that a sweep varies; empty without --sweep"),
+        column("swept_unit", "", "unit of the next column; empty for a pure number"),
+        column("swept_value", "*", "value of the swept quantity"),
         column("median_us", "µs", "time of a step, median over blocks of steps"),
         column("spread_us", "µs", "median deviation of a repeat from its block's median"),
         column("quartile_1_us", "µs", "lower quartile of the blocks"),

@@ -11,6 +11,7 @@ pub mod profiles;
 pub mod savings;
 pub mod study_file;
 pub mod style;
+pub mod sweep;
 pub mod table;
 pub use crate::lab::units;
 
@@ -20,9 +21,17 @@ use crate::lab::study::Record;
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
+/// Names of pictures.
+const SWEEP: &str = "sweep.svg";
+const SPEED: &str = "speed_vs_error.svg";
+const PROFILES: &str = "profiles.svg";
+
 /// Everything that a study measured, as tables: per scene, in equal time and to equal error, and the
 /// performance profiles.
 pub fn tables(records: &[Record]) -> String {
+    if sweep::is_sweep(records) {
+        return sweep::tables(records);
+    }
     let mut text = format!("{}\n", table::LEGEND);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         text += &table::scene_table(scene);
@@ -32,20 +41,31 @@ pub fn tables(records: &[Record]) -> String {
     text + &slices + "\n" + &profiles
 }
 
-/// Writes `tables.txt`, `study.csv`, `study.json`, `speed_vs_error.svg` and `profiles.svg` into
-/// `folder`, and the [page](html) made from them and what else is there; returns their paths.
+/// Writes `tables.txt`, `study.csv`, `study.json` and pictures (`speed_vs_error.svg` and `profiles.svg`, or
+/// `sweep.svg`) into `folder`, and the [page](html) made from them and what else is there; returns
+/// their paths. Pictures of an earlier study of the other kind are removed.
 ///
 /// All but the page are made before the first is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let records = &study.records;
-    let contents = [
+    let mut contents = vec![
         ("tables.txt", tables(records).into_bytes()),
         ("study.csv", export::csv(records)?),
         ("study.json", study.to_json()?),
-        ("speed_vs_error.svg", plot::svg(records)?.into_bytes()),
-        ("profiles.svg", profiles::svg(records)?.into_bytes()),
     ];
+    if sweep::is_sweep(records) {
+        contents.push((SWEEP, html::sweep_svg(records).into_bytes()));
+    } else {
+        contents.push((SPEED, plot::svg(records)?.into_bytes()));
+        contents.push((PROFILES, profiles::svg(records)?.into_bytes()));
+    }
     files::prepare_folder(folder)?;
+    for name in [SWEEP, SPEED, PROFILES].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
+        let path = folder.join(name);
+        if path.exists() {
+            std::fs::remove_file(&path).map_err(Error::io(&path))?;
+        }
+    }
     let mut paths = Vec::new();
     for (name, bytes) in contents {
         let path = folder.join(name);

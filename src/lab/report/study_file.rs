@@ -178,7 +178,7 @@ mod tests {
     fn a_study_comes_back_with_the_same_bits() {
         let plan = StudyPlan { scenes: vec!["stack:2".into(), "arch".into()], ..StudyPlan::default() };
         let mut records = vec![record(8, 1, 10.25, 0.1 + 0.2), fell(8, 2, 3.0, 1e-300), failed(4)];
-        if let Some(sample) = &mut records[0].lap {
+        if let Some(sample) = &mut records[0].sample {
             sample.blocks_ns = vec![vec![10.5, f64::NAN], vec![7.0]];
         }
         let study = StudyFile::new(&plan, records, vec!["arch".into()]);
@@ -189,7 +189,7 @@ mod tests {
         let back = StudyFile::read(folder.path()).unwrap();
         assert_eq!(back.to_json().unwrap(), text);
         assert_eq!(format!("{:?}", back.records[0].errors), format!("{:?}", study.records[0].errors));
-        assert!(back.records[0].lap.as_ref().unwrap().blocks_ns[0][1].is_nan());
+        assert!(back.records[0].sample.as_ref().unwrap().blocks_ns[0][1].is_nan());
     }
 
     #[test]

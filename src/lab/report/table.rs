@@ -1,6 +1,6 @@
 //! Tables for the terminal, to be read at 160 columns.
 
-use super::units::{digits, is_emulated, ratio, si};
+use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
 use crate::lab::study::{Fronts, Record, TruthError};
@@ -44,7 +44,7 @@ pub(crate) fn finish(mut table: Table, left: usize) -> String {
 /// The records of one scene, errors once per solver, budget and order.
 pub fn scene_table(records: &[Record]) -> String {
     let Some(first) = records.first() else { return String::new() };
-    let mut text = format!("{} · {} bodies · dt {}", first.scene, first.bodies, si(first.dt, "s"));
+    let mut text = format!("{} · {} · dt {}", first.scene, bodies(first.bodies), si(first.dt, "s"));
     if let Some(steps) = records.iter().find_map(|r| Some(r.errors?.steps)) {
         text += &format!(" · {steps} steps");
     }
@@ -112,16 +112,16 @@ fn lanes(record: &Record) -> String {
 fn row(record: &Record) -> Vec<String> {
     const NOTHING: &str = "–";
     let mut cells = vec![record.solver.to_string(), record.budget_text.clone(), lanes(record)];
-    let Some(lap) = &record.lap else {
+    let Some(sample) = &record.sample else {
         cells.resize(7, NOTHING.to_string());
         cells.push(record.mark().map_or("failed", |mark| mark.word()).to_string());
         cells.resize(20, NOTHING.to_string());
         return cells;
     };
     cells.extend([
-        digits(lap.median_ns / 1e3),
-        digits(lap.spread_ns / 1e3),
-        digits(lap.row_sweep_ns),
+        digits(sample.median_ns / 1e3),
+        digits(sample.spread_ns / 1e3),
+        digits(sample.row_sweep_ns),
         record.speed_up.map_or(NOTHING.to_string(), digits),
     ]);
     let errors = record.errors.as_ref();
@@ -139,9 +139,9 @@ fn row(record: &Record) -> Vec<String> {
     let reference = |t: TruthError| t.error.map_or("missed".to_string(), |e| si(e, t.unit));
     cells.push(record.truth.map_or(NOTHING.to_string(), reference));
     cells.extend([
-        format!("{:.0}", lap.load.sweeps),
-        lap.load.colors.to_string(),
-        format!("{:.0} %", 100.0 * lap.load.occupancy),
+        format!("{:.0}", sample.load.sweeps),
+        sample.load.colors.to_string(),
+        format!("{:.0} %", 100.0 * sample.load.occupancy),
         front(&record.front),
     ]);
     cells

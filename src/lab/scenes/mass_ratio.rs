@@ -4,7 +4,7 @@ use super::holds::Demand;
 use super::parts::ground_line;
 use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst, ground_load, rests_at, rests_on_ground, weight};
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::{Entry, MASS_RATIO, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
 
 pub(super) const PAIR: Entry = Entry::new("mass_ratio", "a heavy disc on a disc of 1 kg", |ratio| {
@@ -13,7 +13,7 @@ pub(super) const PAIR: Entry = Entry::new("mass_ratio", "a heavy disc on a disc 
     let heavy = SceneBody::dynamic([0.0, 1.5], disc(f64::from(ratio)));
     Scene::new("mass_ratio", vec![ground_line(20.0), light, heavy])
 })
-.sized(100, 1, 10_000, "times as heavy")
+.sized(100, 1, 10_000, MASS_RATIO)
 .known(|scene, _| {
     let weight = weight(scene);
     let off = move |view: &View| pair_error(view, weight);

@@ -99,11 +99,16 @@ pub struct Entry {
     pub seeded: Option<fn(u32, u64) -> Scene>,
     /// What is known about the scene of that size, for a run of its `steps` at its `dt`.
     pub truth: Option<fn(&Scene, u32) -> Truth>,
+    /// What of a scene that may be very large is known without making it.
+    pub outline: Option<fn(u32) -> Outline>,
     /// What a run has to meet, besides that nothing blows up or passes through what is static.
     pub demands: &'static [Demand],
     /// How wrong a run may be, for the scene and the value that its truth has (0 where none is known).
     pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
+
+/// What a size counts where the scene is one mass on another.
+pub const MASS_RATIO: &str = "times as heavy";
 
 /// A whole number that a scene is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,10 +123,20 @@ pub struct Size {
     pub meaning: &'static str,
 }
 
+/// What a scene's size alone says about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outline {
+    /// Bodies in it.
+    pub bodies: usize,
+    /// Its reference value, in the unit that all sizes have.
+    pub reference: f64,
+}
+
 impl Entry {
     const fn new(name: &'static str, summary: &'static str, build: fn(u32) -> Scene) -> Self {
         let tolerances = |_: &Scene, _| Tolerances::standard();
-        Self { name, summary, size: None, build, seeded: None, truth: None, demands: &[], tolerances }
+        let (size, seeded, truth, outline) = (None, None, None, None);
+        Self { name, summary, size, build, seeded, truth, outline, demands: &[], tolerances }
     }
 
     const fn sized(self, default: u32, min: u32, max: u32, meaning: &'static str) -> Self {
@@ -134,6 +149,10 @@ impl Entry {
 
     const fn known(self, truth: fn(&Scene, u32) -> Truth) -> Self {
         Self { truth: Some(truth), ..self }
+    }
+
+    const fn outlined(self, outline: fn(u32) -> Outline) -> Self {
+        Self { outline: Some(outline), ..self }
     }
 
     const fn holds(self, demands: &'static [Demand]) -> Self {
@@ -151,7 +170,7 @@ impl Entry {
         Loaded { scene, truth, demands: self.demands, tolerances }
     }
 
-    /// The size that `text` asks for.
+    /// The size of this text.
     fn parse_size(&self, text: Option<&str>) -> Result<u32, Error> {
         let refuse = |message| Err(Error::invalid(format!("scene '{}'", self.name), message));
         match (self.size, text) {
@@ -191,7 +210,8 @@ pub fn load_with_seed(name: &str, seed: u64) -> Result<Loaded, Error> {
     load_with(name, Some(seed))
 }
 
-fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
+/// The row of a scene's name, and its size.
+fn entry_of(name: &str) -> Result<(&'static Entry, u32), Error> {
     let (stem, size) = match name.split_once(':') {
         Some((stem, size)) => (stem, Some(size)),
         None => (name, None),
@@ -199,13 +219,99 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
     let Some(entry) = CATALOG.iter().find(|e| e.name == stem) else {
         return Err(Error::unknown("scene", stem, CATALOG.iter().map(|e| e.name)));
     };
-    let size = entry.parse_size(size)?;
+    Ok((entry, entry.parse_size(size)?))
+}
+
+fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
+    let (entry, size) = entry_of(name)?;
     let mut scene = match (entry.seeded, seed) {
         (Some(build), Some(seed)) => build(size, seed),
         _ => (entry.build)(size),
     };
     if entry.size.is_some() {
-        scene.name = format!("{stem}:{size}");
+        scene.name = format!("{}:{size}", entry.name);
     }
     Ok(entry.loaded(scene, size))
+}
+
+/// What there is to say about a scene besides its bodies.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// With its size.
+    pub name: String,
+    /// How many.
+    pub bodies: usize,
+    /// Of a run.
+    pub steps: u32,
+    /// Length of a step (s).
+    pub dt: f64,
+    /// m/s²
+    pub gravity: [f64; 2],
+    /// What the reference value is of, the value, its unit.
+    pub reference: Option<(&'static str, f64, &'static str)>,
+    /// What a run has to meet.
+    pub demands: &'static [Demand],
+    /// How wrong it may be.
+    pub tolerances: Tolerances,
+}
+
+impl Description {
+    /// Of a scene that is there.
+    pub fn of(loaded: &Loaded) -> Self {
+        let Loaded { scene, truth, demands, tolerances } = loaded;
+        Description {
+            name: scene.name.clone(),
+            bodies: scene.bodies.len(),
+            steps: scene.steps,
+            dt: scene.dt,
+            gravity: scene.gravity,
+            reference: truth.as_ref().map(|t| (t.quantity, t.expected, t.unit)),
+            demands,
+            tolerances: *tolerances,
+        }
+    }
+}
+
+/// Describes a scene of the catalogue. One that may be very large is not made for it: its smallest
+/// sibling says what all sizes have in common, and its [`Outline`] the rest.
+///
+/// Errors: as [`load`].
+pub fn describe(name: &str, seed: Option<u64>) -> Result<Description, Error> {
+    let (entry, size) = entry_of(name)?;
+    let (Some(outline), Some(Size { min, .. })) = (entry.outline, entry.size) else {
+        return Ok(Description::of(&load_with(name, seed)?));
+    };
+    let Outline { bodies, reference } = outline(size);
+    let smallest = (entry.build)(min);
+    let tolerances = (entry.tolerances)(&smallest, reference);
+    let common = Description::of(&entry.loaded(smallest, min));
+    Ok(Description {
+        name: format!("{}:{size}", entry.name),
+        bodies,
+        reference: common.reference.map(|(quantity, _, unit)| (quantity, reference, unit)),
+        tolerances,
+        ..common
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outline_says_what_the_scene_itself_does() {
+        let words = |d: &Description| format!("{d:?}");
+        let mut outlined = 0;
+        for entry in CATALOG.iter().filter(|e| e.outline.is_some()) {
+            for size in [1, 2, 7, 30] {
+                let name = format!("{}:{size}", entry.name);
+                let made = Description::of(&load(&name).unwrap());
+                assert_eq!(words(&describe(&name, None).unwrap()), words(&made), "{name}");
+                outlined += 1;
+            }
+        }
+        assert!(outlined >= 8);
+        assert_eq!(words(&describe("arch", None).unwrap()), words(&Description::of(&load("arch").unwrap())));
+        assert!(describe("pyramid:1001", None).unwrap_err().to_string().contains("1001"));
+    }
 }

@@ -4,10 +4,17 @@ use super::holds::Demand;
 use super::parts::ground_box;
 use super::tolerance::Tolerances;
 use super::truth::rests_on_ground;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::{Entry, Outline, Scene, SceneBody, SceneShape};
+
+/// Weight of a box of 1 m² and 1 kg/m² (N).
+const BOX_WEIGHT: f64 = 10.0;
 
 pub(super) const PYRAMID: Entry = Entry::new("pyramid", "a pyramid of boxes", |base| scene("pyramid", base))
     .sized(10, 1, 1000, "boxes in the lowest row")
+    .outlined(|base| {
+        let boxes = base as usize * (base as usize + 1) / 2;
+        Outline { bodies: 1 + boxes, reference: boxes as f64 * BOX_WEIGHT }
+    })
     .known(|scene, _| rests_on_ground(scene))
     .holds(&[Demand::Stands])
     .within(|_, load| Tolerances::standard().percent(load));
@@ -37,6 +44,10 @@ pub(super) const MANY: Entry =
         Scene::new("many_pyramids", bodies).steps(200)
     })
     .sized(20, 1, 100, "floors")
+    .outlined(|floors| {
+        let (floors, boxes) = (floors as usize, 55 * (floors * floors) as usize);
+        Outline { bodies: floors + boxes, reference: boxes as f64 * BOX_WEIGHT }
+    })
     .known(|scene, _| rests_on_ground(scene))
     .holds(&[Demand::Stands])
     .within(|_, load| Tolerances::standard().percent(load));

@@ -20,7 +20,7 @@ impl<'a> Answer<'a> {
     /// Of the records of one scene; none without any.
     pub fn of(records: &'a [Record]) -> Option<Answer<'a>> {
         let scene = &records.first()?.scene;
-        let timed: Vec<&Record> = records.iter().filter(|r| r.lap.is_some()).collect();
+        let timed: Vec<&Record> = records.iter().filter(|r| r.sample.is_some()).collect();
         let mut good: Vec<&Record> = Vec::new();
         let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| r.excess() <= 1.0).collect();
         sorted.sort_by(|a, b| time(a).total_cmp(&time(b)));
@@ -95,16 +95,16 @@ pub fn finalists(records: &[Record]) -> Vec<usize> {
 
 /// Which of two records is faster, if that can be told.
 pub fn order(a: &Record, b: &Record) -> Ordering {
-    a.lap.as_ref().zip(b.lap.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
+    a.sample.as_ref().zip(b.sample.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
 }
 
 /// Whether two records differ in their lane width at most.
 pub fn same(a: &Record, b: &Record) -> bool {
-    (a.solver, a.budget, a.order) == (b.solver, b.budget, b.order)
+    (a.solver, a.budget, a.order, a.swept) == (b.solver, b.budget, b.order, b.swept)
 }
 
 fn time(record: &Record) -> f64 {
-    record.lap.as_ref().map_or(f64::INFINITY, |lap| lap.median_ns)
+    record.sample.as_ref().map_or(f64::INFINITY, |sample| sample.median_ns)
 }
 
 #[cfg(test)]
@@ -148,7 +148,7 @@ mod tests {
         // Taken in the same rounds, the second is always 10 % faster; the first left out the slow ones.
         let with = |substeps: u32, blocks: Vec<f64>| {
             let mut own = record(8, substeps, 0.0, 1e-3);
-            own.lap = Some(crate::lab::study::interleave::tests::sample(vec![blocks]));
+            own.sample = Some(crate::lab::study::interleave::tests::sample(vec![blocks]));
             own
         };
         let mut first = vec![100.0; 20];

@@ -106,8 +106,8 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
             for order in [Order::Natural, Order::Colored] {
                 let widths = own().filter(|r| r.budget == *value && r.order == order);
                 let timed = widths.filter(|r| r.holds()).filter_map(|record| {
-                    let (lap, error) = (record.lap.as_ref()?, axis.of(record)?);
-                    Some(Sample { record, budget, time: lap.median_ns, error: error.max(ERROR_FLOOR) })
+                    let (sample, error) = (record.sample.as_ref()?, axis.of(record)?);
+                    Some(Sample { record, budget, time: sample.median_ns, error: error.max(ERROR_FLOOR) })
                 });
                 samples.extend(timed.min_by(|a, b| a.time.total_cmp(&b.time)));
             }

@@ -128,11 +128,11 @@ impl LoadSum {
     }
 }
 
-/// Lets `count` entrants take turns in so many rounds: `turn(entrant, round)` for each of them.
+/// Lets `count` settings take turns in so many rounds: `turn(setting, round)` for each of them.
 ///
 /// The order of a round is the last one's, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
 /// and every second round is read backwards (Williams 1949), so that who comes after whom changes,
-/// too: an entrant that leaves the caches full of its own does not always leave them to the same one.
+/// too: a setting that leaves the caches full of its own does not always leave them to the same one.
 /// It rotates by the golden section of the count, so that after any number of rounds everybody has
 /// been early and late about as often.
 pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize)) {
@@ -149,18 +149,18 @@ pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize
     }
 }
 
-/// Settings of one scene, timed in turns.
-pub struct Race<'a> {
-    scene: &'a Scene,
-    settings: Vec<Settings>,
+/// Settings, timed in turns.
+pub struct Interleaved<'a> {
+    /// Each with its scene: one for all, or variants of one.
+    settings: Vec<(&'a Scene, Settings)>,
     blocks: Vec<Range<u32>>,
-    entrants: Vec<Entrant>,
+    timings: Vec<Timing>,
     random: Pcg64,
 }
 
 /// What is kept of one setting.
 #[derive(Clone, Default)]
-struct Entrant {
+struct Timing {
     /// `[pass][block]` (ns per step)
     blocks: Vec<Vec<f64>>,
     phases: [Vec<f64>; Phase::ALL.len()],
@@ -176,16 +176,16 @@ fn blocks(steps: u32) -> Vec<Range<u32>> {
     (0..steps / length.max(1)).map(|i| i * length..(i + 1) * length).collect()
 }
 
-/// How many of so many steps a race goes.
+/// How many of so many steps interleaved timing takes.
 pub fn whole_blocks(steps: u32) -> u32 {
     blocks(steps).last().map_or(0, |block| block.end)
 }
 
-impl<'a> Race<'a> {
+impl<'a> Interleaved<'a> {
     /// Of the first `steps` steps; `seed` decides who begins.
-    pub fn new(scene: &'a Scene, settings: Vec<Settings>, steps: u32, seed: u64) -> Self {
-        let entrants = vec![Entrant::default(); settings.len()];
-        Race { scene, settings, blocks: blocks(steps), entrants, random: Pcg64::seed_from_u64(seed) }
+    pub fn new(settings: Vec<(&'a Scene, Settings)>, steps: u32, seed: u64) -> Self {
+        let timings = vec![Timing::default(); settings.len()];
+        Interleaved { settings, blocks: blocks(steps), timings, random: Pcg64::seed_from_u64(seed) }
     }
 
     /// Goes through the steps so many times with those settings that `enter`; a world that diverges
@@ -197,17 +197,18 @@ impl<'a> Race<'a> {
             names.shuffle(&mut self.random);
             let mut worlds: Vec<World> = Vec::new();
             for &i in &names {
-                worlds.push(self.scene.build(self.settings[i].clone())?);
+                let (scene, settings) = &self.settings[i];
+                worlds.push(scene.build(settings.clone())?);
             }
-            for entrant in &mut self.entrants {
-                entrant.blocks.push(vec![f64::NAN; self.blocks.len()]);
+            for timing in &mut self.timings {
+                timing.blocks.push(vec![f64::NAN; self.blocks.len()]);
             }
-            let Race { blocks, entrants, .. } = self;
+            let Interleaved { blocks, timings, .. } = self;
             take_turns(names.len(), blocks.len(), |place, round| {
-                entrants[names[place]].go(&mut worlds[place], blocks[round].clone(), round);
+                timings[names[place]].go(&mut worlds[place], blocks[round].clone(), round);
             });
             for (&i, world) in names.iter().zip(&worlds) {
-                self.entrants[i].hash = world.state_hash();
+                self.timings[i].hash = world.state_hash();
             }
         }
         Ok(())
@@ -215,25 +216,26 @@ impl<'a> Race<'a> {
 
     /// What was found about a setting; why it dropped out, if it did.
     pub fn sample(&self, setting: usize) -> Result<Sample, Divergence> {
-        self.entrants[setting].sample()
+        self.timings[setting].sample()
     }
 }
 
 /// Times all settings of a scene side by side; a world that diverges drops out.
-pub fn race(
+pub fn time_in_turns(
     scene: &Scene,
     settings: &[Settings],
     steps: u32,
     repeats: u32,
     seed: u64,
 ) -> Result<Vec<Result<Sample, Divergence>>, Error> {
-    let mut race = Race::new(scene, settings.to_vec(), steps, seed);
     let all: Vec<usize> = (0..settings.len()).collect();
-    race.run(repeats, &all)?;
-    Ok(all.into_iter().map(|i| race.sample(i)).collect())
+    let settings = settings.iter().map(|s| (scene, s.clone())).collect();
+    let mut interleaved = Interleaved::new(settings, steps, seed);
+    interleaved.run(repeats, &all)?;
+    Ok(all.into_iter().map(|i| interleaved.sample(i)).collect())
 }
 
-impl Entrant {
+impl Timing {
     /// Goes one block, the last pass's number `round`.
     fn go(&mut self, world: &mut World, steps: Range<u32>, round: usize) {
         if self.failure.is_some() {
@@ -326,7 +328,7 @@ pub(crate) mod tests {
 
     /// A sample of these blocks (ns per step), `[pass][block]`.
     pub fn sample(blocks: Vec<Vec<f64>>) -> Sample {
-        Entrant { blocks, ..Entrant::default() }.sample().unwrap()
+        Timing { blocks, ..Timing::default() }.sample().unwrap()
     }
 
     #[test]
@@ -379,9 +381,9 @@ pub(crate) mod tests {
             let rounds = 60;
             let mut places = vec![vec![0; count]; count];
             let mut order: Vec<Vec<usize>> = vec![Vec::new(); rounds];
-            take_turns(count, rounds, |entrant, round| {
-                places[entrant][order[round].len()] += 1;
-                order[round].push(entrant);
+            take_turns(count, rounds, |setting, round| {
+                places[setting][order[round].len()] += 1;
+                order[round].push(setting);
             });
             for round in &order {
                 let mut sorted = round.clone();

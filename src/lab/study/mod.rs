@@ -1,13 +1,14 @@
 //! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from a [race](interleave) of all
+//! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
 //! settings of a scene, alone on the machine; those that may be the cheapest are timed again. All
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 
 pub mod answer;
 pub mod budget;
 pub mod compare;
+pub mod cost;
 pub mod curve;
 pub mod interleave;
 pub mod pareto;
@@ -16,6 +17,7 @@ pub mod ranking;
 pub mod record;
 pub mod savings;
 pub mod slices;
+pub mod sweep;
 pub mod telling;
 
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -30,10 +32,11 @@ use crate::lab::scenes::tolerance::{GivenTolerances, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use compare::Ratio;
-use interleave::Race;
+use interleave::Interleaved;
 pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use sweep::{Sweep, Swept};
 
 /// Scenes of the default study: each shows something that the others do not.
 pub const DEFAULT_SCENES: [&str; 11] = [
@@ -85,6 +88,8 @@ pub struct StudyPlan {
     pub budgets: BudgetGrid,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
+    /// What takes several values; none in a study of budgets.
+    pub sweep: Option<Sweep>,
     /// Tolerances that take the place of the scenes' own.
     pub tolerances: GivenTolerances,
     /// Steps of an error run; where none, the scene's own.
@@ -106,6 +111,7 @@ impl Default for StudyPlan {
             orders: vec![Order::Natural, Order::Colored],
             budgets: BudgetGrid::default(),
             overrides: Vec::new(),
+            sweep: None,
             tolerances: GivenTolerances::default(),
             steps: None,
             timing_steps: 200,
@@ -142,13 +148,20 @@ impl StudyPlan {
         if let Some((name, _)) = counts.into_iter().find(|c| c.1 == 0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
+        if let Some(sweep) = &self.sweep {
+            sweep.check(&self.solvers, &self.overrides, &self.budgets)?;
+        }
         for solver in &self.solvers {
-            self.budgets.budgets(solver)?;
+            self.budgets(solver, None)?;
         }
         let mut names = Vec::new();
         for name in &self.scenes {
-            let scene = self.open(name)?.scene;
-            scene.validate()?;
+            // All points of a sweep have one name.
+            let mut scene = None;
+            for point in self.points() {
+                scene = Some(self.open_at(name, point)?.scene);
+            }
+            let Some(scene) = scene else { continue };
             if names.contains(&scene.name) {
                 return Err(Error::invalid("scenes", format!("two are called '{}'", scene.name)));
             }
@@ -159,6 +172,33 @@ impl StudyPlan {
 
     fn open(&self, name: &str) -> Result<Loaded, Error> {
         open_scene(name, Some(self.seed), self.steps, None)
+    }
+
+    /// What a sweep sets, one after the other; one nothing without a sweep.
+    fn points(&self) -> Vec<Option<Swept>> {
+        self.sweep.as_ref().map_or(vec![None], |sweep| sweep.points().map(Some).collect())
+    }
+
+    /// A scene at a point of the sweep.
+    fn open_at(&self, name: &str, point: Option<Swept>) -> Result<Loaded, Error> {
+        let Some((sweep, Swept { value, .. })) = self.sweep.as_ref().zip(point) else {
+            return self.open(name);
+        };
+        let name = sweep.scene_name(value, name)?;
+        let Some(dt) = sweep.dt(value) else { return Ok(sweep.adapt(value, self.open(&name)?)) };
+        let Scene { steps, dt: own, .. } = self.open(&name)?.scene;
+        // As long a time, up to rounding; the last step may begin before its end.
+        let steps = (f64::from(steps) * own / dt * (1.0 - 1e-9)).ceil().max(1.0);
+        open_scene(&name, Some(self.seed), Some(steps as u32), Some(dt))
+    }
+
+    /// The budgets of a solver; at a point of a sweep there is one.
+    fn budgets(&self, variant: &Variant, point: Option<Swept>) -> Result<Vec<Budget>, Error> {
+        let Some(sweep) = &self.sweep else { return self.budgets.budgets(variant) };
+        let standard = self.budgets == BudgetGrid::default();
+        let own = if standard { vec![variant.budget] } else { self.budgets.budgets(variant)? };
+        let at = |budget| point.map_or(Ok(budget), |point| sweep.budget(point.value, budget, variant));
+        own.into_iter().map(at).collect()
     }
 }
 
@@ -215,9 +255,11 @@ pub struct Progress {
     pub what: String,
 }
 
-/// The settings that share an error run per order.
+/// The settings that share an error run per order, one per scene, value of a sweep, solver and budget.
 struct Cell<'a> {
-    scene: usize,
+    /// Place of the scene, and of the value of the sweep.
+    scene: [usize; 2],
+    swept: Option<Swept>,
     name: &'a str,
     solver: &'static Variant,
     budget: Budget,
@@ -246,28 +288,33 @@ pub fn run(
     finished: &dyn Fn(&[Record]),
 ) -> Result<Vec<Record>, Error> {
     plan.check()?;
-    let scenes: Vec<(Scene, Tolerances)> = plan
-        .scenes
-        .iter()
-        .map(|name| plan.open(name).map(|l| (l.scene, l.tolerances.with(&plan.tolerances))))
-        .collect::<Result<_, Error>>()?;
+    let points = plan.points();
     let mut cells = Vec::new();
-    for (scene, name) in plan.scenes.iter().enumerate() {
-        for &solver in &plan.solvers {
-            for budget in plan.budgets.budgets(solver)? {
-                cells.push(Cell { scene, name, solver, budget });
+    let mut scenes: Vec<Vec<(Scene, Tolerances)>> = Vec::new();
+    for (i, name) in plan.scenes.iter().enumerate() {
+        let mut variants = Vec::new();
+        for (k, &swept) in points.iter().enumerate() {
+            let Loaded { scene, tolerances, .. } = plan.open_at(name, swept)?;
+            variants.push((scene, tolerances.with(&plan.tolerances)));
+            for &solver in &plan.solvers {
+                let budgets = plan.budgets(solver, swept)?.into_iter();
+                cells.extend(budgets.map(|budget| Cell { scene: [i, k], swept, name, solver, budget }));
             }
         }
+        scenes.push(variants);
     }
     let done = AtomicUsize::new(0);
-    let total = cells.len() * plan.orders.len() + scenes.len() * (plan.repeats as usize + 1);
+    let finals = usize::from(plan.sweep.is_none());
+    let total = cells.len() * plan.orders.len() + scenes.len() * (plan.repeats as usize + finals);
     let tell = |what: String| progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
-    let outcomes = error_runs(plan, &cells, &tell)?;
+    let timed: Vec<u32> =
+        scenes.iter().map(|variants| timing_steps(plan, variants.iter().map(|v| &v.0))).collect();
+    let outcomes = error_runs(plan, &cells, &timed, &tell)?;
     let mut records = Vec::new();
-    for (i, (scene, tolerances)) in scenes.iter().enumerate() {
-        let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene == i);
+    for (i, variants) in scenes.iter().enumerate() {
+        let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene[0] == i);
         let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
-        let mut own = timed_records(plan, scene, *tolerances, &rows, &tell)?;
+        let mut own = timed_records(plan, variants, timed[i], &rows, &tell)?;
         mark_fronts(&mut own);
         if plan.steps.is_some() {
             leave_out_unseen_truths(&mut own);
@@ -289,19 +336,25 @@ fn leave_out_unseen_truths(records: &mut [Record]) {
 
 /// Settings of a cell in one order at one width.
 fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
-    let parameters = overrides::values(cell.solver, &plan.overrides).unwrap_or(cell.solver.defaults());
+    let mut parameters = overrides::values(cell.solver, &plan.overrides).unwrap_or(cell.solver.defaults());
+    if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
+        // Checked with the plan.
+        let _ = sweep.set(point.value, &mut parameters, cell.solver);
+    }
     Settings { width, order, budget: cell.budget, parameters, ..Settings::new(cell.solver) }
 }
 
-/// Steps of a timing run.
-fn timing_steps(plan: &StudyPlan, scene: &Scene) -> u32 {
-    interleave::whole_blocks(scene.steps.min(plan.timing_steps))
+/// Steps of a timing run of scenes that take turns.
+fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene>) -> u32 {
+    let shortest = scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min);
+    interleave::whole_blocks(shortest)
 }
 
-/// Every cell in every order, on all cores; `[cell][order]`.
+/// Every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each scene.
 fn error_runs(
     plan: &StudyPlan,
     cells: &[Cell],
+    timed: &[u32],
     tell: &(dyn Fn(String) + Sync),
 ) -> Result<Vec<Vec<Outcome>>, Error> {
     let jobs: Vec<(usize, Order)> =
@@ -312,9 +365,9 @@ fn error_runs(
         loop {
             let job = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(cell, order)) = jobs.get(job) else { return Ok::<(), Error>(()) };
-            let Cell { name, solver, budget, .. } = &cells[cell];
+            let Cell { scene, name, solver, budget, .. } = &cells[cell];
             tell(format!("errors {name} · {} · {}", solver.name, budget::brief(budget, solver)));
-            let outcome = error_run(plan, &cells[cell], order)?;
+            let outcome = error_run(plan, &cells[cell], order, timed[scene[0]])?;
             if let Ok(mut found) = found.lock() {
                 found[job] = Some(outcome);
             }
@@ -332,13 +385,12 @@ fn error_runs(
     Ok(outcomes.chunks(plan.orders.len()).map(<[Outcome]>::to_vec).collect())
 }
 
-fn error_run(plan: &StudyPlan, cell: &Cell, order: Order) -> Result<Outcome, Error> {
-    let loaded = plan.open(cell.name)?;
+fn error_run(plan: &StudyPlan, cell: &Cell, order: Order, timed: u32) -> Result<Outcome, Error> {
+    let loaded = plan.open_at(cell.name, cell.swept)?;
     let width = match order {
         Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
     };
-    let timed = timing_steps(plan, &loaded.scene);
     observe(loaded, settings(plan, cell, order, width), timed)
 }
 
@@ -398,33 +450,40 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
 /// Finalists are timed so many times as often again.
 const FINAL: u32 = 2;
 
-/// Races all settings of a scene that did not diverge, and those that may be the cheapest again.
+/// Times in turns all settings of a scene that did not diverge, and those that may be the cheapest again; in
+/// a sweep all of them as often. `variants`: the scene at each value of the sweep.
 fn timed_records(
     plan: &StudyPlan,
-    scene: &Scene,
-    tolerances: Tolerances,
+    variants: &[(Scene, Tolerances)],
+    steps: u32,
     rows: &[Row],
     tell: &dyn Fn(String),
 ) -> Result<Vec<Record>, Error> {
-    let racing: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
-    let chosen = racing.iter().map(|&i| settings(plan, rows[i].cell, rows[i].order, rows[i].width));
-    let mut race = Race::new(scene, chosen.collect(), timing_steps(plan, scene), plan.seed);
-    let all: Vec<usize> = (0..racing.len()).collect();
+    let running: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
+    let variant = |row: &Row| &variants[row.cell.scene[1]];
+    let chosen = running.iter().map(|&i| {
+        let row = &rows[i];
+        (&variant(row).0, settings(plan, row.cell, row.order, row.width))
+    });
+    let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
+    let name = &variants[0].0.name;
+    let all: Vec<usize> = (0..running.len()).collect();
     for pass in 1..=plan.repeats {
-        tell(format!("times {} · pass {pass}", scene.name));
-        race.run(1, &all)?;
+        tell(format!("times {name} · pass {pass}"));
+        interleaved.run(1, &all)?;
     }
-    let place = |i: usize| racing.binary_search(&i).ok();
+    let place = |i: usize| running.binary_search(&i).ok();
     let untimed = Divergence { step: 0, body: 0, speed: 0.0 };
-    let lap = |race: &Race, i: usize| match rows[i].outcome.errors {
-        Ok(_) => place(i).map_or(Err(untimed), |place| race.sample(place)),
+    let sample = |interleaved: &Interleaved, i: usize| match rows[i].outcome.errors {
+        Ok(_) => place(i).map_or(Err(untimed), |place| interleaved.sample(place)),
         Err(divergence) => Err(divergence),
     };
     let record = |(i, row): (usize, &Row)| {
         let Row { cell, order, width, outcome } = row;
-        let lap = lap(&race, i);
-        let failure = lap.as_ref().err().map(|&d| Failure::from(d));
-        let lap = lap.ok();
+        let (scene, tolerances) = variant(row);
+        let sample = sample(&interleaved, i);
+        let failure = sample.as_ref().err().map(|&d| Failure::from(d));
+        let sample = sample.ok();
         Record {
             scene: scene.name.clone(),
             bodies: scene.bodies.len(),
@@ -434,32 +493,35 @@ fn timed_records(
             lanes: width.lanes(),
             budget: cell.budget,
             budget_text: budget::brief(&cell.budget, cell.solver),
+            swept: cell.swept,
             speed_up: None,
             errors: outcome.errors.ok().filter(|_| failure.is_none()),
             truth: outcome.truth,
-            tolerances,
+            tolerances: *tolerances,
             broken: outcome.broken,
-            bits_equal: lap.as_ref().map(|lap| lap.hash == outcome.hash),
+            bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
             front: Fronts::default(),
-            lap,
+            sample,
             failure,
         }
     };
     let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
 
-    tell(format!("times {} · finalists", scene.name));
-    let finalists = answer::finalists(&records);
-    let entering: Vec<usize> = finalists.iter().filter_map(|&i| place(i)).collect();
-    race.run(FINAL * plan.repeats, &entering)?;
-    for i in finalists {
-        records[i].lap = lap(&race, i).ok();
+    if plan.sweep.is_none() {
+        tell(format!("times {name} · finalists"));
+        let finalists = answer::finalists(&records);
+        let entering: Vec<usize> = finalists.iter().filter_map(|&i| place(i)).collect();
+        interleaved.run(FINAL * plan.repeats, &entering)?;
+        for i in finalists {
+            records[i].sample = sample(&interleaved, i).ok();
+        }
     }
     let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
     for i in 0..records.len() {
         let own = &records[i];
-        let budget = |r: &&Record| (r.solver, r.budget) == (own.solver, own.budget);
-        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.lap.as_ref());
-        let ratio = slow.zip(own.lap.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
+        let budget = |r: &&Record| (r.solver, r.budget, r.swept) == (own.solver, own.budget, own.swept);
+        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
+        let ratio = slow.zip(own.sample.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
         records[i].speed_up = ratio.map(|r| r.median);
     }
     Ok(records)

@@ -27,7 +27,7 @@ pub fn times_of_fastest(
     let less = |a: &&Sample, b: &&Sample| a.median_ns.total_cmp(&b.median_ns);
     let own = |solver: &&str| {
         let allowed = scene.iter().filter(|r| r.solver == *solver && allowed(r));
-        allowed.filter_map(|r| r.lap.as_ref()).min_by(less)
+        allowed.filter_map(|r| r.sample.as_ref()).min_by(less)
     };
     let times: Vec<Option<&Sample>> = solvers.iter().map(own).collect();
     let Some(least) = times.iter().flatten().copied().min_by(less) else { return vec![None; solvers.len()] };

@@ -3,6 +3,7 @@
 use super::curve::ErrorAxis;
 use super::interleave::Sample;
 use super::pareto::{self, Point};
+use super::sweep::Swept;
 use crate::engine::params::Budget;
 use crate::engine::world::{Divergence, Order};
 use crate::lab::interned::{self, Name};
@@ -31,8 +32,12 @@ pub struct Record {
     pub budget: Budget,
     /// The same, for tables.
     pub budget_text: String,
+    /// What a sweep set; none without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swept: Option<Swept>,
     /// Times and counts; none if the run failed.
-    pub lap: Option<Sample>,
+    #[serde(alias = "lap")]
+    pub sample: Option<Sample>,
     /// Times faster than one coloured lane; none without that run.
     pub speed_up: Option<f64>,
     /// Errors, the same for all widths; none if the run failed.
@@ -144,17 +149,17 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Marks, scene by scene, the settings on each front, of those that hold. A setting is a solver, a budget and
+/// Marks, scene by scene and value by value of a sweep, the settings on each front, of those that hold. A setting is a solver, a budget and
 /// an order, at its fastest width.
 pub fn mark_fronts(records: &mut [Record]) {
-    for group in records.chunk_by_mut(|a, b| a.scene == b.scene) {
+    for group in records.chunk_by_mut(|a, b| a.scene == b.scene && a.swept == b.swept) {
         let fastest: Vec<usize> =
             (0..group.len()).filter(|&i| group[i].holds() && is_fastest(group, i)).collect();
         let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
             let (indices, points): (Vec<usize>, Vec<Point>) = fastest
                 .iter()
                 .filter_map(|&i| {
-                    let (sample, error) = (group[i].lap.as_ref()?, error(&group[i])?);
+                    let (sample, error) = (group[i].sample.as_ref()?, error(&group[i])?);
                     Some((i, Point { sample, error }))
                 })
                 .unzip();
@@ -172,7 +177,7 @@ pub fn mark_fronts(records: &mut [Record]) {
 /// Whether no width of the same setting is faster than record `i`.
 fn is_fastest(group: &[Record], i: usize) -> bool {
     let own = &group[i];
-    let time = |r: &Record| r.lap.as_ref().map(|lap| lap.median_ns);
+    let time = |r: &Record| r.sample.as_ref().map(|sample| sample.median_ns);
     let Some(own_time) = time(own) else { return false };
     let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
     !group.iter().any(|r| same(r) && time(r).is_some_and(|t| t < own_time))
@@ -185,7 +190,7 @@ pub(crate) mod tests {
 
     /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
-        let lap = Sample {
+        let sample = Sample {
             median_ns: 1e3 * time,
             spread_ns: 0.0,
             quartiles_ns: [0.0; 2],
@@ -204,7 +209,8 @@ pub(crate) mod tests {
             lanes,
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
             budget_text: format!("{substeps} sub"),
-            lap: Some(lap),
+            swept: None,
+            sample: Some(sample),
             speed_up: None,
             errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),
             truth: None,
@@ -218,7 +224,7 @@ pub(crate) mod tests {
 
     pub fn failed(lanes: usize) -> Record {
         let failure = Failure { step: 7, body: 2, speed: None };
-        Record { lap: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
+        Record { sample: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
     /// A record of a run that has errors and a time, and fell.

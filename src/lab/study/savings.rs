@@ -7,7 +7,7 @@
 //!
 //! Scenes of few contacts are left out: what their sweeps cost is the cost of starting them.
 
-use super::interleave::{Sample, race};
+use super::interleave::{Sample, time_in_turns};
 use super::{Progress, StudyPlan, timing_steps};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Features;
@@ -94,7 +94,7 @@ fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Savin
     }
     let mut settings = vec![base.clone()];
     settings.extend(forced.iter().map(|&(_, extra_features)| Settings { extra_features, ..base.clone() }));
-    let samples = race(scene, &settings, timing_steps(plan, scene), plan.repeats, plan.seed)?;
+    let samples = time_in_turns(scene, &settings, timing_steps(plan, [scene]), plan.repeats, plan.seed)?;
     let Some(Ok(own)) = samples.first() else { return Ok(Vec::new()) };
     if own.load.contacts < FEWEST_CONTACTS {
         return Ok(Vec::new());
@@ -118,8 +118,8 @@ fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Savin
 }
 
 /// ns per contact and sweep, from the median times of the phases that sweep.
-fn per_contact(lap: &Sample) -> f64 {
-    let sweeps = Phase::ALL.iter().zip(lap.phase_ns).filter(|(phase, _)| phase.is_sweep());
+fn per_contact(sample: &Sample) -> f64 {
+    let sweeps = Phase::ALL.iter().zip(sample.phase_ns).filter(|(phase, _)| phase.is_sweep());
     let ns: f64 = sweeps.map(|(_, ns)| ns).sum();
-    ns / (lap.load.contacts * lap.load.sweeps).max(1.0)
+    ns / (sample.load.contacts * sample.load.sweeps).max(1.0)
 }

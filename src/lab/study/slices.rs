@@ -30,7 +30,7 @@ pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
 /// The times to equal error.
 pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
     let best = |least: &Sample, other: &Sample| {
-        let samples = least.record.lap.as_ref().zip(other.record.lap.as_ref());
+        let samples = least.record.sample.as_ref().zip(other.record.sample.as_ref());
         samples.is_some_and(|(least, other)| compare(least, other).is_eq())
     };
     slice(records, axis, |s| s.error, Curve::fastest_within, |s| s.time, best)

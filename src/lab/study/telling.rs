@@ -18,10 +18,13 @@ const MOST: usize = 4;
 const LARGEST: usize = 300;
 const FRAMES: u32 = 300;
 
-/// The runs to play: of the scene on which as many solvers hold as fail, the cheapest setting within
+/// The runs to play (none of a sweep, whose scenes differ): of the scene on which as many solvers hold as fail, the cheapest setting within
 /// tolerance or nearest to it, then those that broke, then others that hold; each of another solver.
 /// Empty where nothing was run in colours on a small scene.
 pub fn telling(records: &[Record]) -> Vec<&Record> {
+    if records.iter().any(|r| r.swept.is_some()) {
+        return Vec::new();
+    }
     let mut best: (usize, usize, Vec<&Record>) = Default::default();
     for scene in records.chunk_by(|a, b| a.scene == b.scene).filter(|s| s[0].bodies <= LARGEST) {
         let solvers = solvers_of(scene);
@@ -78,7 +81,7 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
-    let cell = Cell { scene: 0, name, solver, budget: record.budget };
+    let cell = Cell { scene: [0; 2], swept: None, name, solver, budget: record.budget };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;

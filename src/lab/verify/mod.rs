@@ -13,7 +13,7 @@
 //!
 //! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], soft contacts in
 //! substeps) is required to pass, and which promise of its mathematics that rests on, or which it
-//! lacks. The exit code of `simpulse verify` asks for exactly those. A required case that fails stays
+//! lacks. The exit code of `simpulse verify` requires exactly those. A required case that fails stays
 //! required, and a row whose bound or mark was relaxed after a failure says so ([`Case::relaxed`]).
 //!
 //! | promise | because |
@@ -125,7 +125,7 @@ pub enum Required {
 }
 
 impl Required {
-    /// Whether the exit code asks for it.
+    /// Whether the exit code requires it.
     pub fn is_required(self) -> bool {
         matches!(self, Required::Yes(_))
     }

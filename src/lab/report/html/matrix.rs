@@ -91,7 +91,7 @@ pub fn matrix(matrix: &Matrix) -> String {
                         Some(reason) => reason.clone(),
                         None => {
                             format!(
-                                "measured {}, truth {} ± {}",
+                                "measured {}, reference {} ± {}",
                                 word(&o.measured),
                                 word(&o.truth),
                                 word(&o.tolerance)
@@ -108,7 +108,7 @@ pub fn matrix(matrix: &Matrix) -> String {
         }
         text += "</tr>\n";
     }
-    text + "</tbody></table>\n<p class=\"soft\">A cell is the distance to the truth in tolerances: up to 1 passes, \
+    text + "</tbody></table>\n<p class=\"soft\">A cell is the distance to the reference value in tolerances: up to 1 passes, \
             ✗ fails. * is required of the default solver.</p>\n"
 }
 

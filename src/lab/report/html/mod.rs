@@ -13,6 +13,7 @@ mod precision;
 mod scale;
 mod sections;
 mod setting;
+mod sweep;
 mod words;
 
 use crate::lab::error::Error;
@@ -23,10 +24,13 @@ use crate::lab::recording::page::{MOST, Panel, SCRIPT, STYLE, fragment};
 use crate::lab::recording::read::read_file;
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
+use crate::lab::report::sweep::is_sweep;
 use crate::lab::study::curve::solvers_of;
+use crate::lab::units::{bodies, count};
 use matrix::Matrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+pub use sweep::svg as sweep_svg;
 
 /// Name of the page in the folder of a study.
 pub const NAME: &str = "report.html";
@@ -85,10 +89,10 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
          </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{STYLE}</style>\n</head>\n<body>\n\
          <h1>Which contact solver, how fast, and how wrong?</h1>\n\
-         <p class=\"soft\">{} scenes, {} solvers, {} settings · {}, {} lanes native · simpulse {}</p>\n",
+         <p class=\"soft\">{}, {}, {} settings · {}, {} lanes native · simpulse {}</p>\n",
         include_str!("page.css"),
-        scenes.len(),
-        solvers.len(),
+        count(scenes.len(), "scene"),
+        count(solvers.len(), "solver"),
         records.len(),
         escaped(&e.cpu),
         e.native_lanes,
@@ -108,6 +112,19 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         body += &content;
         body += "</section>\n";
     };
+    if is_sweep(records) {
+        let swept = records.iter().find_map(|r| r.swept).map_or("", |s| s.name);
+        let lead = format!(
+            "Time and errors against {}, a curve per solver; a mark is a setting at its fastest lane width, hollow \
+             ones are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the \
+             scene’s tolerance. What falls, slides, tunnels or blows up is at the upper edge and breaks the curve. \
+             All settings of a scene were timed in turns.",
+            escaped(swept)
+        );
+        section("sweep", "Sweep", &lead, sweep::section(records));
+        section("machine", "Machine, settings and command", "", machine(study));
+        return text + &body + "</body>\n</html>\n";
+    }
     section("answer", "The answer", "", words::answer(records, study.settings["steps"].as_u64()));
     section(
         "overview",
@@ -134,10 +151,10 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     for scene in scenes {
         let name = &scene[0].scene;
         by_scene += &format!(
-            "<h3 id=\"{}\">{} <span class=\"soft\">{} bodies</span></h3>\n{}",
+            "<h3 id=\"{}\">{} <span class=\"soft\">{}</span></h3>\n{}",
             words::anchor(name),
             escaped(name),
-            scene[0].bodies,
+            bodies(scene[0].bodies),
             precision::scene(scene)
         );
     }
@@ -182,7 +199,7 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
                  <code>simpulse report DIR</code> put it here.</p>\n"
             .into(),
     };
-    section("verify", "Hard cases whose truth is known", "", cases);
+    section("verify", "Hard cases with known reference values", "", cases);
     section("machine", "Machine, settings and command", "", machine(study));
     text += "<nav>";
     for (id, title) in &contents {
@@ -246,11 +263,18 @@ fn command(settings: &Value) -> String {
         a.iter().map(|o| format!("{}={}", plain(&o["name"]), plain(&o["value"]))).collect()
     });
     option("set", set);
-    let units = [("penetration", "m"), ("residual", ""), ("truth", "")];
-    let given = |(name, unit): &(&str, &str)| {
-        settings["tolerance"][name].as_f64().map(|v| format!("{name}={v}{unit}"))
+    let sweep = &settings["sweep"];
+    if sweep.is_object() {
+        let values = sweep["values"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+        let values: Vec<String> = values.map(|v| v.to_string()).collect();
+        option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
+    }
+    let options =
+        [("penetration", "penetration", "m"), ("residual", "residual", ""), ("truth", "reference", "")];
+    let given = |(name, option, unit): &(&str, &str, &str)| {
+        settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))
     };
-    option("tolerance", units.iter().filter_map(given).collect());
+    option("tolerance", options.iter().filter_map(given).collect());
     for name in ["steps", "repeats", "seed"] {
         let value = &settings[name];
         option(name, if value.is_u64() { vec![value.to_string()] } else { Vec::new() });
@@ -313,6 +337,19 @@ mod tests {
             }
         }
         open.is_empty()
+    }
+
+    #[test]
+    fn the_command_has_the_options_of_the_command_line() {
+        let mut plan = StudyPlan { sweep: Some("friction=0.5,0".parse().unwrap()), ..StudyPlan::default() };
+        plan.tolerances.penetration = Some(0.005);
+        plan.tolerances.truth = Some(3.0);
+        let command = command(&StudyFile::new(&plan, Vec::new(), Vec::new()).settings);
+        for part in
+            [" --sweep friction=0,0.5 ", " --tolerance penetration=0.005m,reference=3 ", " --repeats 3 "]
+        {
+            assert!(command.contains(part), "{part}: {command}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
 //! tolerances of each scene.
 
-use super::panel::{Frame, Labels, Panel, legend};
+use super::panel::{Band, Frame, Labels, Panel, legend};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes};
 use crate::lab::report::style::Style;
@@ -61,7 +61,7 @@ pub fn overview(records: &[Record]) -> String {
             "largest error, in the tolerance of its scene (1 = just within)",
             "time of a step, in times that of the fastest setting that holds",
         ],
-        band: true,
+        band: Band::Right,
     };
     let mut panel = Panel::new(&frame, x, y);
     panel.shade_left(1.0);
@@ -78,7 +78,8 @@ pub fn overview(records: &[Record]) -> String {
                 panel.marker(panel.at(x, dot.slower), 2.6, e.solver, false, true, &title);
             }
             None => {
-                let title = format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its truth".into()));
+                let title =
+                    format!("{title}: {}", e.broke().unwrap_or_else(|| "missed its reference value".into()));
                 let place = Style::of(e.solver).marker as usize as f64 / 7.0;
                 panel.marker(panel.in_band(dot.slower, place), 2.6, e.solver, false, true, &title);
             }

@@ -2,10 +2,22 @@
 
 use super::scale::Scale;
 use crate::lab::picture::svg::{escaped, points, px};
+use crate::lab::report::axes::wrapped;
 use crate::lab::report::style::Style;
 
 /// Width of the band for what has no place on the axis (pixels).
 const BAND: f64 = 34.0;
+
+/// Where the band for what failed is: beyond the errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Band {
+    /// Nothing fails here.
+    None,
+    /// Errors grow to the right.
+    Right,
+    /// Errors grow upwards.
+    Top,
+}
 
 /// An SVG being written.
 pub struct Panel {
@@ -26,16 +38,18 @@ pub struct Frame<'a> {
     pub title: &'a str,
     /// Names of the axes.
     pub names: [&'a str; 2],
-    /// A band at the right for what failed.
-    pub band: bool,
+    /// A band for what failed.
+    pub band: Band,
 }
 
 impl Panel {
     /// Draws the frame.
     pub fn new(frame: &Frame, x: Scale, y: Scale) -> Panel {
         let [width, height] = frame.size;
-        let (left, top, bottom) = (70.0, if frame.title.is_empty() { 10.0 } else { 30.0 }, height - 46.0);
-        let right = width - 12.0 - if frame.band { BAND } else { 0.0 };
+        let in_band = |side: Band| if frame.band == side { BAND } else { 0.0 };
+        let head = if frame.title.is_empty() { 10.0 } else { 30.0 };
+        let (left, top, bottom) = (70.0, head + in_band(Band::Top), height - 46.0);
+        let right = width - 12.0 - in_band(Band::Right);
         let title = escaped(frame.title);
         let mut text = format!(
             "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}, {} against {}\">\n\
@@ -67,9 +81,23 @@ impl Panel {
             px(left),
             px(top)
         );
-        for (v, label) in &x.ticks {
-            text +=
-                &format!("<text class=\"x\" x=\"{}\" y=\"{}\">{label}</text>", across(*v), px(bottom + 15.0));
+        // As many labels as do not touch each other, at equal distances, and none in that of the band.
+        let end = if frame.band == Band::Right { right + 0.5 * BAND - 17.0 } else { width };
+        let place = |(v, label): &(f64, String)| {
+            let (at, half) = (left + x.share(*v) * (right - left), 3.5 * label.chars().count() as f64);
+            [at, half]
+        };
+        let apart = |stride: usize| {
+            let kept: Vec<[f64; 2]> = x.ticks.iter().step_by(stride).map(place).collect();
+            kept.windows(2).all(|w| w[0][0] + w[0][1] + 3.0 < w[1][0] - w[1][1])
+        };
+        let stride = (1..=x.ticks.len()).find(|&stride| apart(stride)).unwrap_or(1);
+        for tick in x.ticks.iter().step_by(stride) {
+            let [at, half] = place(tick);
+            if at + half < end {
+                let (x, y) = (px(at), px(bottom + 15.0));
+                text += &format!("<text class=\"x\" x=\"{x}\" y=\"{y}\">{}</text>", tick.1);
+            }
         }
         for (v, label) in &y.ticks {
             text += &format!(
@@ -79,23 +107,41 @@ impl Panel {
             );
         }
         let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
+        // A character is about half as wide as its line is high.
+        let lines = wrapped(frame.names[0], ((right - left) / 5.6) as usize);
+        let first = height - 10.0 - 6.5 * lines.len().saturating_sub(1) as f64;
+        for (i, line) in lines.iter().enumerate() {
+            let y = px(first + 12.5 * i as f64);
+            text += &format!("\n<text class=\"name\" x=\"{middle}\" y=\"{y}\">{}</text>", escaped(line));
+        }
         text += &format!(
-            "\n<text class=\"name\" x=\"{middle}\" y=\"{}\">{}</text>\n\
-             <text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
-            px(height - 10.0),
-            escaped(frame.names[0]),
+            "\n<text class=\"name\" transform=\"translate(11 {half}) rotate(-90)\">{}</text>\n",
             escaped(frame.names[1])
         );
-        if frame.band {
-            text += &format!(
-                "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{h}\"/>\n\
-                 <text class=\"x\" x=\"{}\" y=\"{}\">fails</text>\n",
-                px(right + 2.0),
-                px(top),
-                px(BAND - 2.0),
-                px(right + 0.5 * BAND),
-                px(bottom + 15.0)
-            );
+        match frame.band {
+            Band::None => {}
+            Band::Right => {
+                text += &format!(
+                    "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{h}\"/>\n\
+                     <text class=\"x\" x=\"{}\" y=\"{}\">fails</text>\n",
+                    px(right + 2.0),
+                    px(top),
+                    px(BAND - 2.0),
+                    px(right + 0.5 * BAND),
+                    px(bottom + 15.0)
+                );
+            }
+            Band::Top => {
+                text += &format!(
+                    "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{w}\" height=\"{}\"/>\n\
+                     <text class=\"y\" x=\"{}\" y=\"{}\" dy=\".35em\">fails</text>\n",
+                    px(left),
+                    px(top - BAND),
+                    px(BAND - 2.0),
+                    px(left - 5.0),
+                    px(top - 0.5 * BAND)
+                );
+            }
         }
         Panel { text, left, top, right, bottom, x, y }
     }
@@ -110,6 +156,24 @@ impl Panel {
     pub fn in_band(&self, y: f64, place: f64) -> [f64; 2] {
         let [_, down] = self.at(self.x.low, y);
         [self.right + 8.0 + place * (BAND - 14.0), down]
+    }
+
+    /// Where something that failed at x is drawn in the band above the frame, `place` in [0, 1] up the band.
+    pub fn above(&self, x: f64, place: f64) -> [f64; 2] {
+        let [across, _] = self.at(x, self.y.low);
+        [across, self.top - 8.0 - place * (BAND - 14.0)]
+    }
+
+    /// Everything below y within the frame.
+    pub fn shade_below(&mut self, y: f64) {
+        let [_, up] = self.at(self.x.low, y);
+        self.text += &format!(
+            "<rect class=\"good\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
+            px(self.left),
+            px(up),
+            px(self.right - self.left),
+            px(self.bottom - up)
+        );
     }
 
     /// A broken line through pixels.

@@ -1,6 +1,6 @@
 //! Work-precision plots: time against three errors, scene by scene, with every number in a table.
 
-use super::panel::{Frame, Labels, Panel};
+use super::panel::{Band, Frame, Labels, Panel};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest};
 use crate::lab::picture::svg::escaped;
@@ -10,7 +10,7 @@ use crate::lab::study::curve::ErrorAxis as Axis;
 use crate::lab::units::{digits, lanes, si};
 
 /// Name and unit of an error on a scene.
-fn name(scene: &[Record], axis: Axis) -> Option<(String, String)> {
+pub fn name(scene: &[Record], axis: Axis) -> Option<(String, String)> {
     match axis {
         Axis::Penetration => Some(("deepest penetration".into(), "m".into())),
         Axis::Law => Some(("contact-law residual (body weights, rms)".into(), String::new())),
@@ -44,7 +44,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     let tolerance = settings.first().and_then(|e| e.tolerance(axis));
     let xs = held().map(|e| error(e)).chain(tolerance);
     let ys = settings.iter().filter_map(|e| e.time());
-    let frame = Frame { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: true };
+    let frame = Frame { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: Band::Right };
     let mut panel = Panel::new(&frame, Scale::log(xs, unit), Scale::log(ys, "s"));
     if let Some(tolerance) = tolerance {
         panel.shade_left(tolerance);
@@ -78,15 +78,15 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     let mut order: Vec<&&Record> = settings.iter().collect();
     order.sort_by_key(|e| (!e.on_front(axis), e.is_natural()));
     for entry in order {
-        let Some(lap) = &entry.lap else { continue };
-        let (time, color) = (1e-9 * lap.median_ns, Style::of(entry.solver).color);
+        let Some(sample) = &entry.sample else { continue };
+        let (time, color) = (1e-9 * sample.median_ns, Style::of(entry.solver).color);
         let budgets: Vec<&&Record> =
             settings.iter().filter(|e| e.solver == entry.solver && e.order == entry.order).collect();
         let size = budgets.iter().position(|e| e.budget == entry.budget).unwrap_or(0).min(4);
         let what = format!("{}, {}: {}", entry.solver, entry.words(), si(time, "s"));
         match (entry.broke(), axis.of(entry)) {
             (None, Some(value)) => {
-                let quartiles = lap.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
+                let quartiles = sample.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
                 if quartiles[0] > 1e-11 {
                     panel.bar(error(entry), quartiles, color);
                 }
@@ -101,7 +101,8 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
                 }
             }
             (broke, _) => {
-                let title = format!("{what}, {}", broke.unwrap_or_else(|| "missed its truth".into()));
+                let title =
+                    format!("{what}, {}", broke.unwrap_or_else(|| "missed its reference value".into()));
                 let at = panel.in_band(time, Style::of(entry.solver).marker as usize as f64 / 7.0);
                 panel.marker(at, 3.0, entry.solver, entry.is_natural(), false, &title);
             }
@@ -113,7 +114,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
 fn table(entries: &[Record], settings: &[&Record]) -> String {
     let mut text = String::from(
         "<details><summary>All settings of this scene</summary>\n<table class=\"numbers\"><thead><tr><th>solver\
-         <th>budget<th>order, lanes<th>time (µs)<th>speed-up<th>penetration<th>residual<th>to truth<th>verdict\
+         <th>budget<th>order, lanes<th>time (µs)<th>speed-up<th>penetration<th>residual<th>to reference<th>verdict\
          </tr></thead><tbody>\n",
     );
     let unit = entries.iter().find_map(|e| e.truth.as_ref()).map_or("", |t| t.unit);
@@ -123,7 +124,7 @@ fn table(entries: &[Record], settings: &[&Record]) -> String {
             (Some(broke), _) => format!("<td class=\"bad\">{}", escaped(&broke)),
             (None, Some(x)) if x <= 1.0 => "<td class=\"ok\">within tolerance".into(),
             (None, Some(x)) => format!("<td>{}× tolerance", number(x)),
-            (None, None) => "<td>missed its truth".into(),
+            (None, None) => "<td>missed its reference value".into(),
         };
         let order = if entry.is_natural() { "natural".into() } else { lanes(entry.lanes) };
         text += &format!(

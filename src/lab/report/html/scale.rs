@@ -66,6 +66,25 @@ impl Scale {
         Scale { log: false, low: 0.0, high, ticks, minor: Vec::new() }
     }
 
+    /// An axis with ticks at these values, as many as there is room for, and at nothing else; logarithmic
+    /// where every value has a logarithm.
+    pub fn at(values: &[f64], unit: &str) -> Scale {
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min).min(1e12);
+        let high = values.iter().copied().fold(low, f64::max);
+        let log = low > 0.0;
+        let stride = values.len().div_ceil(MOST + 1).max(1);
+        let ticks = values.iter().step_by(stride).map(|&v| (v, label(v, unit))).collect();
+        let room = if high > low { 0.05 * (high - low) } else { 1.0 };
+        let (low, high) = match log {
+            true => {
+                let room = (high / low).powf(0.05).max(1.05);
+                (low / room, high * room)
+            }
+            false => (low - room, high + room),
+        };
+        Scale { log, low, high, ticks, minor: Vec::new() }
+    }
+
     /// An axis with these ticks, and nothing between; logarithmic.
     pub fn steps(values: &[usize]) -> Scale {
         let all: Vec<f64> = values.iter().map(|&v| v as f64).collect();
@@ -152,6 +171,19 @@ mod tests {
         let labels: Vec<&str> = linear.ticks.iter().map(|t| t.1.as_str()).collect();
         assert_eq!(labels, ["0×", "2×", "4×", "6×"]);
         assert_eq!(Scale::log([], "").ticks.len(), 3);
+    }
+
+    #[test]
+    fn ticks_are_at_the_values_of_a_sweep() {
+        let hertz = Scale::at(&[15.0, 30.0, 60.0], "Hz");
+        let labels: Vec<&str> = hertz.ticks.iter().map(|t| t.1.as_str()).collect();
+        assert_eq!(labels, ["15 Hz", "30 Hz", "60 Hz"]);
+        assert!((hertz.share(30.0) - 0.5).abs() < 1e-12 && hertz.share(15.0) > 0.0);
+        let friction = Scale::at(&[0.0, 0.5, 1.0], "");
+        assert!((friction.share(0.5) - 0.5).abs() < 1e-12 && friction.share(0.0) > 0.0);
+        assert!((Scale::at(&[3.0], "").share(3.0) - 0.5).abs() < 1e-12);
+        let many: Vec<f64> = (1..=40).map(f64::from).collect();
+        assert!(Scale::at(&many, "").ticks.len() <= MOST + 1);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Profiles, lanes, phases and iterations.
 
-use super::panel::{Frame, Panel};
+use super::panel::{Band, Frame, Panel};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes, standard};
 use crate::engine::clock::Phase;
@@ -19,7 +19,7 @@ pub fn profiles(records: &[Record]) -> String {
         let title = format!("{} within tolerance", profile.axis.name());
         let share = format!("share of {} scenes", profile.scenes);
         let names = ["time, in times that of the fastest", share.as_str()];
-        let frame = Frame { size: [420.0, 310.0], title: &title, names, band: false };
+        let frame = Frame { size: [420.0, 310.0], title: &title, names, band: Band::None };
         let mut x = Scale::log([1.0, most], "×");
         x.low = 0.95;
         x.ticks.retain(|t| t.0 >= 1.0);
@@ -67,11 +67,11 @@ pub fn lanes(records: &[Record]) -> String {
         // The standard budget of each solver.
         let runs = |solver: &'static str| -> Vec<&Record> {
             let Some(chosen) = standard(scene, solver).filter(|e| !e.is_natural()) else { return Vec::new() };
-            scene.iter().filter(|e| answer::same(e, chosen) && e.lap.is_some()).collect()
+            scene.iter().filter(|e| answer::same(e, chosen) && e.sample.is_some()).collect()
         };
         let all: Vec<&Record> = solvers_of(records).into_iter().flat_map(runs).collect();
         let most = all.iter().filter_map(|e| e.speed_up).fold(1.0, f64::max);
-        let colors = all.iter().filter_map(|e| e.lap.as_ref()).map(|l| l.load.colors);
+        let colors = all.iter().filter_map(|e| e.sample.as_ref()).map(|l| l.load.colors);
         let colors = (colors.clone().min().unwrap_or(0), colors.max().unwrap_or(0));
         let colors = match colors {
             (1, 1) => "1 colour".to_string(),
@@ -80,7 +80,7 @@ pub fn lanes(records: &[Record]) -> String {
         };
         let title = format!("{} · {colors}", scene[0].scene);
         let panel = |size, title: &str, names, y| {
-            Panel::new(&Frame { size, title, names, band: false }, Scale::steps(&widths), y)
+            Panel::new(&Frame { size, title, names, band: Band::None }, Scale::steps(&widths), y)
         };
         let mut speed =
             panel([300.0, 250.0], &title, ["lanes", "speed-up over 1 lane"], Scale::linear(most, "×"));
@@ -89,7 +89,7 @@ pub fn lanes(records: &[Record]) -> String {
             let runs = runs(solver);
             for (panel, value) in [
                 (&mut speed, (|e: &Record| e.speed_up) as fn(&Record) -> Option<f64>),
-                (&mut filled, |e: &Record| e.lap.as_ref().map(|l| l.load.occupancy)),
+                (&mut filled, |e: &Record| e.sample.as_ref().map(|l| l.load.occupancy)),
             ] {
                 let points = runs.iter().filter_map(|e| Some((e, value(e)?)));
                 let points: Vec<_> = points.map(|(e, v)| (panel.at(e.lanes as f64, v), *e, v)).collect();
@@ -116,7 +116,7 @@ const PHASES: [&str; Phase::ALL.len()] = [
 pub fn phases(records: &[Record]) -> String {
     let mut text = String::from("<p class=\"legend\">");
     let used = |k: usize| {
-        records.iter().any(|e| e.lap.as_ref().is_some_and(|l| l.phase_ns.get(k).is_some_and(|&t| t > 0.0)))
+        records.iter().any(|e| e.sample.as_ref().is_some_and(|l| l.phase_ns.get(k).is_some_and(|&t| t > 0.0)))
     };
     for (k, phase) in Phase::ALL.iter().enumerate().filter(|p| used(p.0)) {
         text += &format!(
@@ -130,9 +130,9 @@ pub fn phases(records: &[Record]) -> String {
         let rows: Vec<&Record> = solvers_of(records)
             .into_iter()
             .filter_map(|s| standard(scene, s))
-            .filter(|e| e.lap.is_some())
+            .filter(|e| e.sample.is_some())
             .collect();
-        let total = |e: &Record| e.lap.as_ref().map_or(0.0, |l| l.phase_ns.iter().sum::<f64>());
+        let total = |e: &Record| e.sample.as_ref().map_or(0.0, |l| l.phase_ns.iter().sum::<f64>());
         let scale = Scale::linear(1e-9 * rows.iter().map(|e| total(e)).fold(0.0, f64::max), "s");
         let (left, right, top, row) = (190.0, 610.0, 26.0, 22.0);
         let bottom = top + row * rows.len() as f64;
@@ -163,7 +163,7 @@ pub fn phases(records: &[Record]) -> String {
                 escaped(&entry.label()),
             );
             let mut begun = 0.0;
-            for (k, &ns) in entry.lap.iter().flat_map(|l| &l.phase_ns).enumerate() {
+            for (k, &ns) in entry.sample.iter().flat_map(|l| &l.phase_ns).enumerate() {
                 if ns > 0.0 {
                     let (from, to) = (across(1e-9 * begun), across(1e-9 * (begun + ns)));
                     let share = 100.0 * ns / total(entry);
@@ -198,13 +198,13 @@ pub fn iterations(records: &[Record]) -> String {
             let held: Vec<(&Record, f64, f64)> = fastest(scene)
                 .into_iter()
                 .filter(|e| e.broke().is_none() && !e.is_natural())
-                .filter_map(|e| Some((e, e.lap.as_ref()?.load.sweeps.max(0.5), e.drawn(axis)?)))
+                .filter_map(|e| Some((e, e.sample.as_ref()?.load.sweeps.max(0.5), e.drawn(axis)?)))
                 .collect();
             let frame = Frame {
                 size: [300.0, 230.0],
                 title: &scene[0].scene,
                 names: ["sweeps of a step", name],
-                band: false,
+                band: Band::None,
             };
             let x = Scale::log(held.iter().map(|h| h.1), "");
             let mut panel = Panel::new(&frame, x, Scale::log(held.iter().map(|h| h.2), unit));

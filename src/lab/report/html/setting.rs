@@ -29,7 +29,7 @@ pub trait Setting {
 
 impl Setting for Record {
     fn time(&self) -> Option<f64> {
-        self.lap.as_ref().map(|lap| 1e-9 * lap.median_ns)
+        self.sample.as_ref().map(|sample| 1e-9 * sample.median_ns)
     }
 
     fn drawn(&self, axis: ErrorAxis) -> Option<f64> {

@@ -100,7 +100,7 @@ fn row(answer: &Answer) -> String {
         (_, None) => "<td>no other solver".into(),
         (Some(best), Some(next)) => {
             let ratio =
-                next.lap.as_ref().zip(best.lap.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
+                next.sample.as_ref().zip(best.sample.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
             let slower = ratio.map_or(String::new(), |r| format!(": {:.2}×", r.median));
             format!("<td>{}, {}{slower}", escaped(next.solver), escaped(&next.words()))
         }

@@ -1,0 +1,344 @@
+//! A sweep: one quantity takes several values, and everything else stays as it is.
+//!
+//! The quantity belongs to solvers (a parameter), to the budget, or to the scene. Solvers that do not have
+//! it take no part. Where the step changes, runs keep their duration; where friction changes, the scene has
+//! no reference value, because those of the catalogue hold for a scene's own friction.
+
+use super::budget::{self, BudgetGrid};
+use crate::engine::params::{Budget, Parameters};
+use crate::engine::solvers::{VARIANTS, Variant};
+use crate::lab::error::Error;
+use crate::lab::interned::{self, Name};
+use crate::lab::overrides;
+use crate::lab::scenes::{self, Loaded};
+use crate::lab::units::quantity;
+use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+
+/// Most values of a sweep.
+const MOST: usize = 100;
+
+/// What can vary besides the parameters of solvers: name, unit, whose it is.
+const QUANTITIES: [(&str, &str, Kind); 8] = [
+    ("substeps", "", Kind::Substeps),
+    ("iterations", "", Kind::Iterations),
+    ("velocity_iterations", "", Kind::Velocity),
+    ("relax_iterations", "", Kind::Relax),
+    ("position_iterations", "", Kind::Position),
+    ("dt", "s", Kind::Dt),
+    ("friction", "", Kind::Friction),
+    ("mass_ratio", "", Kind::MassRatio),
+];
+
+/// Whose quantity it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A parameter of solvers.
+    Parameter,
+    /// [`Budget::substeps`]
+    Substeps,
+    /// Velocity sweeps; position sweeps of solvers that have no others.
+    Iterations,
+    /// [`Budget::velocity_iterations`]
+    Velocity,
+    /// [`Budget::relax_iterations`]
+    Relax,
+    /// [`Budget::position_iterations`]
+    Position,
+    /// Step of the scene (s).
+    Dt,
+    /// Friction coefficient of every shape (1).
+    Friction,
+    /// Size of a scene that is one mass on another.
+    MassRatio,
+}
+
+/// The quantity and its values, ascending.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sweep {
+    /// In `snake_case`.
+    pub name: &'static str,
+    /// Empty for a pure number.
+    pub unit: &'static str,
+    /// Each once.
+    pub values: Vec<f64>,
+    #[serde(skip)]
+    kind: Kind,
+}
+
+/// The swept quantity of one record.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Swept {
+    /// Name of the quantity.
+    #[serde(deserialize_with = "interned::read")]
+    pub name: Name,
+    /// Its unit; empty for a pure number.
+    #[serde(deserialize_with = "interned::read")]
+    pub unit: Name,
+    /// In that unit.
+    pub value: f64,
+}
+
+impl Display for Swept {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", format!("{} {} {}", self.name, self.value, self.unit).trim_end())
+    }
+}
+
+impl FromStr for Sweep {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let refuse = |message: String| Error::invalid("sweep", message);
+        let Some((given, values)) = text.split_once('=') else {
+            return Err(refuse(format!("'{text}' is not NAME=VALUE,VALUE,…")));
+        };
+        let parameters = || VARIANTS.iter().flat_map(|v| v.parameters);
+        let snake = given.trim().replace('-', "_");
+        let fixed = QUANTITIES.into_iter().find(|q| q.0 == snake);
+        let own = || parameters().find(|p| p.name == snake).map(|p| (p.name, p.unit, Kind::Parameter));
+        let Some((name, unit, kind)) = fixed.or_else(own) else {
+            let mut known: Vec<&str> = QUANTITIES.iter().map(|q| q.0).collect();
+            for parameter in parameters() {
+                if !known.contains(&parameter.name) {
+                    known.push(parameter.name);
+                }
+            }
+            return Err(Error::unknown("quantity to sweep", &snake, known.into_iter()));
+        };
+        if values.trim().is_empty() {
+            return Err(refuse(format!("the list of values of {name} is empty")));
+        }
+        // A plain number is in the quantity's own unit.
+        let read = |value: &str| {
+            let plain = value.trim().parse::<f64>().is_ok();
+            quantity("sweep", value, if plain { "" } else { unit })
+        };
+        let mut values = values.split(',').map(read).collect::<Result<Vec<f64>, Error>>()?;
+        let is_count = !matches!(kind, Kind::Parameter | Kind::Dt | Kind::Friction);
+        if let Some(broken) = values.iter().find(|v| is_count && (v.fract() != 0.0 || **v > 1e9)) {
+            return Err(refuse(format!("{broken} is not a whole number, which {name} is")));
+        }
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if values.len() > MOST {
+            return Err(refuse(format!("{} values, where at most {MOST} are possible", values.len())));
+        }
+        Ok(Sweep { name, unit, values, kind })
+    }
+}
+
+impl Sweep {
+    /// One after the other.
+    pub fn points(&self) -> impl Iterator<Item = Swept> {
+        self.values.iter().map(|&value| Swept { name: self.name, unit: self.unit, value })
+    }
+
+    /// Whether the quantity is one that this solver has, or is the scene's.
+    pub fn concerns(&self, variant: &Variant) -> bool {
+        match self.kind {
+            Kind::Parameter => variant.parameter(self.name).is_ok(),
+            Kind::Velocity => variant.uses.velocity,
+            Kind::Relax => variant.uses.relax,
+            Kind::Position => variant.uses.position,
+            Kind::Iterations => variant.uses.velocity || variant.uses.position,
+            Kind::Substeps | Kind::Dt | Kind::Friction | Kind::MassRatio => true,
+        }
+    }
+
+    /// The budget grid of a sweep: a solver's own budget, or the one given.
+    ///
+    /// Errors: a list of several values, or of the swept quantity.
+    pub fn check_grid(&self, grid: &BudgetGrid) -> Result<(), Error> {
+        let lists = [
+            ("substeps", &grid.substeps, &[Kind::Substeps][..]),
+            ("velocity-iterations", &grid.velocity_iterations, &[Kind::Velocity, Kind::Iterations]),
+            ("relax-iterations", &grid.relax_iterations, &[Kind::Relax]),
+            ("position-iterations", &grid.position_iterations, &[Kind::Position]),
+        ];
+        for (option, list, kinds) in lists {
+            if list.len() > 1 {
+                let message = format!("{} values, where a sweep takes one", list.len());
+                return Err(Error::invalid(format!("--{option}"), message));
+            }
+            if !list.is_empty() && kinds.contains(&self.kind) {
+                return Err(Error::invalid(format!("--{option}"), format!("--sweep {} sets it", self.name)));
+            }
+        }
+        Ok(())
+    }
+
+    /// `budget` at this value. Errors: one that the solver cannot work with.
+    pub fn budget(&self, value: f64, budget: Budget, variant: &Variant) -> Result<Budget, Error> {
+        let count = value as u32;
+        let changed = match self.kind {
+            Kind::Substeps => Budget { substeps: count, ..budget },
+            Kind::Velocity => Budget { velocity_iterations: count, ..budget },
+            Kind::Relax => Budget { relax_iterations: count, ..budget },
+            Kind::Position => Budget { position_iterations: count, ..budget },
+            Kind::Iterations if variant.uses.velocity => Budget { velocity_iterations: count, ..budget },
+            Kind::Iterations => Budget { position_iterations: count, ..budget },
+            Kind::Parameter | Kind::Dt | Kind::Friction | Kind::MassRatio => budget,
+        };
+        budget::check(&changed, variant)?;
+        Ok(changed)
+    }
+
+    /// `parameters` at this value. Errors: a value out of the parameter's range.
+    pub fn set(&self, value: f64, parameters: &mut Parameters, variant: &Variant) -> Result<(), Error> {
+        match self.kind {
+            Kind::Parameter => Ok(variant.set(parameters, self.name, value as f32)?),
+            _ => Ok(()),
+        }
+    }
+
+    /// The name that opens the scene at this value. Errors: a scene that does not have the quantity.
+    pub fn scene_name(&self, value: f64, name: &str) -> Result<String, Error> {
+        if self.kind != Kind::MassRatio {
+            return Ok(name.to_string());
+        }
+        let (stem, _) = name.split_once(':').unwrap_or((name, ""));
+        let with_ratio =
+            || scenes::CATALOG.iter().filter(|e| e.size.is_some_and(|s| s.meaning == scenes::MASS_RATIO));
+        if !with_ratio().any(|e| e.name == stem) {
+            let known: Vec<&str> = with_ratio().map(|e| e.name).collect();
+            let message = format!("scene '{name}' has no mass ratio; scenes with one: {}", known.join(", "));
+            return Err(Error::invalid("sweep", message));
+        }
+        Ok(format!("{stem}:{value}"))
+    }
+
+    /// Length of a step (s) at this value, where it is what varies.
+    pub fn dt(&self, value: f64) -> Option<f64> {
+        (self.kind == Kind::Dt).then_some(value)
+    }
+
+    /// The scene at this value, as it is compared with those at others: under one name, and with what is
+    /// known about it where that still holds.
+    pub fn adapt(&self, value: f64, mut loaded: Loaded) -> Loaded {
+        match self.kind {
+            Kind::Friction => {
+                let shapes = loaded.scene.bodies.iter_mut().flat_map(|b| &mut b.shapes);
+                shapes.for_each(|shape| shape.friction = value);
+                loaded.truth = None;
+                loaded.tolerances.truth = None;
+            }
+            Kind::MassRatio => {
+                let stem = loaded.scene.name.split(':').next().unwrap_or_default();
+                loaded.scene.name = stem.to_string();
+            }
+            _ => {}
+        }
+        loaded
+    }
+
+    /// Refuses what nothing can be swept with: no solver that has the quantity, the same parameter set, a
+    /// value out of its range.
+    pub fn check(
+        &self,
+        solvers: &[&'static Variant],
+        overrides: &[overrides::Override],
+        grid: &BudgetGrid,
+    ) -> Result<(), Error> {
+        self.check_grid(grid)?;
+        if overrides.iter().any(|o| o.name == self.name) {
+            return Err(Error::invalid("--set", format!("--sweep sets {}", self.name)));
+        }
+        if let Some(other) = solvers.iter().find(|v| !self.concerns(v)) {
+            let having: Vec<&str> = VARIANTS.iter().filter(|v| self.concerns(v)).map(|v| v.name).collect();
+            let having = having.join(", ");
+            let message = format!("{} does not have {}; solvers that do: {having}", other.name, self.name);
+            return Err(Error::invalid("sweep", message));
+        }
+        for (variant, &value) in solvers.iter().flat_map(|v| self.values.iter().map(move |value| (v, value)))
+        {
+            self.set(value, &mut variant.defaults(), variant)?;
+            self.budget(value, variant.budget, variant)?;
+        }
+        Ok(())
+    }
+
+    /// As on the command line: `contact_hertz=15,30,60`.
+    pub fn words(&self) -> String {
+        let values: Vec<String> = self.values.iter().map(f64::to_string).collect();
+        format!("{}={}", self.name, values.join(","))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::find;
+
+    fn sweep(text: &str) -> Sweep {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn values_are_sorted_and_each_is_there_once() {
+        let dt = sweep("dt = 10ms,0.005,0.02,5ms");
+        assert_eq!((dt.name, dt.unit, &dt.values[..]), ("dt", "s", &[0.005, 0.01, 0.02][..]));
+        assert_eq!(sweep("contact-hertz=60,15 Hz").words(), "contact_hertz=15,60");
+        assert_eq!(sweep("mass-ratio=10").points().next().unwrap().value, 10.0);
+    }
+
+    #[test]
+    fn what_is_no_sweep_is_refused_with_its_text() {
+        let message = |text: &str| text.parse::<Sweep>().unwrap_err().to_string();
+        assert!(message("contact-hertz").contains("'contact-hertz' is not NAME=VALUE"));
+        assert_eq!(message("dt="), "sweep: the list of values of dt is empty");
+        let unknown = message("contact-herz=30");
+        assert!(
+            unknown.contains("did you mean 'contact_hertz'") && unknown.contains("mass_ratio"),
+            "{unknown}"
+        );
+        assert!(message("dt=10m").contains("'10m'"));
+        assert!(message("friction=0.1,,0.3").contains("''"));
+        assert!(message("substeps=2.5").contains("2.5 is not a whole number"));
+        assert!(message("friction=-1").contains("'-1'"));
+    }
+
+    #[test]
+    fn a_quantity_changes_what_it_belongs_to_and_nothing_else() {
+        let (soft, pgs, xpbd) = (find("soft_step").unwrap(), find("pgs").unwrap(), find("xpbd").unwrap());
+        let hertz = sweep("contact-hertz=60");
+        assert!(hertz.concerns(soft) && !hertz.concerns(pgs));
+        let mut parameters = soft.defaults();
+        hertz.set(60.0, &mut parameters, soft).unwrap();
+        assert_eq!(overrides::brief(soft, &parameters), "contact_hertz 60 Hz");
+        assert_eq!(hertz.budget(60.0, soft.budget, soft).unwrap(), soft.budget);
+
+        let iterations = sweep("iterations=3");
+        assert_eq!(iterations.budget(3.0, pgs.budget, pgs).unwrap().velocity_iterations, 3);
+        assert_eq!(iterations.budget(3.0, xpbd.budget, xpbd).unwrap().position_iterations, 3);
+        assert!(iterations.budget(0.0, pgs.budget, pgs).is_err());
+
+        let ratio = sweep("mass-ratio=10");
+        assert_eq!(ratio.scene_name(10.0, "mass_ratio:100").unwrap(), "mass_ratio:10");
+        let message = ratio.scene_name(10.0, "arch").unwrap_err().to_string();
+        assert!(message.contains("'arch'") && message.contains("mass_ratio"), "{message}");
+
+        let slippery = sweep("friction=0").adapt(0.0, scenes::load("stack:3").unwrap());
+        assert!(slippery.truth.is_none() && slippery.tolerances.truth.is_none());
+        assert!(slippery.scene.bodies.iter().flat_map(|b| &b.shapes).all(|s| s.friction == 0.0));
+    }
+
+    #[test]
+    fn a_plan_that_contradicts_its_sweep_is_refused() {
+        let (soft, pgs) = (find("soft_step").unwrap(), find("pgs").unwrap());
+        let (hertz, grid) = (sweep("contact-hertz=15,60"), BudgetGrid::default());
+        hertz.check(&[soft], &[], &grid).unwrap();
+        let message = |r: Result<(), Error>| r.unwrap_err().to_string();
+        assert!(message(hertz.check(&[soft, pgs], &[], &grid)).contains("pgs does not have contact_hertz"));
+        let set = "contact_hertz=30".parse().unwrap();
+        assert_eq!(message(hertz.check(&[soft], &[set], &grid)), "--set: --sweep sets contact_hertz");
+        assert!(message(sweep("contact-hertz=1e9").check(&[soft], &[], &grid)).contains("contact_hertz"));
+        let two = BudgetGrid { substeps: vec![2, 4], ..grid.clone() };
+        assert!(message(hertz.check(&[soft], &[], &two)).starts_with("--substeps: 2 values"));
+        let one = BudgetGrid { substeps: vec![2], ..grid };
+        assert!(
+            message(sweep("substeps=1,2").check(&[soft], &[], &one)).contains("--sweep substeps sets it")
+        );
+    }
+}
