@@ -1,4 +1,4 @@
-//! This crate's `soft_step`, the schedule that the other two have as well.
+//! This crate's `soft_step`, the schedule that the other two have as well, and its `shim`.
 
 use crate::engine::{Contender, Engine, Stage, State};
 use simpulse::engine::broadphase::BroadPhaseKind;
@@ -12,8 +12,8 @@ use simpulse::lab::scenes::Scene;
 pub struct Simpulse(World);
 
 impl Simpulse {
-    /// Errors: a scene that is not valid.
-    pub fn new(
+    /// `soft_step`. Errors: a scene that is not valid.
+    pub fn soft_step(
         scene: &Scene,
         contender: &Contender,
         width: LaneWidth,
@@ -23,6 +23,14 @@ impl Simpulse {
         let mut settings = Settings { width, broadphase, ..Settings::new(solver) };
         let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
         set.map_err(|e| e.to_string())?;
+        settings.budget.substeps = contender.substeps;
+        Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
+    }
+
+    /// `shim` at the widest lanes, whose springs are as stiff as its substeps allow. Errors: as above.
+    pub fn shim(scene: &Scene, contender: &Contender) -> Result<Self, String> {
+        let solver = solvers::find("shim").map_err(|e| e.to_string())?;
+        let mut settings = Settings { width: LaneWidth::W16, ..Settings::new(solver) };
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }

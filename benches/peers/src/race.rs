@@ -19,7 +19,8 @@ fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String
     Ok(match contender.maker {
         Maker::Box2d => Box::new(Box2d::new(scene, contender)?),
         Maker::Rapier => Box::new(Rapier::new(scene, contender)?),
-        Maker::Simpulse(width, pairs) => Box::new(Simpulse::new(scene, contender, width, pairs)?),
+        Maker::Simpulse(width, pairs) => Box::new(Simpulse::soft_step(scene, contender, width, pairs)?),
+        Maker::Shim => Box::new(Simpulse::shim(scene, contender)?),
     })
 }
 
