@@ -68,7 +68,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
         (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
-        (&["run", "stack:2", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
+        (&["run", "stack:2", "--solver", "soft_step", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
         (&["study", "--set", "contact_hertz=nan"], &["contact_hertz", "NaN"]),
         (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["study", "--scenes="], &["--scenes: the list is empty"]),

@@ -18,13 +18,11 @@ use std::process::ExitCode;
 /// Run the hard cases whose truth is known on paper
 ///
 /// Every case runs with every solver at its standard budget and compares one number with its
-/// reference value. What fails is shown as failing, and where a bound or a required mark was ever
-/// relaxed, `--list` says so.
+/// reference value. What fails is shown as failing.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,
-so that up to 1 passes. '*' marks the cases that the default solver is required to pass, '†' those whose
-bound or mark was relaxed after a failure; --list says why and how.
+so that up to 1 passes. '*' marks the cases that the default solver is required to pass; --list says why.
 Exit code 0: it passed all of those that ran; 1: it did not; 2: a request that cannot be met.
 
 Examples:
@@ -114,9 +112,6 @@ fn list(cases: &[&Case]) -> String {
         };
         text += &format!("{}  {} [{}]{law}\n", case.id, case.summary, case.unit);
         text += &format!("    tolerance: {}\n    {word} of {DEFAULT}: {why}\n", case.tolerance);
-        if let Some(how) = case.relaxed {
-            text += &format!("    relaxed after a failure: {how}\n");
-        }
     }
     text + &skipped()
 }
@@ -129,7 +124,7 @@ fn skipped() -> String {
 const LEGEND: &str = "\
 A cell: pass or FAIL, the measured value, and in brackets the margin, error over tolerance: up to 1 passes.
 reference: what it should be.  n/a: the reference value is that of soft contacts.
-*: required of the default solver.  †: its bound or mark was relaxed after a failure; --list says how.
+*: required of the default solver; --list says why.
 ";
 
 fn text(matrix: &Matrix) -> String {
@@ -138,7 +133,6 @@ fn text(matrix: &Matrix) -> String {
     table.set_header(["case", "what", "reference", "tolerance"].map(String::from).into_iter().chain(names));
     for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
         let star = if case.required.is_required() { "*" } else { "" };
-        let star = format!("{star}{}", if case.relaxed.is_some() { "†" } else { "" });
         let (truth, tolerance) = (common(cells, |f| f.truth), common(cells, |f| f.tolerance));
         let own = truth.is_none() || tolerance.is_none();
         let shown = |value: Option<f64>| value.map_or("per solver".into(), number);
@@ -294,7 +288,7 @@ fn described(case: &&Case) -> Value {
     };
     json!({
         "case": case.id, "what": case.summary, "unit": case.unit, "tolerance": case.tolerance,
-        "required": required, "why": why, "relaxed": case.relaxed,
+        "required": required, "why": why,
     })
 }
 
@@ -335,9 +329,9 @@ mod tests {
 
     #[test]
     fn the_list_says_what_is_required_and_what_is_skipped() {
-        let cases = verify::select(&["B2.box".to_string(), "A18".to_string()]).unwrap();
+        let cases = verify::select(&["B2.box".to_string(), "A17".to_string()]).unwrap();
         let text = list(&cases);
-        for part in ["A18.law", "not required of soft_step", "(soft contacts only)", "B20 (bridge"] {
+        for part in ["A17.spin", "not required of shim", "(soft contacts only)", "B20 (bridge"] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
     }

@@ -269,7 +269,7 @@ fn bad_requests_name_the_value_and_what_there_is() {
     let table: &[(&[&str], &[&str])] = &[
         (&["profile", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["profile", "stack:2", "--phase", "solv"], &["'solv'", "pairs", "warm-start", "store", "all"]),
-        (&["profile", "stack:2", "--phase", "position"], &["'position'", "soft_step", "solve", "relax"]),
+        (&["profile", "stack:2", "--phase", "position"], &["'position'", "shim", "solve", "relax"]),
         (&["profile", "stack:2", "--phase", "restitution"], &["'restitution'", "integrate"]),
         (&["profile", "stack:2", "--seconds", "0"], &["seconds", "0"]),
         (&["profile", "stack:2", "--seconds", "-1"], &["seconds", "-1"]),

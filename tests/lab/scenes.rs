@@ -370,6 +370,7 @@ fn bad_files_are_refused_with_place_and_value() {
         (r#""dt": 0.01"#, r#""dt": 0"#, "dt: ", "0.0"),
         (r#""dt": 0.01"#, r#""dt": -0.01"#, "dt: ", "-0.01"),
         (r#""dt": 0.01"#, r#""dt": 1e-60"#, "dt: ", "1e-60"),
+        (r#""dt": 0.01"#, r#""dt": 1e38"#, "dt: ", "at most 1000 s, is 1e38 s"),
         (r#""dt": 0.01"#, r#""dt": 1e-30"#, "dt: ", "at least 1e-9 s, is 1e-30 s"),
         (r#""steps": 10"#, r#""steps": 0"#, "steps: ", "is 0"),
         (r#""steps": 10"#, r#""steps": 4000000000"#, "steps: ", "at most 10000000, is 4000000000"),

@@ -203,9 +203,8 @@ fn only_broken_promises_of_the_solver_itself_count() {
     assert_eq!(matrix(vec![vec![good(), good()], vec![good(), good()]]).broken_promises("projection"), None);
 }
 
-/// Required cases that the default solver fails: more than its 30 Hz contacts hold. What leaves this list or
-/// joins it is news, and belongs into the README.
-const FAILS: &[&str] = &["B5.drift", "B5.jitter"];
+/// Required cases that the default solver fails. What joins this list is news, and belongs into the README.
+const FAILS: &[&str] = &[];
 
 #[test]
 fn the_default_solver_keeps_its_promises_but_for_those_that_are_told() {

@@ -76,7 +76,7 @@ pub static VARIANTS: [&Variant; 27] = [
 ];
 
 /// The solver that is used where none is named.
-pub const DEFAULT: &str = "soft_step";
+pub const DEFAULT: &str = "shim";
 
 /// Which fields of a [`Budget`] a solver's schedule has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

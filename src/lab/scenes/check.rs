@@ -13,6 +13,10 @@ pub const MAX_BODIES: usize = 1_000_000;
 /// Shortest step (s): shorter ones would be shown as 0, and `f32` rounds most motion in them away.
 pub const MIN_DT: f64 = 1e-9;
 
+/// Longest step (s): in longer ones impulses of ordinary scenes come near what `f32` holds, and
+/// metrics that square them are no numbers.
+pub const MAX_DT: f64 = 1e3;
+
 /// Most steps of a run: 46 hours at 60 steps a second.
 pub const MAX_STEPS: u32 = 10_000_000;
 
@@ -23,7 +27,7 @@ impl Scene {
     /// Whether a world can be made of this scene.
     ///
     /// Errors, naming place and value: a name that is empty or has control characters;
-    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`]; no steps, or more than [`MAX_STEPS`];
+    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; no steps, or more than [`MAX_STEPS`];
     /// no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
     /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
     /// constructors refuse; a dynamic body without mass.
@@ -45,6 +49,9 @@ impl Scene {
         positive("dt", self.dt)?;
         if self.dt < MIN_DT {
             return Err(Error::invalid("dt", format!("must be at least {MIN_DT:e} s, is {:e} s", self.dt)));
+        }
+        if self.dt > MAX_DT {
+            return Err(Error::invalid("dt", format!("must be at most {MAX_DT} s, is {:e} s", self.dt)));
         }
         if !(1..=MAX_STEPS).contains(&self.steps) {
             let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);

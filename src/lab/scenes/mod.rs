@@ -36,7 +36,7 @@ mod washer;
 /// JSON schema of scene files (2020-12).
 pub const SCHEMA: &str = include_str!("scene.schema.json");
 
-pub use check::{MAX_BODIES, MAX_FRICTION, MAX_STEPS, MIN_DT};
+pub use check::{MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };

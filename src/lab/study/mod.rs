@@ -57,7 +57,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
 /// accelerated, in parallel, in substeps, of positions, and soft; all of them fast. All others of
 /// [`VARIANTS`] run when they are named, or with `all`.
 pub const DEFAULT_SOLVERS: [&str; 7] =
-    ["pgs", "pgs_ngs_block", "nncg", "mass_splitting", "tgs_ngs", "xpbd", "soft_step"];
+    ["pgs", "pgs_ngs_block", "nncg", "tgs_ngs", "xpbd", "soft_step", "shim"];
 
 /// The rows of [`DEFAULT_SOLVERS`].
 pub fn default_solvers() -> Vec<&'static Variant> {
