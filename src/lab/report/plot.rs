@@ -64,7 +64,7 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
     }
     write(
         area,
-        "budgets, smallest first, at their fastest lane width; white dot: natural order",
+        "budgets, smallest first; white dot: natural order",
         (x + 6, 44),
         14,
         HPos::Left,
