@@ -62,13 +62,7 @@ fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
         marker(area, (x + 6, 44), budget, &INK)?;
         x += 20;
     }
-    write(
-        area,
-        "budgets, smallest first; white dot: natural order",
-        (x + 6, 44),
-        14,
-        HPos::Left,
-    )
+    write(area, "budgets, smallest first; white dot: natural order", (x + 6, 44), 14, HPos::Left)
 }
 
 fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -> Drawn {
