@@ -366,7 +366,7 @@ impl<'a> Passes<'a> {
     }
 
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
-    /// the impulses so far, of which a step takes over the part `rate`; see [`super::preload`].
+    /// the impulses so far, of which a step takes over the part `rate`; see `preload.rs`.
     pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
         self.run(Phase::Prepare, &Preload { springs, share, rate });
     }
