@@ -102,8 +102,8 @@ pub enum Maker {
     Rapier,
     /// `soft_step` at a width of ours.
     Simpulse(LaneWidth, BroadPhaseKind),
-    /// `shim`, 16 lanes.
-    Shim,
+    /// Another solver of ours at its own parameters, 16 lanes.
+    Solver(&'static str),
 }
 
 /// An engine and what it is set to. Everything else is at its defaults.
@@ -126,7 +126,7 @@ impl Contender {
         match self.maker {
             Maker::Box2d => "Box2D x8".into(),
             Maker::Rapier => "rapier x8".into(),
-            Maker::Shim => "shim x16".into(),
+            Maker::Solver(name) => format!("our {name} x16"),
             Maker::Simpulse(width, BroadPhaseKind::HashGrid) => format!("simpulse x{} grid", width.lanes()),
             Maker::Simpulse(width, _) => format!("simpulse x{}", width.lanes()),
         }
@@ -160,8 +160,10 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     add(ours(LaneWidth::W8), widths);
     add(ours(LaneWidth::W4), widths);
     add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::HashGrid), &default);
-    // Contact frequencies are its own affair.
-    add(Maker::Shim, &[(16, 30.0), (8, 30.0)]);
+    // Contact frequencies of `shim` are its own affair; the others are those engines' methods here.
+    add(Maker::Solver("shim"), &[(16, 30.0), (8, 30.0)]);
+    add(Maker::Solver("box2d"), &default);
+    add(Maker::Solver("rapier"), &default);
     let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all

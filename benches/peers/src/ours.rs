@@ -1,4 +1,4 @@
-//! This crate's `soft_step`, the schedule that the other two have as well, and its `shim`.
+//! This crate's `soft_step`, the schedule that the other two have as well, and others at their own settings.
 
 use crate::engine::{Contender, Engine, Stage, State};
 use simpulse::engine::broadphase::BroadPhaseKind;
@@ -27,9 +27,9 @@ impl Simpulse {
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
 
-    /// `shim` at the widest lanes, whose springs are as stiff as its substeps allow. Errors: as above.
-    pub fn shim(scene: &Scene, contender: &Contender) -> Result<Self, String> {
-        let solver = solvers::find("shim").map_err(|e| e.to_string())?;
+    /// Another solver at the widest lanes and its own parameters. Errors: as above.
+    pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
+        let solver = solvers::find(name).map_err(|e| e.to_string())?;
         let mut settings = Settings { width: LaneWidth::W16, ..Settings::new(solver) };
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))

@@ -20,7 +20,7 @@ fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String
         Maker::Box2d => Box::new(Box2d::new(scene, contender)?),
         Maker::Rapier => Box::new(Rapier::new(scene, contender)?),
         Maker::Simpulse(width, pairs) => Box::new(Simpulse::soft_step(scene, contender, width, pairs)?),
-        Maker::Shim => Box::new(Simpulse::shim(scene, contender)?),
+        Maker::Solver(name) => Box::new(Simpulse::of(scene, name, contender)?),
     })
 }
 
