@@ -217,7 +217,7 @@ fn solve<L: Lanes>(
     bounces: &mut Bounces,
     change: &Cell<f32>,
 ) {
-    let moves = segment.opposite == OppositeKind::Dynamic;
+    let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let (zero, one) = (L::zero(), L::splat(1.0));
@@ -253,7 +253,7 @@ fn solve<L: Lanes>(
                 };
                 let mass_t = record[layout.at(p, layout.tangent_mass)];
                 let k_tt = one / mass_t.select_positive(mass_t, one);
-                let answers = if moves { a[7] } else { zero };
+                let answers = if pushes_a { a[7] } else { zero };
                 let k_nt = (b[7] * arm_b[0]).mul_add(arm_b[1], answers * arm_a[0] * arm_a[1]);
                 // Velocities that are to be made, from none of the wave's impulses.
                 let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted));
@@ -294,7 +294,7 @@ fn solve<L: Lanes>(
             let turn = |arm: [L; 2]| arm[0].mul_add(delta[0], arm[1] * delta[1]);
             let v = [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), b[7].mul_add(turn(arm_b), b[2]), b[3]];
             L::scatter_velocity(rows, row_b, v);
-            if moves {
+            if pushes_a {
                 let w = a[7].neg_mul_add(turn(arm_a), a[2]);
                 let v = [a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]), w, a[3]];
                 L::scatter_velocity(rows, row_a, v);

@@ -270,7 +270,7 @@ fn apply_segment<L: Lanes>(
     bounces: &mut Bounces,
     h: f32,
 ) {
-    let moves = segment.opposite == OppositeKind::Dynamic;
+    let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment, layout.points));
     for ((record, bounce), (row_a, row_b)) in records.zip(row_a.batches().zip(row_b.batches())) {
@@ -290,7 +290,7 @@ fn apply_segment<L: Lanes>(
             let b = L::gather(rows, row_b);
             let w = if layout.has_arms[0] { (b[7] * arms(layout.arm_b)).mul_add(delta, b[2]) } else { b[2] };
             L::scatter_velocity(rows, row_b, [b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]), w, b[3]]);
-            if moves {
+            if pushes_a {
                 let a = L::gather(rows, row_a);
                 let turned = (a[7] * arms(layout.arm_a)).neg_mul_add(delta, a[2]);
                 let w = if layout.has_arms[1] { turned } else { a[2] };
