@@ -20,7 +20,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::constraints::rules::{Bearing, Rigid, Soft};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, MAX_PUSH_SPEED, Parameter};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -98,7 +98,7 @@ fn step(passes: &mut Passes<'_>) {
             passes.integrate_and_warm_start();
         }
         for _ in 0..budget.velocity_iterations {
-            passes.block_sweep_normal_first(Phase::Solve, springs);
+            passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
             passes.iteration_done();
         }
         passes.integrate_positions();

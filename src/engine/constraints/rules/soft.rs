@@ -95,3 +95,35 @@ impl NormalRule for Soft {
         [mass.neg_mul_add(bias, keep * old), mass * scale]
     }
 }
+
+/// As [`Soft`], but only the speed of the push is bounded, not the load that a spring bears.
+///
+/// A row at rest bears the λ that leaks as much as the bias adds, γ_i λ = −m γ_m β s. A bias that is cut off
+/// at the push speed u bears m u/γ_i and no more, however deep s. Let the leak fall with what is cut off:
+///
+/// ```text
+/// f = min(1, u/(γ_m β |s|))      λ ← max(0, λ − m_eff (γ_m v_n + γ_m β s f) − γ_i f λ)
+/// ```
+///
+/// Then λ = −m γ_m β s/γ_i at any depth, and what is pushed without a load still moves at u.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bearing(pub Soft);
+
+impl NormalRule for Bearing {
+    const FRICTION: bool = Soft::FRICTION;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        let Bearing(springs) = self;
+        let soft = if against_static { springs.against_static } else { springs.dynamic };
+        let [constant, slope] = springs.line(against_static, separation, mass, old);
+        let depth = separation * L::splat(-soft.mass_scale * soft.bias_rate);
+        let beyond = depth - L::splat(springs.push_speed);
+        if !beyond.any_positive() {
+            return [constant, slope];
+        }
+        let cut = L::splat(1.0) - L::splat(springs.push_speed) / beyond.select_positive(depth, L::splat(1.0));
+        let kept = (L::splat(soft.impulse_scale) * cut).mul_add(old, constant);
+        [beyond.select_positive(kept, constant), slope]
+    }
+}
