@@ -9,7 +9,7 @@ use super::bounces::Bounces;
 use super::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
 use super::kept::Kept;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
+use crate::engine::lanes::{BodyRow, LaneWidth, Lanes, Quad};
 
 /// What a pass runs on: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -26,7 +26,7 @@ pub struct PassInput<'a> {
     /// Numbers that the solver keeps per contact point and per body.
     pub kept: &'a mut Kept,
     /// Changes of velocity in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
-    pub increments: &'a [[f32; 4]],
+    pub increments: &'a [Quad],
 }
 
 /// What a pass requests per contact.

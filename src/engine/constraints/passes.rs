@@ -16,7 +16,7 @@ use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
-use super::preload::Preload;
+use super::preload::{Borne, Preload};
 use super::prepare::{Prepare, Store};
 use super::restitution;
 use super::rules::{NormalRule, Rule, Soft};
@@ -365,6 +365,14 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// Constraint pass: how many bodies the most loaded contact bears, by the impulses so far (1); see
+    /// `preload.rs`.
+    pub fn bodies_borne(&mut self) -> f32 {
+        let pass = Borne::default();
+        self.run(Phase::Prepare, &pass);
+        pass.most_squared.get().sqrt()
+    }
+
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
     /// the impulses so far, of which a step takes over the part `rate`; see `preload.rs`.
     pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
@@ -382,7 +390,7 @@ impl<'a> Passes<'a> {
             graph,
             kept,
             contacts: self.contacts,
-            increments: motion.velocity_increments(),
+            increments: bytemuck::cast_slice(motion.velocity_increments()),
             rotation: self.input.features.rotation,
             friction: self.input.features.friction,
         });

@@ -31,10 +31,12 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
+use super::restitution::largest;
 use super::rules::{Soft, Softness};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::Lanes;
+use crate::engine::lanes::{Lanes, Quad};
 use crate::engine::params::SPECULATIVE_DISTANCE;
+use std::cell::Cell;
 
 /// Follows the load and shortens the springs; see the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +47,67 @@ pub(super) struct Preload {
     pub share: f32,
     /// Share of the way to the sag per step (1).
     pub rate: f32,
+}
+
+/// x
+const EARNED: f32 = 20.0;
+
+/// Finds how many bodies the most loaded contact bears; see the [module](self).
+#[derive(Debug, Default)]
+pub(super) struct Borne {
+    /// Square of the number of bodies (1).
+    pub most_squared: Cell<f32>,
+}
+
+impl Pass for Borne {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        // Mass and impulse of each point, and what forces do to both bodies.
+        PerLane { floats_read: 2 * layout.points + 8, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let layout = F::layout(segment.opposite);
+            let most = borne_squared::<L>(on.batches, &segment, &layout, on.increments);
+            self.most_squared.set(self.most_squared.get().max(most));
+        }
+    }
+}
+
+#[inline(never)]
+fn borne_squared<L: Lanes>(
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    increments: &[Quad],
+) -> f32 {
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let mut most = zero;
+    for (record, (row_a, row_b)) in records {
+        let speed = borne_speed(record, layout);
+        let [a, b] = [row_a, row_b].map(|row| L::gather_quads::<1, 0>(increments, row));
+        let (x, y) = (a[0] + b[0], a[1] + b[1]);
+        let own = x.mul_add(x, y * y);
+        // Where nothing pulls, no number of bodies makes the load.
+        let bodies = speed * speed / own.select_positive(own, one);
+        most = most.max(own.select_positive(bodies, zero));
+    }
+    largest(most)
+}
+
+/// The speed Σλ/Σm that the impulses of a contact would give to its effective mass (m/s).
+#[inline(always)]
+fn borne_speed<L: Lanes>(record: &[L], layout: &Layout) -> L {
+    let (mut impulse, mut mass) = (L::zero(), L::zero());
+    for p in 0..layout.points {
+        impulse = impulse + record[layout.at(p, layout.normal_impulse)];
+        mass = mass + record[layout.at(p, layout.normal_mass)];
+    }
+    // A lane without a contact has no mass.
+    impulse / mass.select_positive(mass, L::splat(1.0))
 }
 
 impl Pass for Preload {
@@ -62,8 +125,9 @@ impl Pass for Preload {
                 _ => self.springs.against_static,
             };
             let compliance = self.share * impulse_scale / (mass_scale * bias_rate);
+            let deepest = self.springs.push_speed / (mass_scale * bias_rate);
             let layout = F::layout(segment.opposite);
-            preload_segment::<L>(on.batches, &segment, &layout, on.contacts, [compliance, self.rate]);
+            preload_segment::<L>(on.batches, &segment, &layout, on.contacts, [compliance, self.rate, deepest]);
         }
     }
 }
@@ -75,27 +139,21 @@ fn preload_segment<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     contacts: &mut [Contact],
-    factors: [f32; 2],
+    factors: [f32; 3],
 ) {
-    let [compliance, rate] = factors.map(L::splat);
+    let [compliance, rate, deepest] = factors.map(L::splat);
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
         let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
-        let (mut impulse, mut mass) = (L::zero(), L::zero());
-        for p in 0..layout.points {
-            impulse = impulse + record[layout.at(p, layout.normal_impulse)];
-            mass = mass + record[layout.at(p, layout.normal_mass)];
-        }
-        // A lane without a contact has no mass.
-        let safe = mass.select_positive(mass, L::splat(1.0));
-        let sag = (compliance * impulse / safe).min(L::splat(SPECULATIVE_DISTANCE));
+        let sag = (compliance * borne_speed(record, layout)).min(L::splat(SPECULATIVE_DISTANCE));
         let [_, last, ..] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
         let preload = rate.mul_add(sag - last, last).min(sag);
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);
-            record[at] = record[at] - preload;
+            let depth = L::splat(EARNED).mul_add(preload, deepest);
+            record[at] = record[at].max(-depth) - preload;
         }
         let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&preload));
         for (&preload, &contact) in floats.iter().zip(filled) {
