@@ -14,8 +14,7 @@ pub const STEP_SCENES: [&str; 3] = ["stack:20", "pyramid:30", "circle_pile:500"]
 
 /// A scene after 30 steps of `solver` at `width`, with the clock on.
 pub fn settled(scene: &str, solver: &str, width: LaneWidth) -> World {
-    let mut settings = Settings::new(solvers::find(solver).expect("a solver of the table"));
-    settings.width = width;
+    let mut settings = Settings::new(solvers::find(solver).expect("a solver of the table")).exactly(width);
     settings.timed = true;
     let scene = scenes::load(scene).expect("a scene of the catalogue").scene;
     let mut world = scene.build(settings).expect("a valid scene");

@@ -112,12 +112,9 @@ fn phase() -> impl TypedValueParser<Value = Which> {
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
     let setting = &args.setting;
-    Ok(Settings {
-        width: args.lanes.or_native(),
-        budget: setting.budget()?,
-        parameters: setting.parameters()?,
-        ..Settings::new(setting.solver)
-    })
+    let own = Settings::new(setting.solver);
+    let own = args.lanes.lanes.map_or(own.clone(), |width| own.exactly(width));
+    Ok(Settings { budget: setting.budget()?, parameters: setting.parameters()?, ..own })
 }
 
 /// Runs the command.

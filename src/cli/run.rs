@@ -4,7 +4,7 @@ use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
 use super::values::{self, SettingArgs, scene_help};
 use crate::engine::clock::{Phase, Timings};
-use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::estimate::{self, Estimate, free_memory};
@@ -46,7 +46,7 @@ pub struct RunArgs {
     /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
-    /// Lanes per instruction [default: the widest that this build has instructions for, in natural
+    /// Lanes per instruction [default: as many as the colours fill and this build has instructions for, in natural
     /// order 1; wider ones are emulated]
     #[arg(long, value_name = "N", value_parser = values::lanes())]
     pub lanes: Option<LaneWidth>,
@@ -127,7 +127,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let every = args.every.unwrap_or(1);
     let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
         let (scene, solver) = (scene.name.clone(), world.settings.solver.name.into());
-        let caption = Caption { scene, solver, setting: how(&world.settings) };
+        let caption = Caption { scene, solver, setting: how(&world) };
         // Begun now, so that a file that cannot be written is refused before the run.
         Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
     });
@@ -207,22 +207,23 @@ fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
 /// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
 /// lanes.
 pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
-    let lanes = match (order, lanes) {
-        (Order::Natural, None | Some(LaneWidth::W1)) => LaneWidth::W1,
+    let own = Settings::new(setting.solver);
+    let own = match (order, lanes) {
+        (Order::Natural, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
         (Order::Natural, Some(width)) => {
             let message = format!("{}, but natural order has 1 lane", width.lanes());
             return Err(Error::invalid("lanes", message));
         }
-        (Order::Colored, lanes) => lanes.unwrap_or(native_width()),
+        (Order::Colored, Some(width)) => own.exactly(width),
+        (Order::Colored, None) => own,
     };
     Ok(Settings {
-        width: lanes,
         order,
         budget: setting.budget()?,
         parameters: setting.parameters()?,
         record_impulses: true,
         timed: true,
-        ..Settings::new(setting.solver)
+        ..own
     })
 }
 
@@ -306,7 +307,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "budget": s.budget,
         "parameters": overrides::by_name(s.solver, &s.parameters),
         "order": s.order,
-        "lanes": s.width.lanes(),
+        "lanes": world.lane_width().lanes(),
         "step_ns": found.times.step_ns(),
         "phase_ns": phases,
         "errors": value(&found.errors)?,
@@ -316,10 +317,11 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
 }
 
 /// Budget and order or lanes.
-fn how(s: &Settings) -> String {
+fn how(world: &World) -> String {
+    let s = &world.settings;
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
-        Order::Colored => lanes(s.width.lanes()),
+        Order::Colored => lanes(world.lane_width().lanes()),
     };
     format!("{}, {order}", budget::brief(&s.budget, s.solver))
 }
@@ -333,7 +335,7 @@ fn head(world: &World, scene: &Scene) -> String {
         scene.steps,
         si(scene.dt, "s"),
         s.solver.name,
-        how(s),
+        how(world),
     )
 }
 

@@ -87,7 +87,7 @@ pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
     let s = &world.settings;
     let order = match s.order {
         Order::Natural => "natural order".to_string(),
-        Order::Colored => lanes(s.width.lanes()),
+        Order::Colored => lanes(world.lane_width().lanes()),
     };
     let time = si(f64::from(args.step) * loaded.scene.dt, "s");
     let title = format!("{} · step {} ({time})", loaded.scene.name, args.step);

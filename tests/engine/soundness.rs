@@ -82,7 +82,7 @@ struct Given {
     batches: Batches,
     bounces: Bounces,
     contacts: Vec<Contact>,
-    increments: Vec<[f32; 4]>,
+    increments: Vec<Quad>,
 }
 
 impl Given {
@@ -92,7 +92,7 @@ impl Given {
             batches,
             bounces: Bounces::default(),
             contacts: vec![Contact::default(); CONTACTS],
-            increments: vec![[0.0; 4]; ROWS],
+            increments: vec![Quad::default(); ROWS],
         }
     }
 

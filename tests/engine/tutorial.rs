@@ -71,7 +71,7 @@ fn step(passes: &mut Passes<'_>) {
 
 /// `count` unit boxes on the ground.
 fn stack(count: usize, width: LaneWidth) -> World {
-    let mut world = World::new(Settings { width, ..Settings::new(&ADAPTIVE) });
+    let mut world = World::new(Settings::new(&ADAPTIVE).exactly(width));
     let shape = |x, y| Shape::rectangle("box", glam::Vec2::new(x, y), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
     let solid = |x, y| vec![ShapeDef::new(shape(x, y))];
     world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], solid(20.0, 1.0)));

@@ -107,7 +107,7 @@ type Seen = Arc<Mutex<Vec<(Phase, usize)>>>;
 
 /// A chain of six discs at distance 1 on the ground, each pair held by a rod, and a box on top.
 fn chain(solver: &'static Variant, width: LaneWidth, order: Order) -> (World, Seen) {
-    let mut world = World::new(Settings { width, order, ..Settings::new(solver) });
+    let mut world = World::new(Settings { order, ..Settings::new(solver).exactly(width) });
     let block = Shape::rectangle("box", glam::Vec2::new(20.0, 1.0), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
     world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ShapeDef::new(block)]));
     for i in 0..6 {

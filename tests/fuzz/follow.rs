@@ -70,7 +70,7 @@ pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
 fn settings(salt: u64) -> Settings {
     let mut random = Random::seed_from_u64(salt);
     let mut settings = Settings::new(bytes::one(&mut random, &VARIANTS));
-    settings.width = bytes::one(&mut random, &LaneWidth::ALL);
+    settings = settings.exactly(bytes::one(&mut random, &LaneWidth::ALL));
     if random.random_ratio(1, 5) {
         (settings.order, settings.width) = (Order::Natural, LaneWidth::W1);
     }

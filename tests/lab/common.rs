@@ -13,9 +13,7 @@ pub fn settings(variant: &'static Variant) -> Settings {
 
 /// Standard settings of a solver at one width.
 pub fn with_width(variant: &'static Variant, width: LaneWidth) -> Settings {
-    let mut settings = Settings::new(variant);
-    settings.width = width;
-    settings
+    Settings::new(variant).exactly(width)
 }
 
 /// A scene of the catalogue, or `crowded_plate`: one dynamic plate under more bodies than

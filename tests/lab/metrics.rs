@@ -245,7 +245,8 @@ fn angles_count_whole_turns() {
 fn errors_do_not_depend_on_the_lane_width() {
     let scene = scenes::load("pyramid:5").unwrap().scene;
     let of = |width| {
-        let settings = Settings { record_impulses: true, width, ..Settings::new(find("soft_step").unwrap()) };
+        let settings =
+            Settings { record_impulses: true, ..Settings::new(find("soft_step").unwrap()).exactly(width) };
         observe(&mut scene.build(settings).unwrap(), 60)
     };
     let one = of(LaneWidth::W1);

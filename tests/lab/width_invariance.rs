@@ -1,9 +1,9 @@
 //! Law: the number of lanes changes the time a step takes and nothing else.
 
-use crate::common::{run, settings};
+use crate::common::{run, settings, with_width};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, find};
-use simpulse::engine::world::Order;
+use simpulse::engine::world::{Order, Settings};
 use simpulse::lab::scenes;
 
 /// Scenes that differ in what their kernels need: discs with and without friction, boxes,
@@ -81,4 +81,19 @@ fn a_crowded_plate_runs_out_of_colors() {
     assert_eq!(world.counts.overflow, 0);
     let world = run(&crate::common::scene("crowded_plate"), settings(find("soft_step").unwrap()), 60);
     assert!(world.counts.overflow > 0, "{:?}", world.counts);
+}
+
+#[test]
+fn few_contacts_run_in_fewer_lanes_with_the_same_bits() {
+    // A stack of five has colours of one and two contacts, a pyramid of 40 rows colours of hundreds.
+    for (name, lanes) in [("stack:5", LaneWidth::W4), ("pyramid:40", LaneWidth::W16)] {
+        let scene = crate::common::scene(name);
+        let solver = find("soft_step").unwrap();
+        let fitted = Settings { width: LaneWidth::W16, narrowest: LaneWidth::W4, ..settings(solver) };
+        let world = run(&scene, fitted, 30);
+        assert_eq!(world.lane_width(), lanes, "{name}");
+        let exactly = run(&scene, with_width(solver, LaneWidth::W16), 30);
+        assert_eq!(exactly.lane_width(), LaneWidth::W16, "{name}");
+        assert_eq!(world.state_hash(), exactly.state_hash(), "{name}");
+    }
 }

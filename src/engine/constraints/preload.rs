@@ -27,6 +27,30 @@
 //! part φ < 1 leaves some overlap, so that points at rest stay points.
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
+//!
+//! # How many bodies a contact bears
+//!
+//! How slowly depends on how high the bodies are piled (`papers/shim.md`), which the loads tell: free flight
+//! changes the velocities of both bodies by w = h a, and a contact that bears N bodies like its own has
+//!
+//! ```text
+//! Σλ/Σm = N |w_a + w_b|
+//! ```
+//!
+//! on the ground (Σm = m, w_a = 0) as between two of them (Σm = m/2). A heavy body on a light one counts as as
+//! many as it outweighs, which is more than its mode needs. What nothing pulls at is taken to bear none.
+//!
+//! # How deep springs see it
+//!
+//! Springs bear a load however deep its contact is ([`super::rules::Bearing`]). Overlap that no load has made is
+//! pushed out at the push speed alone: at the beginning of a step springs see a contact no deeper than
+//!
+//! ```text
+//! u/(γ_m β) + 20 d
+//! ```
+//!
+//! the depth from which the push speed u is all they give, and more as it has borne a load. So what is
+//! thrown into another body is not thrown back.
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
@@ -49,7 +73,7 @@ pub(super) struct Preload {
     pub rate: f32,
 }
 
-/// x
+/// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
 
 /// Finds how many bodies the most loaded contact bears; see the [module](self).
@@ -127,7 +151,13 @@ impl Pass for Preload {
             let compliance = self.share * impulse_scale / (mass_scale * bias_rate);
             let deepest = self.springs.push_speed / (mass_scale * bias_rate);
             let layout = F::layout(segment.opposite);
-            preload_segment::<L>(on.batches, &segment, &layout, on.contacts, [compliance, self.rate, deepest]);
+            preload_segment::<L>(
+                on.batches,
+                &segment,
+                &layout,
+                on.contacts,
+                [compliance, self.rate, deepest],
+            );
         }
     }
 }

@@ -160,7 +160,8 @@ fn prepare_segment<L: Lanes>(
             } else {
                 (0.0, Vec2::ZERO)
             };
-            let increment = |row: u32| Vec2::new(increments[row as usize].0[0], increments[row as usize].0[1]);
+            let increment =
+                |row: u32| Vec2::new(increments[row as usize].0[0], increments[row as usize].0[1]);
             let [a, b] = [row_a, row_b].map(|row| increment(row.entries()[lane]));
             floats[lane] = -n.dot(b - a) / h;
             floats[L::WIDTH + lane] = e;

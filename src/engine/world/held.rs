@@ -187,11 +187,12 @@ impl HeldWorld<'_> {
     /// If a phase runs a pass of another, whatever the filter says.
     pub fn probes(&mut self) -> Vec<Probe> {
         // The same contacts in the same colours, one to a batch.
-        let (width, order) = (self.world.settings.width, self.world.settings.order);
-        (self.world.settings.width, self.world.settings.order) = (LaneWidth::W1, Order::Colored);
+        let settings = self.world.settings.clone();
+        self.world.settings = settings.clone().exactly(LaneWidth::W1);
+        self.world.settings.order = Order::Colored;
         self.world.frozen_step();
         let probes = Phase::ALL.into_iter().filter_map(|phase| self.probe(phase)).collect();
-        (self.world.settings.width, self.world.settings.order) = (width, order);
+        self.world.settings = settings;
         self.restore_bodies();
         self.restore_types();
         self.world.put_back(&self.before.contacts);

@@ -10,7 +10,8 @@ impl World {
     /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
         let by_levels = self.settings.solver.by_levels;
-        let choice = Some((self.settings.width, self.settings.order, by_levels, *features));
+        let widths = [self.settings.narrowest, self.settings.width];
+        let choice = Some((widths, self.settings.order, by_levels, *features));
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
@@ -32,7 +33,7 @@ impl World {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);
             }
-            Order::Colored => self.assignment.colored(work, self.settings.width, features, contacts, &sides),
+            Order::Colored => self.assignment.colored(work, widths, features, contacts, &sides),
         }
         work.graph = graph;
         self.counts.colors = self.assignment.colors;

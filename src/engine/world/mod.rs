@@ -78,7 +78,7 @@ pub struct World {
     narrow: Narrow,
     assignment: Assignment,
     /// What the present lanes were assigned for.
-    lanes_are_for: Option<(LaneWidth, Order, bool, Features)>,
+    lanes_are_for: Option<([LaneWidth; 2], Order, bool, Features)>,
     work: Workspace,
 }
 
@@ -228,7 +228,7 @@ impl World {
 
     /// The solver's stages, on rows and lanes that are ready.
     fn run_solver(&mut self, clock: &mut Clock, phases: PhaseFilter) -> WorkCount {
-        let s = &self.settings;
+        let (s, width) = (&self.settings, self.lane_width());
         let input = StepInput {
             features: self.kernel_features(),
             budget: s.budget,
@@ -240,7 +240,12 @@ impl World {
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());
-        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, s.width)
+        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, width)
+    }
+
+    /// Lanes per instruction of the last step: as many as the settings allow and the colours fill.
+    pub fn lane_width(&self) -> LaneWidth {
+        LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
     }
 
     /// The scene's needs and the extra ones, completed to a set that has a kernel:

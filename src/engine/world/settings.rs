@@ -23,8 +23,11 @@ pub enum Order {
 pub struct Settings {
     /// Row of [`crate::engine::solvers::VARIANTS`].
     pub solver: &'static Variant,
-    /// Lanes per instruction.
+    /// Lanes per instruction, at most.
     pub width: LaneWidth,
+    /// Scenes with few contacts per colour run with fewer lanes, but not with fewer than these; see
+    /// [`Self::exactly`]. The results are the same bits.
+    pub narrowest: LaneWidth,
     /// Constraint order.
     pub order: Order,
     /// Work per step.
@@ -58,6 +61,7 @@ impl Settings {
         Settings {
             solver,
             width: native_width(),
+            narrowest: native_width().min(LaneWidth::W4),
             order: Order::Colored,
             budget: solver.budget,
             gravity: [0.0, -10.0],
@@ -71,6 +75,11 @@ impl Settings {
             rotation: RotationUpdate::default(),
             extra_features: Features::NONE,
         }
+    }
+
+    /// With `width` lanes, whatever the scene.
+    pub fn exactly(self, width: LaneWidth) -> Self {
+        Settings { width, narrowest: width, ..self }
     }
 
     /// Substep (s).

@@ -222,7 +222,7 @@ impl<'a> Replay<'a> {
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let mut assignment = Assignment::default();
         if sequence == Sequence::Colored {
-            assignment.colored(work, self.width, features, contacts, &sides);
+            assignment.colored(work, [self.width; 2], features, contacts, &sides);
         } else {
             let order = sequence.order(contacts.len()).into_iter();
             assignment.serial(work, features, contacts, order, &sides);

@@ -169,7 +169,7 @@ pub fn profile(frozen: &mut HeldWorld<'_>, probes: &[Probe], scene: &str, option
     let mut buffer = Buffer::new(&levels, if options.ceilings { largest } else { 0 });
     let mut level_rates = vec![[Vec::new(), Vec::new()]; levels.len()];
     let mut arithmetic = Vec::new();
-    let width = frozen.world().settings.width;
+    let width = frozen.world().lane_width();
     let (start, mut resets, waited) = (Instant::now(), Duration::ZERO, waiting::waited());
     loop {
         for entrant in &mut entrants {
