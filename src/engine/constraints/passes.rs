@@ -16,7 +16,7 @@ use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
-use super::preload::{Borne, Preload};
+use super::preload::{Preload, longest_column};
 use super::prepare::{Prepare, Store};
 use super::restitution;
 use super::rules::{NormalRule, Rule, Soft};
@@ -365,12 +365,9 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Constraint pass: how many bodies the most loaded contact bears, by the impulses so far (1); see
-    /// `preload.rs`.
-    pub fn bodies_borne(&mut self) -> f32 {
-        let pass = Borne::default();
-        self.run(Phase::Prepare, &pass);
-        pass.most_squared.get().sqrt()
+    /// A bound on how many bodies the longest column of the scene has, `most` or less; see `preload.rs`.
+    pub fn longest_column(&self, most: f32) -> f32 {
+        longest_column(&self.work.rows, most)
     }
 
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under

@@ -28,17 +28,15 @@
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
 //!
-//! # How many bodies a contact bears
+//! # How slowly
 //!
-//! How slowly depends on how high the bodies are piled (`papers/shim.md`), which the loads tell: free flight
-//! changes the velocities of both bodies by w = h a, and a contact that bears N bodies like its own has
+//! The rate has to be that of the slowest mode (`papers/shim.md`). Loads do not tell it: boxes in a row along the
+//! ground that are pressed against a wall by a tenth of their weight swing as a column of as many does. But no
+//! chain is longer than all bodies, and none is slower than one of the heaviest on the lightest:
 //!
 //! ```text
-//! Σλ/Σm = N |w_a + w_b|
+//! N ≤ n √(m_max/m_min)
 //! ```
-//!
-//! on the ground (Σm = m, w_a = 0) as between two of them (Σm = m/2). A heavy body on a light one counts as as
-//! many as it outweighs, which is more than its mode needs. What nothing pulls at is taken to bear none.
 //!
 //! # How deep springs see it
 //!
@@ -55,12 +53,10 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
-use super::restitution::largest;
 use super::rules::{Soft, Softness};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{Lanes, Quad};
+use crate::engine::lanes::{BodyRow, Lanes};
 use crate::engine::params::SPECULATIVE_DISTANCE;
-use std::cell::Cell;
 
 /// Follows the load and shortens the springs; see the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -75,64 +71,6 @@ pub(super) struct Preload {
 
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
-
-/// Finds how many bodies the most loaded contact bears; see the [module](self).
-#[derive(Debug, Default)]
-pub(super) struct Borne {
-    /// Square of the number of bodies (1).
-    pub most_squared: Cell<f32>,
-}
-
-impl Pass for Borne {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        // Mass and impulse of each point, and what forces do to both bodies.
-        PerLane { floats_read: 2 * layout.points + 8, ..PerLane::default() }
-    }
-
-    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let layout = F::layout(segment.opposite);
-            let most = borne_squared::<L>(on.batches, &segment, &layout, on.increments);
-            self.most_squared.set(self.most_squared.get().max(most));
-        }
-    }
-}
-
-#[inline(never)]
-fn borne_squared<L: Lanes>(
-    batches: &mut Batches,
-    segment: &Segment,
-    layout: &Layout,
-    increments: &[Quad],
-) -> f32 {
-    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
-    let (zero, one) = (L::zero(), L::splat(1.0));
-    let mut most = zero;
-    for (record, (row_a, row_b)) in records {
-        let speed = borne_speed(record, layout);
-        let [a, b] = [row_a, row_b].map(|row| L::gather_quads::<1, 0>(increments, row));
-        let (x, y) = (a[0] + b[0], a[1] + b[1]);
-        let own = x.mul_add(x, y * y);
-        // Where nothing pulls, no number of bodies makes the load.
-        let bodies = speed * speed / own.select_positive(own, one);
-        most = most.max(own.select_positive(bodies, zero));
-    }
-    largest(most)
-}
-
-/// The speed Σλ/Σm that the impulses of a contact would give to its effective mass (m/s).
-#[inline(always)]
-fn borne_speed<L: Lanes>(record: &[L], layout: &Layout) -> L {
-    let (mut impulse, mut mass) = (L::zero(), L::zero());
-    for p in 0..layout.points {
-        impulse = impulse + record[layout.at(p, layout.normal_impulse)];
-        mass = mass + record[layout.at(p, layout.normal_mass)];
-    }
-    // A lane without a contact has no mass.
-    impulse / mass.select_positive(mass, L::splat(1.0))
-}
 
 impl Pass for Preload {
     fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
@@ -162,7 +100,25 @@ impl Pass for Preload {
     }
 }
 
-/// `factors`: sag per impulse and effective mass (s), and rate.
+/// Part of a column that swings when preload follows at the pace of all of it, measured on pyramids and rows.
+const SAFETY: f32 = 3.0;
+
+/// A bound on the length of the column (bodies) whose slowest mode is slower than any of these bodies', but no
+/// more than `most`.
+pub(super) fn longest_column(rows: &[BodyRow], most: f32) -> f32 {
+    let (mut count, mut least, mut greatest) = (0.0, f32::INFINITY, 0.0f32);
+    for inverse in rows.iter().map(|row| row.velocity[3]).filter(|&inverse| inverse > 0.0) {
+        count += SAFETY;
+        (least, greatest) = (least.min(inverse), greatest.max(inverse));
+        if count >= most {
+            return most;
+        }
+    }
+    // Without bodies there is none.
+    if count > 0.0 { (count * (greatest / least).sqrt()).min(most) } else { 1.0 }
+}
+
+/// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m).
 #[inline(never)]
 fn preload_segment<L: Lanes>(
     batches: &mut Batches,
@@ -176,7 +132,14 @@ fn preload_segment<L: Lanes>(
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
         let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
-        let sag = (compliance * borne_speed(record, layout)).min(L::splat(SPECULATIVE_DISTANCE));
+        let (mut impulse, mut mass) = (L::zero(), L::zero());
+        for p in 0..layout.points {
+            impulse = impulse + record[layout.at(p, layout.normal_impulse)];
+            mass = mass + record[layout.at(p, layout.normal_mass)];
+        }
+        // A lane without a contact has no mass.
+        let sag = (compliance * impulse / mass.select_positive(mass, L::splat(1.0)))
+            .min(L::splat(SPECULATIVE_DISTANCE));
         let [_, last, ..] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
         let preload = rate.mul_add(sag - last, last).min(sag);

@@ -81,16 +81,13 @@ pub static SOLVER: Variant = Variant {
     step,
 };
 
-/// Bodies of the column whose swing sets the pace of preload, per body that the most loaded contact bears.
-const COLUMN_MARGIN: f32 = 3.0;
-
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [stiffness, damping_ratio, push_speed, height, share] = [0, 1, 2, 3, 4].map(|i| passes.parameter(i));
     let omega = TAU * stiffness / h;
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
     let rigid = Rigid::new(h);
-    let tallest = (COLUMN_MARGIN * passes.bodies_borne()).clamp(1.0, height);
+    let tallest = passes.longest_column(height);
     let (dt, slowest) = (h * budget.substeps as f32, FRAC_PI_2 / tallest);
     let time = 1.0 / (2.0 * damping_ratio * omega * slowest * slowest);
     passes.preload(springs, share, dt / (dt + time));
