@@ -14,23 +14,33 @@
 //!                                     | k₁₂   1/s₂ |
 //! ```
 //!
-//! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the unchanged K of the two rows. Of the
-//! four cases the first that fits is taken (total enumeration, `catto2006`):
+//! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the unchanged K of the two rows. Of its four
+//! cases (`catto2006`) exactly one holds if A is positive definite, and the signs of x = A⁻¹ r tell which. With
+//! g_p = s_p k₁₂ and q_p = s_p r_p, so that nothing is divided by an s of zero,
 //!
 //! ```text
-//! both push     λ = A⁻¹ r              λ ≥ 0
-//! first alone   λ = (r₁ s₁, 0)         λ₁ ≥ 0, w₂ = k₁₂ λ₁ − r₂ ≥ 0
-//! second alone  λ = (0, r₂ s₂)         λ₂ ≥ 0, w₁ = k₁₂ λ₂ − r₁ ≥ 0
-//! none          λ = 0                  r ≤ 0
+//! x₁ + g₁ x₂ = q₁,   g₂ x₁ + x₂ = q₂,   g₁ g₂ < 1
+//!
+//! x₁ ≥ 0, x₂ ≥ 0   both push, λ = x
+//! x₁ ≥ 0 > x₂      not the second: alone, the first leaves w₂ ~ g₂ q₁ − q₂ = −x₂ (1 − g₁ g₂) > 0.
+//!                  Nor does it push if q₁ ≤ 0: x₁ ≥ 0 and x₂ < 0 are g₁ q₂ ≤ q₁ and q₂ < g₂ q₁
+//! x₂ ≥ 0 > x₁      not the first, likewise
+//! both negative    each that has q_p > 0, which is one at most: q₁ < g₁ q₂ < g₁ g₂ q₁ otherwise
 //! ```
 //!
-//! For a positive definite A exactly one does, up to ties. Where A is close to singular (its
+//! and in one line each
+//!
+//! ```text
+//! λ₁ = max(0, x₂ < 0 ? q₁ : x₁)      λ₂ = max(0, x₁ < 0 ? q₂ : x₂)
+//! ```
+//!
+//! Where A is close to singular (its
 //! determinant below a thousandth of a₁₁ a₂₂) or there is one point only, rows are solved one after
 //! the other.
 //!
-//! In [`BlockSweep`] friction rows come first, bounded by the normal impulses so far (`catto2024solver2d`,
-//! `solve_pgs_ngs_block`): normal rows have the last word. In [`BlockSweepNormalFirst`] they come last, bounded
-//! by the new ones, so that the cone holds and what slides feels the load of now.
+//! Friction rows come first, bounded by the normal impulses so far, so that normal rows have the last word
+//! (`catto2024solver2d`, `solve_pgs_ngs_block`); or they come last, bounded by the new ones, so that the cone
+//! holds and what slides feels the load of now.
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
@@ -45,59 +55,28 @@ use crate::engine::lanes::{BodyRow, Lanes};
 /// A matrix with a determinant below this part of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
 
-/// A block sweep under a rule.
+/// A block sweep under a rule; `NORMAL_FIRST`: normal rows come before friction rows.
 #[derive(Clone, Copy, Debug)]
-pub struct BlockSweep<R>(pub R);
+pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 
-impl<R: NormalRule> Pass for BlockSweep<R> {
+impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRST> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane::of_sweep(layout, R::FRICTION, opposite)
     }
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R, FrictionFirst>(on.rows, on.batches, self.0);
+        sweep::<L, F, R, NORMAL_FIRST>(on.rows, on.batches, self.0);
     }
-}
-
-/// A block sweep under a rule, normal rows before friction rows.
-#[derive(Clone, Copy, Debug)]
-pub struct BlockSweepNormalFirst<R>(pub R);
-
-impl<R: NormalRule> Pass for BlockSweepNormalFirst<R> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
-    #[inline(always)]
-    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R, NormalFirst>(on.rows, on.batches, self.0);
-    }
-}
-
-/// Which rows of a contact come first.
-trait RowOrder {
-    const NORMAL_FIRST: bool;
-}
-
-struct NormalFirst;
-struct FrictionFirst;
-
-impl RowOrder for NormalFirst {
-    const NORMAL_FIRST: bool = true;
-}
-
-impl RowOrder for FrictionFirst {
-    const NORMAL_FIRST: bool = false;
 }
 
 #[inline(never)]
-fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, W: RowOrder>(
+fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     rule: R,
 ) {
-    over_segments!(segment, L, N, R, W; rows, batches, rule);
+    over_segments!(segment, L, N, R, NORMAL_FIRST; rows, batches, rule);
 }
 
 /// Velocities of a contact while its rows are solved, and what they have applied.
@@ -137,7 +116,7 @@ fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
 }
 
 #[inline(always)]
-fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>(
+fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, const NORMAL_FIRST: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -153,7 +132,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
         let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
         let mut progress = Progress { along_t, w: [a[W], b[W]], sum: [L::zero(); 2] };
         let has_friction = const { N::FRICTION && R::FRICTION };
-        if has_friction && !W::NORMAL_FIRST {
+        if has_friction && !NORMAL_FIRST {
             friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
         }
 
@@ -189,7 +168,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, W: RowOrder>
             progress.sum[0] = progress.sum[0] + delta;
             spin::<L, N, O>(&mut progress.w, inertia, arm[p], delta);
         }
-        if has_friction && W::NORMAL_FIRST {
+        if has_friction && NORMAL_FIRST {
             friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
         }
         apply::<L, O>(&mut a, &mut b, n, progress.sum, progress.w);
@@ -209,8 +188,6 @@ fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling
     let seen = coupling.mul_add(first - old[0], v[1]);
     let one_by_one = [first, s[1].neg_mul_add(seen, c[1]).max(zero)];
 
-    // The problem times s₁ and s₂, so that nothing is divided by an s of zero: with
-    // g = s k₁₂ and q = s r, the cases are x₁ + g₁ x₂ = q₁, g₂ x₁ + x₂ = q₂.
     let g = [s[0] * coupling, s[1] * coupling];
     let q = [
         s[0].mul_add(coupling.mul_add(old[1], -v[0]), c[0]),
@@ -218,20 +195,15 @@ fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling
     ];
     // det A/(a₁₁ a₂₂)
     let determinant = g[0].neg_mul_add(g[1], L::splat(1.0));
-    let is_regular = |yes: L, no: L| (determinant - L::splat(SINGULAR)).select_positive(yes, no);
-    let safe = is_regular(determinant, L::splat(1.0));
-    let both = [g[0].neg_mul_add(q[1], q[0]) / safe, g[1].neg_mul_add(q[0], q[1]) / safe];
-    // Not negative: −x is not positive.
-    let fits = |x: L, y: L, yes: [L; 2], no: [L; 2]| -> [L; 2] {
-        std::array::from_fn(|k| (-x).select_positive(no[k], (-y).select_positive(no[k], yes[k])))
-    };
-    let mut new = one_by_one;
-    new = fits(-q[0], -q[1], [zero; 2], new);
-    new = fits(q[1], g[0].mul_add(q[1], -q[0]), [zero, q[1]], new);
-    new = fits(q[0], g[1].mul_add(q[0], -q[1]), [q[0], zero], new);
-    new = fits(both[0], both[1], both, new);
-    let both_exist = |yes: L, no: L| s[0].select_positive(s[1].select_positive(yes, no), no);
-    std::array::from_fn(|k| both_exist(is_regular(new[k], one_by_one[k]), one_by_one[k]))
+    // A point that is not there has s = 0.
+    let regular = (determinant - L::splat(SINGULAR)).min(s[0]).min(s[1]);
+    let inverse = L::splat(1.0) / regular.select_positive(determinant, L::splat(1.0));
+    let both = [g[0].neg_mul_add(q[1], q[0]) * inverse, g[1].neg_mul_add(q[0], q[1]) * inverse];
+    std::array::from_fn(|p| {
+        let alone = q[p].max(zero);
+        let new = (-both[1 - p]).select_positive(alone, both[p].max(zero));
+        regular.select_positive(new, one_by_one[p])
+    })
 }
 
 #[cfg(test)]
@@ -253,6 +225,27 @@ mod tests {
         assert_eq!(solve(k, [-3.0, -1.0], [0.0; 2]), [1.5, 0.0]);
         assert_eq!(solve(k, [-1.0, -3.0], [0.0; 2]), [0.0, 1.5]);
         assert_eq!(solve(k, [1.0, 2.0], [0.0; 2]), [0.0, 0.0]);
+    }
+
+    proptest::proptest! {
+        /// λ ≥ 0, w = K λ + b ≥ 0 and λ w = 0, each to what rounding does to its terms.
+        #[test]
+        fn impulses_and_velocities_are_complementary(
+            k in [0.5f32..4.0, 0.5..4.0],
+            cosine in -0.99f32..0.99,
+            v in [-3.0f32..3.0, -3.0..3.0],
+            old in [0.0f32..2.0, 0.0..2.0],
+        ) {
+            let coupling = cosine * (k[0] * k[1]).sqrt();
+            let new = solve([k[0], k[1], coupling], v, old);
+            let change = [new[0] - old[0], new[1] - old[1]];
+            for p in 0..2 {
+                let w = v[p] + k[p] * change[p] + coupling * change[1 - p];
+                let rounding = 1e-4 / (1.0 - cosine * cosine);
+                proptest::prop_assert!(new[p] >= 0.0 && w >= -rounding, "{new:?} {w}");
+                proptest::prop_assert!(new[p].min(w) <= rounding, "{new:?} {w}");
+            }
+        }
     }
 
     #[test]

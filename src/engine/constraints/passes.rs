@@ -1,7 +1,7 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
 use super::batches::Batches;
-use super::block::{BlockSweep, BlockSweepNormalFirst};
+use super::block::BlockSweep;
 use super::bounces::Bounces;
 use super::descent::Blocks;
 use super::features::{Features, Layout};
@@ -252,14 +252,14 @@ impl<'a> Passes<'a> {
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
     /// together; see [`super::block`].
     pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
-        if self.run(phase, &BlockSweep(rule)) {
+        if self.run(phase, &BlockSweep::<_, false>(rule)) {
             self.solved(&Sweep(rule));
         }
     }
 
     /// Constraint pass: as [`Self::block_sweep`], but friction rows come last, bounded by the new impulses.
     pub fn block_sweep_normal_first<R: NormalRule>(&mut self, phase: Phase, rule: R) {
-        if self.run(phase, &BlockSweepNormalFirst(rule)) {
+        if self.run(phase, &BlockSweep::<_, true>(rule)) {
             self.solved(&Sweep(rule));
         }
     }
