@@ -18,6 +18,7 @@ mod box2d;
 mod check;
 mod engine;
 mod ours;
+mod picture;
 mod race;
 mod rapier;
 mod table;
@@ -58,7 +59,7 @@ struct Args {
     /// Default settings only, 180 steps
     #[arg(long)]
     quick: bool,
-    /// Folder for peers.csv
+    /// Folder for peers.csv and peers.svg
     #[arg(long, default_value = "results")]
     out: PathBuf,
 }
@@ -83,6 +84,7 @@ fn run(args: &Args) -> Result<(), String> {
     let failed = |e: csv::Error| format!("{}: {e}", path.display());
     let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
     let mut summary = vec![table::SUMMARY.to_string()];
+    let mut raced = Vec::new();
     for (name, steps, stands) in scenes {
         let steps = args.steps.unwrap_or(if args.quick { QUICK_STEPS } else { steps });
         let outcomes = race::race(name, steps, args.repeats, stands, &contenders)?;
@@ -99,7 +101,10 @@ fn run(args: &Args) -> Result<(), String> {
             csv.serialize(table::Row::new(name, outcome)).map_err(failed)?;
         }
         csv.flush().map_err(|e| format!("{}: {e}", path.display()))?;
+        raced.push((name.to_string(), outcomes));
     }
-    println!("\n{}\n\n{}", summary.join("\n"), path.display());
+    let drawn = args.out.join("peers.svg");
+    std::fs::write(&drawn, picture::svg(&raced)?).map_err(|e| format!("{}: {e}", drawn.display()))?;
+    println!("\n{}\n\n{}\n{}", summary.join("\n"), path.display(), drawn.display());
     Ok(())
 }

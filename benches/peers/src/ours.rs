@@ -20,7 +20,7 @@ impl Simpulse {
         broadphase: BroadPhaseKind,
     ) -> Result<Self, String> {
         let solver = solvers::find("soft_step").map_err(|e| e.to_string())?;
-        let mut settings = Settings { width, broadphase, ..Settings::new(solver) };
+        let mut settings = Settings { broadphase, ..Settings::new(solver).exactly(width) };
         let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
         set.map_err(|e| e.to_string())?;
         settings.budget.substeps = contender.substeps;

@@ -1,7 +1,7 @@
 //! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
 
 pub mod answer;
-pub(crate) mod axes;
+pub mod axes;
 pub mod columns;
 pub mod environment;
 pub mod export;

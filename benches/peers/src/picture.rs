@@ -1,0 +1,121 @@
+//! `peers.svg`: time of a step against mean overlap, a panel per scene.
+//!
+//! Both axes are logarithmic, lower left is better. What failed the check has no time and no place:
+//! it is told under its panel.
+
+use crate::engine::{Contender, Maker};
+use crate::race::Outcome;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+use simpulse::lab::report::axes::{
+    Area, Drawn, GRID, INK, Scale, color, marker, wrapped, write, write_upwards,
+};
+use simpulse::lab::report::units::si_short;
+
+const COLUMNS: usize = 3;
+const PANEL: (i32, i32) = (360, 300);
+const LEGEND_HEIGHT: i32 = 62;
+/// Space left of, right of, above and below a plot.
+const LEFT: i32 = 76;
+const RIGHT: i32 = 26;
+const TOP: i32 = 34;
+const BOTTOM: i32 = 66;
+/// Letters of a line under a panel.
+const LINE: usize = 56;
+
+/// Who is drawn, in the order of the legend: an engine at all its settings.
+const ENGINES: [&str; 4] = ["Box2D", "rapier", "simpulse soft_step", "simpulse shim"];
+
+/// Place in [`ENGINES`]; none for what other tables compare.
+fn engine(contender: &Contender) -> Option<usize> {
+    match contender.maker {
+        Maker::Box2d if contender.recycling => Some(0),
+        Maker::Rapier if contender.recycling => Some(1),
+        Maker::Simpulse(width, broad_phase) => {
+            (width.lanes() == 16 && broad_phase == Default::default()).then_some(2)
+        }
+        Maker::Solver("shim") => Some(3),
+        _ => None,
+    }
+}
+
+/// The picture as SVG text; scenes with what was raced in them.
+pub fn svg(scenes: &[(String, Vec<Outcome>)]) -> Result<String, String> {
+    let mut text = String::new();
+    draw(scenes, &mut text).map_err(|e| format!("peers.svg: {e}"))?;
+    Ok(text)
+}
+
+fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
+    let rows = scenes.len().div_ceil(COLUMNS) as i32;
+    let size = ((COLUMNS as i32 * PANEL.0) as u32, (LEGEND_HEIGHT + rows * PANEL.1) as u32);
+    let root = SVGBackend::with_string(text, size).into_drawing_area();
+    root.fill(&WHITE)?;
+    write(
+        &root,
+        "Time of a step against overlap, in one run: lower left is better",
+        (8, 18),
+        18,
+        HPos::Left,
+    )?;
+    let mut x = 12;
+    for (k, name) in ENGINES.into_iter().enumerate() {
+        marker(&root, (x, 44), k, &color(k))?;
+        write(&root, name, (x + 10, 44), 14, HPos::Left)?;
+        x += 34 + 8 * name.len() as i32;
+    }
+    write(&root, "number: substeps; contacts at 30 Hz unless told", (x, 44), 14, HPos::Left)?;
+    for (i, (name, outcomes)) in scenes.iter().enumerate() {
+        let (column, row) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
+        panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), name, outcomes)?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> Drawn {
+    let all = outcomes.iter().filter_map(|o| engine(&o.contender).map(|k| (k, o)));
+    let shown: Vec<(usize, &Outcome, f64, f64)> = all
+        .clone()
+        .filter_map(|(k, o)| Some((k, o, o.step?.median, o.errors.as_ref()?.penetration_mean)))
+        .filter(|&(.., overlap)| overlap > 0.0)
+        .collect();
+    let (left, right) = (corner.0 + LEFT, corner.0 + PANEL.0 - RIGHT);
+    let (top, bottom) = (corner.1 + TOP, corner.1 + PANEL.1 - BOTTOM);
+    write(area, name, (left, top - 14), 15, HPos::Left)?;
+    let overlaps = Scale::of(shown.iter().map(|s| s.3), 5);
+    let times = Scale::of(shown.iter().map(|s| s.2), 6);
+    for &tick in &overlaps.ticks {
+        let x = overlaps.pixel(tick, left, right);
+        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
+        write(area, &si_short(tick, "m"), (x, bottom + 12), 12, HPos::Center)?;
+    }
+    for &tick in &times.ticks {
+        let y = times.pixel(tick, bottom, top);
+        area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
+        write(area, &si_short(1e-3 * tick, "s"), (left - 6, y), 12, HPos::Right)?;
+    }
+    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
+    write_upwards(area, "time of a step", (corner.0 + 14, (top + bottom) / 2), 12)?;
+    write(area, "mean overlap", ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
+    for &(k, outcome, time, overlap) in &shown {
+        let (x, y) = (overlaps.pixel(overlap, left, right), times.pixel(time, bottom, top));
+        marker(area, (x, y), k, &color(k))?;
+        write(area, &setting(&outcome.contender), (x + 7, y - 7), 11, HPos::Left)?;
+    }
+    let failed = all.filter(|(_, o)| o.failed.is_some());
+    let failed: Vec<String> =
+        failed.map(|(k, o)| format!("{} {}", ENGINES[k], setting(&o.contender))).collect();
+    if !failed.is_empty() {
+        let line = format!("falls: {}", failed.join(", "));
+        for (i, line) in wrapped(&line, LINE).iter().enumerate() {
+            write(area, line, (corner.0 + 8, bottom + 44 + 14 * i as i32), 11, HPos::Left)?;
+        }
+    }
+    Ok(())
+}
+
+fn setting(contender: &Contender) -> String {
+    let stiffer = if contender.hertz == 30.0 { String::new() } else { format!(" ({} Hz)", contender.hertz) };
+    format!("{}{stiffer}", contender.substeps)
+}
