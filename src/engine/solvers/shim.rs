@@ -5,16 +5,17 @@
 //!
 //! **Departures.** Other than in [`super::soft_step`], springs are as stiff as the substep rate allows, a
 //! fixed part of it; each contact has a preload that follows its load
-//! ([`crate::engine::constraints::Passes::preload`]); and the two normal rows of a contact are solved
-//! together, friction rows after them.
+//! ([`crate::engine::constraints::Passes::preload`]); springs bear a load however deep its contact is; the two
+//! normal rows of a contact are solved together, friction rows after them; and the first substep relaxes once
+//! more, since its impulses come from contacts as they were a step ago.
 //!
-//! **Cost.** Per step 1 warm start and 1 pass that shortens springs; per substep 2 body passes,
-//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones.
+//! **Cost.** Per step 1 warm start, 1 pass that shortens springs and 1 rigid block sweep; per substep 2 body
+//! passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones.
 //!
 //! **Fails when** a column is so tall that it buckles on its springs: preload has no moment, so that
 //! rocking is held by the springs alone. N unit boxes need 30 Hz (N/14)^1.5, which the standard budget has
-//! for 41. And where there is no room for the bodies: springs push no faster than `push_speed`, and
-//! beyond 7 cm of overlap not harder.
+//! for 41. And angular momentum is conserved to 1e-4 only, where bodies slide past each other: arms are
+//! those of the step's beginning.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -62,7 +63,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 300.0,
             range: [1.0, 1e6],
-            meaning: "bodies in the highest column that preload may not make swing",
+            meaning: "bodies in the highest column that preload may not make swing, if the scene has so many",
             trials: &[],
         },
         Parameter {
