@@ -14,6 +14,7 @@ use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
+use super::point_vector::PointVector;
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
 use super::preload::Preload;
@@ -57,7 +58,7 @@ pub struct Workspace {
     /// Called after each iteration of a solver.
     pub watch: Option<Watch>,
     /// Vectors that solvers have given back.
-    pub vectors: Vec<Vec<Pair>>,
+    pub vectors: Vec<PointVector>,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
     pub masses: Vec<[f32; 2]>,
     /// Keep the rule of the last velocity sweep in `last_rule`.
@@ -81,7 +82,7 @@ impl fmt::Debug for Watch {
 impl Workspace {
     /// Bytes held by what only some solvers have.
     pub fn own_bytes(&self) -> usize {
-        let vectors: usize = self.vectors.iter().map(held).sum();
+        let vectors: usize = self.vectors.iter().map(PointVector::held_bytes).sum();
         self.kept.held_bytes() + self.graph.held_bytes() + vectors + held(&self.masses)
     }
 }
@@ -294,10 +295,10 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let (mut impulses, zero) = (self.vector(), self.vector());
+        let (mut impulses, mut zero) = (self.vector(), self.vector());
         let mut system = self.system();
-        system.impulses(&mut impulses);
-        system.set_impulses(&zero);
+        system.lane_impulses(&mut impulses);
+        system.set_lane_impulses(&mut zero);
         let Workspace { rows, sums, .. } = &mut *self.work;
         sums.clone_from(rows);
         rows.iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
@@ -307,7 +308,7 @@ impl<'a> Passes<'a> {
         for (row, before) in rows.iter_mut().zip(sums.iter()) {
             row.velocity = before.velocity;
         }
-        self.system().set_impulses(&impulses);
+        self.system().set_lane_impulses(&mut impulses);
         self.give_back([impulses, zero]);
         let row = size_of::<BodyRow>() as f64;
         self.book_rows([2.0 * row, 2.0 * row]);
@@ -399,16 +400,22 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let mut impulses = self.vector();
-        for (contact, c) in self.contacts.iter().enumerate() {
-            for p in 0..c.manifold.count as usize {
-                let [normal, tangent] = of(self.work.kept.point(contact, p));
-                let bound = c.friction * normal;
-                impulses[2 * contact + p] = [normal, tangent.min(bound).max(-bound)];
-            }
+        let Workspace { lanes, serial, kept, .. } = &mut *self.work;
+        for batches in [lanes, serial] {
+            let width = batches.width();
+            batches.for_each_lane(&self.input.features, |contact, layout, record, lane| {
+                let c = &self.contacts[contact as usize];
+                for p in 0..c.manifold.count as usize {
+                    let [normal, tangent] = of(kept.point(contact as usize, p));
+                    let bound = c.friction * normal;
+                    record[layout.at(p, layout.normal_impulse) * width + lane] = normal;
+                    if layout.has_friction {
+                        let at = layout.at(p, layout.tangent_impulse) * width + lane;
+                        record[at] = tangent.min(bound).max(-bound);
+                    }
+                }
+            });
         }
-        self.system().set_impulses(&impulses);
-        self.give_back([impulses]);
         self.clock.lap(phase);
     }
 
@@ -498,15 +505,14 @@ impl<'a> Passes<'a> {
 
     /// A vector over contact points, all zero. Given back by [`Self::give_back`], it is not allocated
     /// again in the next step.
-    pub fn vector(&mut self) -> Vec<Pair> {
+    pub fn vector(&mut self) -> PointVector {
         let mut vector = self.work.vectors.pop().unwrap_or_default();
-        vector.clear();
-        vector.resize(2 * self.contacts.len(), [0.0; 2]);
+        vector.reset([&self.work.lanes, &self.work.serial]);
         vector
     }
 
     /// Takes vectors back.
-    pub fn give_back<const N: usize>(&mut self, vectors: [Vec<Pair>; N]) {
+    pub fn give_back<const N: usize>(&mut self, vectors: [PointVector; N]) {
         // The last one out is the first one in, so that each finds its own length again.
         self.work.vectors.extend(vectors.into_iter().rev());
     }
@@ -530,7 +536,7 @@ impl<'a> Passes<'a> {
     /// All impulses and velocities as vectors, in an order that no width changes.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, .. } = &mut *self.work;
-        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock)
+        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock, self.width)
     }
 
     /// Finds out which contacts each body has.
