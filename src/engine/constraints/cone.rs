@@ -24,7 +24,9 @@ mod tests {
     #[test]
     fn a_projection_is_the_nearest_point_of_the_cone() {
         for friction in [0.0, 0.3, 1.0, 2.5] {
-            for point in [[1.0, 0.2], [1.0, -4.0], [-1.0, 0.5], [-0.1, 3.0], [0.0, 0.0], [-2.0, -1.0], [-1.0, 0.0]] {
+            for point in
+                [[1.0, 0.2], [1.0, -4.0], [-1.0, 0.5], [-0.1, 3.0], [0.0, 0.0], [-2.0, -1.0], [-1.0, 0.0]]
+            {
                 let nearest = project(point, friction);
                 assert!(nearest[0] >= 0.0 && nearest[1].abs() <= friction * nearest[0]);
                 let distance = |to: [f32; 2]| (to[0] - point[0]).hypot(to[1] - point[1]);

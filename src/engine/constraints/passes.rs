@@ -324,9 +324,10 @@ impl<'a> Passes<'a> {
     }
 
     /// Constraint pass: displaces bodies that overlap or slip, see `positional.rs`; `first` in each
-    /// substep, and overlap removed at `push_speed` (m/s) at most.
-    pub fn displacing_sweep(&mut self, push_speed: f32, first: bool) {
-        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, first }) {
+    /// substep, overlap removed at `push_speed` (m/s) at most, and contacts that give way by `compliance`
+    /// (m/N).
+    pub fn displacing_sweep(&mut self, push_speed: f32, compliance: f32, first: bool) {
+        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, compliance, first }) {
             self.count_sweep(if self.input.features.friction { 2 } else { 1 });
         }
     }

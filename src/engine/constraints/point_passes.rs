@@ -133,7 +133,15 @@ const AHEAD: usize = 3;
 #[inline(always)]
 fn each_batch<L: Lanes>(
     On { rows, batches, features, vector }: On<'_>,
-    mut visit: impl FnMut(&mut [BodyRow], &Layout, &Segment, &mut [L], [LaneIndex<'_, L::Index>; 2], &mut [L], usize),
+    mut visit: impl FnMut(
+        &mut [BodyRow],
+        &Layout,
+        &Segment,
+        &mut [L],
+        [LaneIndex<'_, L::Index>; 2],
+        &mut [L],
+        usize,
+    ),
 ) {
     let vector: &mut [L] = bytemuck::cast_slice_mut(vector);
     for i in 0..batches.segments().len() {

@@ -94,10 +94,7 @@ pub fn dot(x: &PointVector, y: &PointVector) -> f64 {
 /// # Panics
 /// If a vector is shorter than the first.
 #[inline(always)]
-pub fn sum_of_products<const N: usize>(
-    from: [&PointVector; N],
-    f: impl Fn([Entry; N]) -> [Entry; 2],
-) -> f64 {
+pub fn sum_of_products<const N: usize>(from: [&PointVector; N], f: impl Fn([Entry; N]) -> [Entry; 2]) -> f64 {
     let count = from.first().map_or(0, |v| v.entries().len());
     let from = from.map(|v| &v.entries()[..count]);
     let mut sums = [0.0_f64; 16];
