@@ -11,6 +11,7 @@
 pub mod assign;
 pub mod batches;
 pub mod block;
+mod body_lanes;
 pub mod bounces;
 pub mod cone;
 pub mod dense;

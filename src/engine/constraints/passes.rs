@@ -3,7 +3,7 @@
 use super::batches::Batches;
 use super::block::{BlockSweep, BlockSweepNormalFirst};
 use super::bounces::Bounces;
-use super::descent::Blocks;
+use super::descent::{Bodies, Descent};
 use super::features::{Features, Layout};
 use super::graph::Graph;
 use super::impact;
@@ -57,6 +57,8 @@ pub struct Workspace {
     pub types: Vec<Joined>,
     /// Called after each iteration of a solver.
     pub watch: Option<Watch>,
+    /// What block descent works with.
+    pub descent: Descent,
     /// Vectors that solvers have given back.
     pub vectors: Vec<PointVector>,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
@@ -83,7 +85,11 @@ impl Workspace {
     /// Bytes held by what only some solvers have.
     pub fn own_bytes(&self) -> usize {
         let vectors: usize = self.vectors.iter().map(PointVector::held_bytes).sum();
-        self.kept.held_bytes() + self.graph.held_bytes() + vectors + held(&self.masses)
+        self.kept.held_bytes()
+            + self.graph.held_bytes()
+            + self.descent.held_bytes()
+            + vectors
+            + held(&self.masses)
     }
 }
 
@@ -373,24 +379,49 @@ impl<'a> Passes<'a> {
         self.run(Phase::Prepare, &Preload { springs, share, rate });
     }
 
-    /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
-    pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
+    /// Begins a substep of block descent, see [`super::descent`]: bodies get their lanes and go to their inertial
+    /// place; of multipliers and of penalties remains a share.
+    pub fn begin_descent(&mut self, keep: f32, keep_penalty: f32) {
+        let (h, motion) = (self.input.h, self.motion_after_velocities());
+        if self.input.phases.runs(Phase::Solve) {
+            self.build_graph();
+        }
+        let width = self.width;
+        let one_by_one = self.work.lanes.segments().is_empty();
+        self.with_descent(Phase::Solve, |descent, bodies, graph| {
+            descent.assign(bodies, graph, width, one_by_one);
+            descent.begin(bodies, h, motion, [keep, keep_penalty]);
+        });
+    }
+
+    /// Body pass: every body takes a step of block descent; of errors at the start of the substep the share
+    /// `alpha` is left alone.
+    pub fn descend(&mut self, phase: Phase, alpha: f32) {
+        self.with_descent(phase, |descent, bodies, _| descent.descend(bodies, alpha));
+        self.count_sweep(2);
+    }
+
+    /// Constraint pass: multipliers take forces over, and penalties grow by `beta` (N/m²) times error.
+    pub fn raise_penalties(&mut self, phase: Phase, alpha: f32, beta: f32) {
+        self.with_descent(phase, |descent, bodies, _| descent.raise(bodies, alpha, beta));
+    }
+
+    /// Body pass: v ← v + (x − y)/h, y being the inertial place.
+    pub fn velocities_of_descent(&mut self) {
+        let h = self.input.h;
+        self.with_descent(Phase::Solve, |descent, bodies, _| descent.velocities(bodies, h));
+    }
+
+    fn with_descent(&mut self, phase: Phase, work: impl FnOnce(&mut Descent, &mut Bodies<'_>, &Graph)) {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let Workspace { rows, graph, kept, motion, .. } = &mut *self.work;
-        work(&mut Blocks {
-            rows,
-            graph,
-            kept,
-            contacts: self.contacts,
-            increments: motion.velocity_increments(),
-            rotation: self.input.features.rotation,
-            friction: self.input.features.friction,
-        });
-        // Each contact point is looked at from both of its bodies, and its numbers are kept.
-        let (points, size) = (2.0 * self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
-        self.clock.book_bytes([points * (2.0 * (32.0 + 32.0) + 2.0 * size), points * size]);
+        let Workspace { rows, graph, kept, descent, .. } = &mut *self.work;
+        let Features { rotation, friction, .. } = self.input.features;
+        work(descent, &mut Bodies { rows, kept, contacts: self.contacts, rotation, friction }, graph);
+        // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
+        let (contacts, size) = (self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
+        self.clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);
         self.book_rows([32.0, 16.0]);
         self.clock.lap(phase);
     }
