@@ -9,6 +9,7 @@ mod features;
 mod impulses;
 mod metrics;
 mod profile;
+mod recycling;
 mod rest;
 mod scenes;
 mod schema;

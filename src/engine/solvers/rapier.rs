@@ -76,7 +76,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {
-            passes.block_sweep(Phase::Relax, rigid);
+            passes.block_sweep_normal_first(Phase::Relax, rigid);
         }
         passes.end_substep(substep);
     }
