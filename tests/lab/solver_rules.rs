@@ -210,3 +210,29 @@ fn two_compliant_points_give_way_by_half() {
     let sunk = 0.5 - f64::from(world.bodies.position_y[1]);
     assert!((sunk - 5e-4).abs() < 5e-6, "{sunk}");
 }
+
+/// Penalties of AVBD grow by β |C| an iteration whatever the load is (`giles2025`): what carries 1000 times as much sinks
+/// until they have grown. Sequential impulses scale with the load and sink alike. Sums of overlaps under five boxes.
+#[test]
+fn avbd_gives_way_to_dense_bodies_and_sequential_impulses_do_not() {
+    let sunk = |solver: &str, density: u32| {
+        let boxes: Vec<String> = (0..5)
+            .map(|i| {
+                let y = 0.5 + f64::from(i);
+                let shape = format!(r#"{{"box":{{"half":[0.5,0.5]}},"density":{density}}}"#);
+                format!(r#"{{"type":"dynamic","position":[0,{y}],"shapes":[{shape}]}}"#)
+            })
+            .collect();
+        let text = format!(r#"{{"name":"dense","bodies":[{GROUND},{}]}}"#, boxes.join(","));
+        let mut world = build(&text, solver);
+        for _ in 0..600 {
+            world.step().unwrap();
+        }
+        4.5 - f64::from(world.bodies.position_y[5])
+    };
+    let found = ["avbd", "pgs"].map(|solver| [1, 30, 1000].map(|density| sunk(solver, density)));
+    println!("sunk (m) at densities 1, 30, 1000: avbd {:?}, pgs {:?}", found[0], found[1]);
+    let [avbd, pgs] = found;
+    assert!(avbd[0] < 1e-3 && avbd[2] > 0.05 && avbd[2] < 1.0, "{avbd:?}");
+    assert!((pgs[2] - pgs[0]).abs() < 1e-4, "{pgs:?}");
+}
