@@ -98,8 +98,7 @@ pub fn sum_of_products<const N: usize>(from: [&PointVector; N], f: impl Fn([Entr
     let count = from.first().map_or(0, |v| v.entries().len());
     let from = from.map(|v| &v.entries()[..count]);
     let mut sums = [0.0_f64; 16];
-    for i in 0..count {
-        let [x, y] = f(std::array::from_fn(|k| from[k][i]));
+    for [x, y] in (0..count).map(|i| f(std::array::from_fn(|k| from[k][i]))) {
         for (x, y) in x.iter().zip(&y) {
             let (x, y) = (x.as_array(), y.as_array());
             for k in 0..16 {
