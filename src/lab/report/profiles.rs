@@ -112,7 +112,7 @@ pub fn profile_table(records: &[Record]) -> String {
         + &finish(rows, 3)
 }
 
-/// Scenes beside each other in one table of slices.
+/// Most scenes beside each other in one table of slices.
 const SCENES_PER_TABLE: usize = 6;
 
 /// Equal time and equal error: a line per solver and a column per scene.
@@ -124,7 +124,8 @@ pub fn slice_tables(records: &[Record]) -> String {
         text += heading;
         for axis in ErrorAxis::ALL {
             let slices: Vec<Slice> = scenes.iter().filter_map(|scene| of(scene, axis)).collect();
-            for part in slices.chunks(SCENES_PER_TABLE) {
+            let tables = slices.len().div_ceil(SCENES_PER_TABLE).max(1);
+            for part in slices.chunks(slices.len().div_ceil(tables).max(1)) {
                 let mut header = vec![axis.name()];
                 header.extend(part.iter().map(|slice| slice.scene));
                 let mut rows = table(&header);
