@@ -98,7 +98,7 @@ impl BodyLanes {
         self.color(graph, inert);
         if !one_by_one {
             let (colors, degree) = (&self.colors, |b: u32| graph.edges_of(b as usize).len());
-            self.order.sort_by_key(|&b| (colors[b as usize], std::cmp::Reverse(degree(b))));
+            self.order.sort_unstable_by_key(|&b| (colors[b as usize], std::cmp::Reverse(degree(b)), b));
         }
         self.batches.clear();
         self.bodies.clear();

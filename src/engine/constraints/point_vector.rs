@@ -19,9 +19,20 @@ pub type Wide = f32x16;
 pub type Entry = [Wide; 2];
 
 /// Entries of all contact points; see the [module](self).
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct PointVector {
     blocks: Vec<Block>,
+}
+
+impl Clone for PointVector {
+    fn clone(&self) -> Self {
+        PointVector { blocks: self.blocks.clone() }
+    }
+
+    /// Into the memory that there is.
+    fn clone_from(&mut self, from: &Self) {
+        self.blocks.clone_from(&from.blocks);
+    }
 }
 
 /// Blocks that sixteen contacts share.
