@@ -4,13 +4,14 @@
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
 use simpulse::engine::constraints::kept::KeptSize;
+use simpulse::engine::constraints::point_vector::{dot, scaled, update};
 use simpulse::engine::constraints::sweep::{NormalRule, Sweep};
 use simpulse::engine::constraints::{Passes, System};
 use simpulse::engine::lanes::{LaneWidth, Lanes};
 use simpulse::engine::params::{Budget, Parameter};
 use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers::{Uses, Variant};
-use simpulse::engine::world::{Settings, World};
+use simpulse::engine::world::{Order, Settings, World};
 
 /// λ ← max(0, λ − m_eff (v_n + max(s, β s)/h)): closes gaps, and removes the share β of an overlap.
 #[derive(Clone, Copy)]
@@ -171,10 +172,44 @@ fn vectors_are_the_sweeps_problem() {
             assert!((a - b).abs() < 1e-5, "{a} for {b}");
         }
         system.apply(&impulses);
+        in_lanes(passes, &impulses, &after);
         passes.integrate_positions();
         passes.end_substep(0);
     }
-    let mut world = stack(2, LaneWidth::W8);
-    world.settings = Settings { ..Settings::new(&PROBE) };
-    world.step().unwrap();
+    /// The same vectors in lanes: products agree with those in contact order to rounding.
+    fn in_lanes(passes: &mut Passes<'_>, impulses: &[[f32; 2]], velocities: &[[f32; 2]]) {
+        let [mut lambda, mut u] = [(); 2].map(|()| passes.vector());
+        let mut system = passes.system();
+        system.lane_impulses(&mut lambda);
+        system.lane_velocities(&mut u);
+        let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-5 * a.abs().max(1e-3), "{a} for {b}");
+        close(dot(&lambda, &lambda), System::dot(impulses, impulses));
+        close(dot(&lambda, &u), System::dot(impulses, velocities));
+        // Taken back and given again in lanes, and seen in contact order.
+        update([&mut lambda], [], |[l], []| [scaled(-1.0, l)]);
+        system.push_lanes(&mut lambda);
+        system.apply(impulses);
+        let mut restored = Vec::new();
+        system.relative_velocities(&mut restored);
+        for (a, b) in restored.iter().flatten().zip(velocities.iter().flatten()) {
+            assert!((a - b).abs() < 1e-5, "{a} for {b}");
+        }
+        // Impulses and velocities stay as the sweep left them, whatever was written in between.
+        system.set_lane_impulses(&mut lambda);
+        update([&mut lambda], [], |[l], []| [scaled(-1.0, l)]);
+        system.set_lane_impulses(&mut lambda);
+        let mut read = Vec::new();
+        system.impulses(&mut read);
+        assert_eq!(read, impulses);
+        passes.give_back([lambda, u]);
+    }
+    for (width, order) in LaneWidth::ALL
+        .map(|width| (width, Order::Colored))
+        .into_iter()
+        .chain([(LaneWidth::W1, Order::Natural)])
+    {
+        let mut world = stack(2, width);
+        world.settings = Settings { width, order, ..Settings::new(&PROBE) };
+        world.step().unwrap();
+    }
 }

@@ -9,6 +9,8 @@ mod features;
 mod impulses;
 mod metrics;
 mod profile;
+mod recycling;
+mod rest;
 mod scenes;
 mod schema;
 mod solver2d;

@@ -161,3 +161,78 @@ fn a_rolling_disc_rolls_as_deep_as_it_rests() {
     let truth = (-60.0_f64).rem_euclid(std::f64::consts::TAU);
     assert!((angle.rem_euclid(std::f64::consts::TAU) - truth).abs() < 1e-2, "{angle} for {truth}");
 }
+
+/// A body on a contact of compliance α sinks by α times its weight (`macklin2016`), whatever the number of
+/// iterations and substeps. A disc, since it has one contact point.
+#[test]
+fn a_compliant_contact_gives_way_by_the_load_whatever_the_iterations() {
+    let text = format!(
+        r#"{{"name":"compliant","bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.5],"shapes":[{{"circle":{{"radius":0.5}}}}]}}]}}"#
+    );
+    let weight = 10.0 * std::f64::consts::PI * 0.25;
+    for compliance in [1e-5, 1e-4, 5e-4] {
+        for substeps in [2, 4, 8] {
+            for iterations in [1, 5, 20, 100] {
+                let mut world = build(&text, "xpbd");
+                (world.settings.budget.substeps, world.settings.budget.position_iterations) =
+                    (substeps, iterations);
+                let solver = world.settings.solver;
+                solver.set(&mut world.settings.parameters, "compliance", compliance).unwrap();
+                for _ in 0..300 {
+                    world.step().unwrap();
+                }
+                let sunk = 0.5 - f64::from(world.bodies.position_y[1]);
+                let wanted = f64::from(compliance) * weight;
+                // Two ulp of the position, and roundings of Δλ.
+                let error = (sunk - wanted).abs();
+                let case = format!("{compliance} m/N, {substeps} × {iterations}");
+                assert!(error < 1.2e-7 + 1e-4 * wanted, "{case}: {sunk} for {wanted}");
+            }
+        }
+    }
+}
+
+/// Two points bear half the weight each: a box sinks by α m g/2.
+#[test]
+fn two_compliant_points_give_way_by_half() {
+    let text = format!(
+        r#"{{"name":"compliant","bodies":[{GROUND},
+        {{"type":"dynamic","position":[0,0.5],"shapes":[{{"box":{{"half":[0.5,0.5]}}}}]}}]}}"#
+    );
+    let mut world = build(&text, "xpbd");
+    world.settings.budget.position_iterations = 20;
+    let solver = world.settings.solver;
+    solver.set(&mut world.settings.parameters, "compliance", 1e-4).unwrap();
+    for _ in 0..600 {
+        world.step().unwrap();
+    }
+    let sunk = 0.5 - f64::from(world.bodies.position_y[1]);
+    assert!((sunk - 5e-4).abs() < 5e-6, "{sunk}");
+}
+
+/// Penalties of AVBD grow by β |C| an iteration whatever the load is (`giles2025`): what carries 1000 times as much sinks
+/// until they have grown. Sequential impulses scale with the load and sink alike. Sums of overlaps under five boxes.
+#[test]
+fn avbd_gives_way_to_dense_bodies_and_sequential_impulses_do_not() {
+    let sunk = |solver: &str, density: u32| {
+        let boxes: Vec<String> = (0..5)
+            .map(|i| {
+                let y = 0.5 + f64::from(i);
+                let shape = format!(r#"{{"box":{{"half":[0.5,0.5]}},"density":{density}}}"#);
+                format!(r#"{{"type":"dynamic","position":[0,{y}],"shapes":[{shape}]}}"#)
+            })
+            .collect();
+        let text = format!(r#"{{"name":"dense","bodies":[{GROUND},{}]}}"#, boxes.join(","));
+        let mut world = build(&text, solver);
+        for _ in 0..600 {
+            world.step().unwrap();
+        }
+        4.5 - f64::from(world.bodies.position_y[5])
+    };
+    let found = ["avbd", "pgs"].map(|solver| [1, 30, 1000].map(|density| sunk(solver, density)));
+    println!("sunk (m) at densities 1, 30, 1000: avbd {:?}, pgs {:?}", found[0], found[1]);
+    let [avbd, pgs] = found;
+    assert!(avbd[0] < 1e-3 && avbd[2] > 0.05 && avbd[2] < 1.0, "{avbd:?}");
+    assert!((pgs[2] - pgs[0]).abs() < 1e-4, "{pgs:?}");
+}

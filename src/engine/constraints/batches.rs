@@ -35,6 +35,8 @@ pub struct Batches {
     buffer: Vec<Block>,
     /// Lane vectors in use of the buffer.
     vectors: usize,
+    /// Places in vectors over contact points.
+    slots: usize,
 }
 
 /// The records of a segment, and by what they gather.
@@ -146,7 +148,7 @@ impl Batches {
         self.contact.clear();
         self.row_a.clear();
         self.row_b.clear();
-        self.vectors = 0;
+        (self.vectors, self.slots) = (0, 0);
     }
 
     /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
@@ -201,8 +203,21 @@ impl Batches {
         self.row_a.fill_to(end, inert);
         self.row_b.fill_to(end, inert);
         let first_vector = self.vectors;
-        let segment =
-            Segment { opposite, first_lane, contacts, batches, first_vector, stride, stage, level, disjoint };
+        // At every width the same place: what is disjoint may be of any width, what is not is of one lane.
+        let first_slot = if disjoint { self.slots.next_multiple_of(16) } else { self.slots };
+        self.slots = first_slot + contacts;
+        let segment = Segment {
+            opposite,
+            first_lane,
+            contacts,
+            batches,
+            first_slot,
+            first_vector,
+            stride,
+            stage,
+            level,
+            disjoint,
+        };
         self.segments.push(segment);
         self.visits.push(segment);
         (self.focus, self.order) = (0..self.visits.len(), SweepOrder::Forward);
@@ -274,6 +289,11 @@ impl Batches {
             row_a: self.row_a.list().part(lanes.clone()),
             row_b: self.row_b.list().part(lanes),
         }
+    }
+
+    /// Groups of sixteen places in vectors over contact points.
+    pub(super) fn groups(&self) -> usize {
+        self.slots.div_ceil(16)
     }
 
     /// Bytes of records and indices, padding included.

@@ -5,7 +5,7 @@
 //! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
 
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::held;
+use crate::engine::lanes::{LaneVec, held};
 
 /// How many numbers a solver keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,11 +23,11 @@ pub struct Kept {
     /// Shape pair and feature ids of each contact that the numbers belong to.
     names: Vec<(u64, [u32; 2])>,
     /// `[contacts × 2 × per_point]`
-    points: Vec<f32>,
+    points: LaneVec,
     /// `[bodies × per_body]`
     bodies: Vec<f32>,
     last_names: Vec<(u64, [u32; 2])>,
-    last_points: Vec<f32>,
+    last_points: LaneVec,
 }
 
 /// The feature id of a point that is not in use: no contact has it.
@@ -66,7 +66,7 @@ impl Kept {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         let names = held(&self.names) + held(&self.last_names);
-        names + held(&self.points) + held(&self.last_points) + held(&self.bodies)
+        names + self.points.bytes() + self.last_points.bytes() + held(&self.bodies)
     }
 
     /// Takes the numbers on to the contacts of the coming step, which are sorted by shape pair.
@@ -81,8 +81,8 @@ impl Kept {
         std::mem::swap(&mut self.names, &mut self.last_names);
         std::mem::swap(&mut self.points, &mut self.last_points);
         self.names.clear();
-        self.points.clear();
-        self.points.resize(contacts.len() * 2 * size.per_point, 0.0);
+        self.points.resize(0);
+        self.points.resize(contacts.len() * 2 * size.per_point);
         let mut last = self.last_names.iter().enumerate().peekable();
         for (i, contact) in contacts.iter().enumerate() {
             let m = &contact.manifold;

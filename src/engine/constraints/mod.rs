@@ -4,13 +4,14 @@
 //! [`assign`] (which contact is in which lane), [`sweep`] (the kernel) and [`rules`] (what it
 //! solves), [`prepare`], [`impact`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
 //! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
-//! sweep; [`system`] shows the problem as vectors, [`graph`] as nodes and edges, and [`kept`]
+//! sweep; [`system`] shows the problem as vectors, in lanes as [`point_vector`], [`graph`] as nodes and edges, and [`kept`]
 //! keeps a solver's own numbers. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
 //! added, and [`types`] how constraints of other types join.
 
 pub mod assign;
 pub mod batches;
 pub mod block;
+mod body_lanes;
 pub mod bounces;
 pub mod cone;
 pub mod dense;
@@ -26,6 +27,8 @@ pub mod observe;
 pub mod order;
 pub mod pass;
 pub mod passes;
+mod point_passes;
+pub mod point_vector;
 pub mod position;
 mod positional;
 mod preload;
@@ -43,6 +46,7 @@ pub use features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
 pub use order::SweepOrder;
 pub use pass::{AnyPass, Pass, PassInput, PerLane};
 pub use passes::{Passes, StepInput, WorkCount, Workspace};
+pub use point_vector::PointVector;
 pub use position::PositionSweep;
 pub use rules::{NormalRule, Rule};
 pub use system::System;

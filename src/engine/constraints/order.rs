@@ -91,6 +91,7 @@ mod tests {
             first_lane,
             contacts,
             batches,
+            first_slot: 0,
             first_vector: stride * first_lane,
             stride,
             stage,

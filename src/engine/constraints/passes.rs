@@ -3,7 +3,7 @@
 use super::batches::Batches;
 use super::block::BlockSweep;
 use super::bounces::Bounces;
-use super::descent::Blocks;
+use super::descent::{Bodies, Descent};
 use super::features::{Features, Layout};
 use super::graph::Graph;
 use super::impact;
@@ -14,6 +14,7 @@ use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
+use super::point_vector::PointVector;
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
 use super::preload::{Preload, longest_column};
@@ -56,8 +57,10 @@ pub struct Workspace {
     pub types: Vec<Joined>,
     /// Called after each iteration of a solver.
     pub watch: Option<Watch>,
+    /// What block descent works with.
+    pub descent: Descent,
     /// Vectors that solvers have given back.
-    pub vectors: Vec<Vec<Pair>>,
+    pub vectors: Vec<PointVector>,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
     pub masses: Vec<[f32; 2]>,
     /// Keep the rule of the last velocity sweep in `last_rule`.
@@ -81,8 +84,12 @@ impl fmt::Debug for Watch {
 impl Workspace {
     /// Bytes held by what only some solvers have.
     pub fn own_bytes(&self) -> usize {
-        let vectors: usize = self.vectors.iter().map(held).sum();
-        self.kept.held_bytes() + self.graph.held_bytes() + vectors + held(&self.masses)
+        let vectors: usize = self.vectors.iter().map(PointVector::held_bytes).sum();
+        self.kept.held_bytes()
+            + self.graph.held_bytes()
+            + self.descent.held_bytes()
+            + vectors
+            + held(&self.masses)
     }
 }
 
@@ -294,10 +301,10 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let (mut impulses, zero) = (self.vector(), self.vector());
+        let (mut impulses, mut zero) = (self.vector(), self.vector());
         let mut system = self.system();
-        system.impulses(&mut impulses);
-        system.set_impulses(&zero);
+        system.lane_impulses(&mut impulses);
+        system.set_lane_impulses(&mut zero);
         let Workspace { rows, sums, .. } = &mut *self.work;
         sums.clone_from(rows);
         rows.iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
@@ -307,7 +314,7 @@ impl<'a> Passes<'a> {
         for (row, before) in rows.iter_mut().zip(sums.iter()) {
             row.velocity = before.velocity;
         }
-        self.system().set_impulses(&impulses);
+        self.system().set_lane_impulses(&mut impulses);
         self.give_back([impulses, zero]);
         let row = size_of::<BodyRow>() as f64;
         self.book_rows([2.0 * row, 2.0 * row]);
@@ -323,9 +330,10 @@ impl<'a> Passes<'a> {
     }
 
     /// Constraint pass: displaces bodies that overlap or slip, see `positional.rs`; `first` in each
-    /// substep, and overlap removed at `push_speed` (m/s) at most.
-    pub fn displacing_sweep(&mut self, push_speed: f32, first: bool) {
-        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, first }) {
+    /// substep, overlap removed at `push_speed` (m/s) at most, and contacts that give way by `compliance`
+    /// (m/N).
+    pub fn displacing_sweep(&mut self, push_speed: f32, compliance: f32, first: bool) {
+        if self.run(Phase::Position, &Displace { h: self.input.h, push_speed, compliance, first }) {
             self.count_sweep(if self.input.features.friction { 2 } else { 1 });
         }
     }
@@ -376,24 +384,49 @@ impl<'a> Passes<'a> {
         self.run(Phase::Prepare, &Preload { springs, share, rate });
     }
 
-    /// Bodies with their contact points, for work booked on `phase`; [`Self::build_graph`] comes first.
-    pub fn with_blocks(&mut self, phase: Phase, work: impl FnOnce(&mut Blocks<'_>)) {
+    /// Begins a substep of block descent, see [`super::descent`]: bodies get their lanes and go to their inertial
+    /// place; of multipliers and of penalties remains a share.
+    pub fn begin_descent(&mut self, keep: f32, keep_penalty: f32) {
+        let (h, motion) = (self.input.h, self.motion_after_velocities());
+        if self.input.phases.runs(Phase::Solve) {
+            self.build_graph();
+        }
+        let width = self.width;
+        let one_by_one = self.work.lanes.segments().is_empty();
+        self.with_descent(Phase::Solve, |descent, bodies, graph| {
+            descent.assign(bodies, graph, width, one_by_one);
+            descent.begin(bodies, h, motion, [keep, keep_penalty]);
+        });
+    }
+
+    /// Body pass: every body takes a step of block descent; of errors at the start of the substep the share
+    /// `alpha` is left alone.
+    pub fn descend(&mut self, phase: Phase, alpha: f32) {
+        self.with_descent(phase, |descent, bodies, _| descent.descend(bodies, alpha));
+        self.count_sweep(2);
+    }
+
+    /// Constraint pass: multipliers take forces over, and penalties grow by `beta` (N/m²) times error.
+    pub fn raise_penalties(&mut self, phase: Phase, alpha: f32, beta: f32) {
+        self.with_descent(phase, |descent, bodies, _| descent.raise(bodies, alpha, beta));
+    }
+
+    /// Body pass: v ← v + (x − y)/h, y being the inertial place.
+    pub fn velocities_of_descent(&mut self) {
+        let h = self.input.h;
+        self.with_descent(Phase::Solve, |descent, bodies, _| descent.velocities(bodies, h));
+    }
+
+    fn with_descent(&mut self, phase: Phase, work: impl FnOnce(&mut Descent, &mut Bodies<'_>, &Graph)) {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let Workspace { rows, graph, kept, motion, .. } = &mut *self.work;
-        work(&mut Blocks {
-            rows,
-            graph,
-            kept,
-            contacts: self.contacts,
-            increments: bytemuck::cast_slice(motion.velocity_increments()),
-            rotation: self.input.features.rotation,
-            friction: self.input.features.friction,
-        });
-        // Each contact point is looked at from both of its bodies, and its numbers are kept.
-        let (points, size) = (2.0 * self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
-        self.clock.book_bytes([points * (2.0 * (32.0 + 32.0) + 2.0 * size), points * size]);
+        let Workspace { rows, graph, kept, descent, .. } = &mut *self.work;
+        let Features { rotation, friction, .. } = self.input.features;
+        work(descent, &mut Bodies { rows, kept, contacts: self.contacts, rotation, friction }, graph);
+        // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
+        let (contacts, size) = (self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
+        self.clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);
         self.book_rows([32.0, 16.0]);
         self.clock.lap(phase);
     }
@@ -404,16 +437,22 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let mut impulses = self.vector();
-        for (contact, c) in self.contacts.iter().enumerate() {
-            for p in 0..c.manifold.count as usize {
-                let [normal, tangent] = of(self.work.kept.point(contact, p));
-                let bound = c.friction * normal;
-                impulses[2 * contact + p] = [normal, tangent.min(bound).max(-bound)];
-            }
+        let Workspace { lanes, serial, kept, .. } = &mut *self.work;
+        for batches in [lanes, serial] {
+            let width = batches.width();
+            batches.for_each_lane(&self.input.features, |contact, layout, record, lane| {
+                let c = &self.contacts[contact as usize];
+                for p in 0..c.manifold.count as usize {
+                    let [normal, tangent] = of(kept.point(contact as usize, p));
+                    let bound = c.friction * normal;
+                    record[layout.at(p, layout.normal_impulse) * width + lane] = normal;
+                    if layout.has_friction {
+                        let at = layout.at(p, layout.tangent_impulse) * width + lane;
+                        record[at] = tangent.min(bound).max(-bound);
+                    }
+                }
+            });
         }
-        self.system().set_impulses(&impulses);
-        self.give_back([impulses]);
         self.clock.lap(phase);
     }
 
@@ -503,15 +542,14 @@ impl<'a> Passes<'a> {
 
     /// A vector over contact points, all zero. Given back by [`Self::give_back`], it is not allocated
     /// again in the next step.
-    pub fn vector(&mut self) -> Vec<Pair> {
+    pub fn vector(&mut self) -> PointVector {
         let mut vector = self.work.vectors.pop().unwrap_or_default();
-        vector.clear();
-        vector.resize(2 * self.contacts.len(), [0.0; 2]);
+        vector.reset([&self.work.lanes, &self.work.serial]);
         vector
     }
 
     /// Takes vectors back.
-    pub fn give_back<const N: usize>(&mut self, vectors: [Vec<Pair>; N]) {
+    pub fn give_back<const N: usize>(&mut self, vectors: [PointVector; N]) {
         // The last one out is the first one in, so that each finds its own length again.
         self.work.vectors.extend(vectors.into_iter().rev());
     }
@@ -535,7 +573,7 @@ impl<'a> Passes<'a> {
     /// All impulses and velocities as vectors, in an order that no width changes.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, .. } = &mut *self.work;
-        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock)
+        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock, self.width)
     }
 
     /// Finds out which contacts each body has.

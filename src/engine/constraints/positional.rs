@@ -4,7 +4,8 @@
 //! # Displacing
 //!
 //! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse
-//! Δλ = −C/k (kg·m) along n, C = max(s, −v_max h), on arms that have turned; then, if what it needs is
+//! Δλ = −(C + α̃ λ)/(k + α̃) (kg·m) along n, C = max(s, −v_max h), on arms that have turned, α̃ = α/h²
+//! being what the compliance α (m/N) is in these units (`macklin2016`, equation 18); then, if what it needs is
 //! within the cone of its λ, the one along t that takes back its slide d since the step began,
 //!
 //! ```text
@@ -39,6 +40,8 @@ pub(super) struct Displace {
     pub h: f32,
     /// v_max (m/s)
     pub push_speed: f32,
+    /// α (m/N)
+    pub compliance: f32,
     /// The first sweep of a substep: λ starts at zero.
     pub first: bool,
 }
@@ -101,11 +104,13 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
     store: &mut Displaced<'_>,
     batches: &mut Batches,
     segment: &Segment,
-    Displace { h, push_speed, first }: Displace,
+    Displace { h, push_speed, compliance, first }: Displace,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let inv_h = L::splat(1.0 / h);
     let deepest = L::splat(-push_speed * h);
+    // α̃ (1/kg), and α̃ h, as records hold λ/h.
+    let (compliance, of_impulse) = (L::splat(compliance / (h * h)), L::splat(compliance / h));
     let zero = L::zero();
     for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
@@ -140,10 +145,12 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             // A point that is not there has no mass.
             let is_there = record[layout.at(p, layout.normal_mass)];
             let overlap = is_there.select_positive(-separation.max(deepest).min(zero), zero);
-            let push = is_there.select_positive(overlap / answer(arm_n), zero);
             let at = layout.at(p, layout.normal_impulse);
             let old = if first { zero } else { record[at] };
-            let normal = inv_h.mul_add(push, old);
+            let wanted = of_impulse.neg_mul_add(old, overlap);
+            let push = is_there.select_positive(wanted / (answer(arm_n) + compliance), zero);
+            // With compliance a push can be taken back, which leaves a rounding of it at most.
+            let normal = inv_h.mul_add(push, old).max(zero);
             record[at] = normal;
             sum[0] = sum[0] + push;
             moved = mass_sum.mul_add(push, moved);

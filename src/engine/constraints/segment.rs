@@ -15,6 +15,8 @@ pub struct Segment {
     pub contacts: usize,
     /// Batches of `width` lanes.
     pub batches: usize,
+    /// Place of its first contact in vectors over contact points ([`super::point_vector`]).
+    pub first_slot: usize,
     /// Where the first record starts in the buffer, in lane vectors.
     pub first_vector: usize,
     /// Lane vectors of a record ([`super::features::Layout::stride`]).

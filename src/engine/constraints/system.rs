@@ -1,16 +1,31 @@
 //! The step's problem as vectors: λ of all contact points, v of all bodies, and J between them.
 //!
 //! For methods that need more than one row at a time: conjugate gradients, projected gradients,
-//! acceleration, stopping by a residual. Vectors are in contact order with two points a contact,
-//! absent points zero, whatever lanes the contacts have, and sums run in that order in `f64`. So
-//! the result has the same bits at every width. One entry of a λ or of a relative velocity is
-//! `[normal, tangential]`, along n and t = (n_y, −n_x) on body b.
+//! acceleration, stopping by a residual. Vectors are of two kinds. A [`PointVector`] has the order of the
+//! lanes, and all that is done with it is done in lanes. A list of [`Pair`]s is in contact order with two
+//! points a contact, absent points zero, for who looks at single contacts. Sums over either have
+//! the same bits at every width. One entry of a λ or of a relative velocity is `[normal, tangential]`,
+//! along n and t = (n_y, −n_x) on body b.
 
 use super::batches::Batches;
-use super::features::Features;
+use super::features::{Features, Layout};
+use super::point_passes::{self, On};
+use super::point_vector::PointVector;
 use crate::engine::clock::Clock;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::BodyRow;
+use crate::engine::lanes::{BodyRow, LaneWidth};
+
+/// Runs a pass at the lanes of `$width`.
+macro_rules! at_width {
+    ($width:expr, $pass:ident($($arg:expr),*)) => {
+        match $width {
+            LaneWidth::W1 => point_passes::$pass::<f32>($($arg),*),
+            LaneWidth::W4 => point_passes::$pass::<wide::f32x4>($($arg),*),
+            LaneWidth::W8 => point_passes::$pass::<wide::f32x8>($($arg),*),
+            LaneWidth::W16 => point_passes::$pass::<wide::f32x16>($($arg),*),
+        }
+    };
+}
 
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];
@@ -22,6 +37,7 @@ pub struct System<'a> {
     contacts: &'a [Contact],
     features: &'a Features,
     clock: &'a mut Clock,
+    width: LaneWidth,
 }
 
 impl<'a> System<'a> {
@@ -31,8 +47,62 @@ impl<'a> System<'a> {
         contacts: &'a [Contact],
         features: &'a Features,
         clock: &'a mut Clock,
+        width: LaneWidth,
     ) -> Self {
-        System { rows, batches, contacts, features, clock }
+        System { rows, batches, contacts, features, clock, width }
+    }
+
+    /// Reads all accumulated impulses (N·s), in lanes.
+    pub fn lane_impulses(&mut self, to: &mut PointVector) {
+        let of = |layout: &Layout| [layout.normal_impulse, layout.tangent_impulse];
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, read(on, of)));
+    }
+
+    /// Replaces all accumulated impulses (N·s), in lanes; velocities stay as they are.
+    pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(from, |width, on| at_width!(width, write_impulses(on)));
+    }
+
+    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes; of the
+    /// normal row alone in a scene without friction.
+    pub fn lane_masses(&mut self, to: &mut PointVector) {
+        let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, read(on, of)));
+    }
+
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes.
+    pub fn lane_surfaces(&mut self, to: &mut PointVector) {
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, read_surfaces(on)));
+    }
+
+    /// J v: how fast the surfaces part and slide at each point (m/s), in lanes.
+    pub fn lane_velocities(&mut self, to: &mut PointVector) {
+        self.book_points([GEOMETRY, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, read_velocities(on)));
+    }
+
+    /// v ← v + M⁻¹ Jᵀ Δλ, in lanes, in the order of the lanes. Accumulated impulses stay as they are.
+    pub fn push_lanes(&mut self, delta: &mut PointVector) {
+        self.book_points([8.0 + GEOMETRY, 32.0]);
+        self.over_lanes(delta, |width, on| at_width!(width, push(on)));
+    }
+
+    /// Coloured batches at their width, then serial ones at one lane.
+    ///
+    /// # Panics
+    /// If the vector is of other contacts.
+    fn over_lanes(&mut self, vector: &mut PointVector, pass: impl Fn(LaneWidth, On<'_>)) {
+        let [lanes, serial] = &mut self.batches;
+        let parts = vector.parts([lanes, serial]);
+        for (batches, (width, vector)) in
+            [lanes, serial].into_iter().zip([self.width, LaneWidth::W1].into_iter().zip(parts))
+        {
+            pass(width, On { rows: self.rows, batches, features: self.features, vector });
+        }
     }
 
     /// Entries of every vector over contact points: two a contact.

@@ -6,8 +6,7 @@
 //! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
 //! last sweep is not extrapolated, so that impulses end within their bounds.
 //!
-//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors in natural
-//! order, not in lanes.
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes.
 //!
 //! **Fails when** iterations are few, or contacts open and close: the combination is right for a
 //! linear sweep, and a clamp is a corner in it.
@@ -27,8 +26,9 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::point_vector::{difference, dot, plus_scaled, update};
 use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, System, dense};
+use crate::engine::constraints::{Passes, dense};
 use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -81,7 +81,7 @@ fn step(passes: &mut Passes<'_>) {
         let [mut begin, mut swept, mut change, mut last_swept] = [(); 4].map(|_| passes.vector());
         let mut changes: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
         let mut images: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
-        passes.with_system(Phase::Solve, |system| system.impulses(&mut begin));
+        passes.with_system(Phase::Solve, |system| system.lane_impulses(&mut begin));
         // Sweeps seen since the last start, and |f|² of the last one.
         let (mut seen, mut last) = (0_usize, f64::INFINITY);
         for k in 0..budget.velocity_iterations {
@@ -91,24 +91,23 @@ fn step(passes: &mut Passes<'_>) {
                 break;
             }
             passes.with_system(Phase::Solve, |system| {
-                system.impulses(&mut swept);
+                system.lane_impulses(&mut swept);
                 let at = seen % depth;
                 // Differences: of f against the last one, which `change` still is, and of g.
-                for (i, g) in swept.iter().enumerate() {
-                    for axis in 0..2 {
-                        let f = g[axis] - begin[i][axis];
-                        changes[at][i][axis] = f - change[i][axis];
-                        images[at][i][axis] = g[axis] - last_swept[i][axis];
-                        change[i][axis] = f;
-                    }
-                }
-                last_swept.clone_from(&swept);
-                let square = System::dot(&change, &change);
+                update(
+                    [&mut changes[at], &mut images[at], &mut change, &mut last_swept, &mut begin],
+                    [&swept],
+                    |[.., last_f, last_g, begin], [g]| {
+                        let f = difference(g, begin);
+                        // The next sweep begins here, unless it is extrapolated.
+                        [difference(f, last_f), difference(g, last_g), f, g, g]
+                    },
+                );
+                let square = dot(&change, &change);
                 let is_first = seen == 0 || square > GROWTH * last;
                 (seen, last) = (if is_first { 1 } else { seen + 1 }, square);
                 // The first sweep has nothing to be a difference of: its place is taken again.
                 let columns = (seen - 1).min(depth);
-                begin.clone_from(&swept);
                 if is_first {
                     seen = 1;
                     return;
@@ -117,9 +116,10 @@ fn step(passes: &mut Passes<'_>) {
                 let mut gram = [0.0; DEPTH * DEPTH];
                 let mut right = [0.0; DEPTH];
                 for i in 0..columns {
-                    right[i] = System::dot(&changes[place(i)], &change);
-                    for j in 0..columns {
-                        gram[i * columns + j] = System::dot(&changes[place(i)], &changes[place(j)]);
+                    right[i] = dot(&changes[place(i)], &change);
+                    for j in 0..=i {
+                        let product = dot(&changes[place(i)], &changes[place(j)]);
+                        (gram[i * columns + j], gram[j * columns + i]) = (product, product);
                     }
                 }
                 let trace: f64 = (0..columns).map(|i| gram[i * columns + i]).sum();
@@ -129,13 +129,11 @@ fn step(passes: &mut Passes<'_>) {
                 }
                 for (j, gamma) in right[..columns].iter().enumerate() {
                     let gamma = *gamma as f32;
-                    for (b, d) in begin.iter_mut().zip(&images[place(j)]) {
-                        *b = [b[0] - gamma * d[0], b[1] - gamma * d[1]];
-                    }
+                    update([&mut begin], [&images[place(j)]], |[b], [d]| [plus_scaled(b, -gamma, d)]);
                 }
-                system.set_impulses(&begin);
-                swept.iter_mut().zip(&begin).for_each(|(s, b)| *s = [b[0] - s[0], b[1] - s[1]]);
-                system.apply(&swept);
+                system.set_lane_impulses(&mut begin);
+                update([&mut swept], [&begin], |[swept], [begin]| [difference(begin, swept)]);
+                system.push_lanes(&mut swept);
             });
         }
         passes.give_back(images);

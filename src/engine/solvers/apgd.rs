@@ -7,7 +7,7 @@
 //! cone stays one. Gradients at extrapolated points are extrapolated, as the problem is linear.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over
-//! vectors, one more for each step that was too long. They go point by point, not in lanes.
+//! vectors in lanes, one more for each step that was too long.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of
 //! sliding. (A clamp of friction by the normal impulse has no such effect and no convex problem.) And
@@ -26,8 +26,11 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::point_vector::{
+    Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
+};
 use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, System, cone};
+use crate::engine::constraints::{Passes, PointVector, System, cone};
 use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -70,10 +73,11 @@ fn step(passes: &mut Passes<'_>) {
         let [mut bias, mut mass, mut now, mut next, mut y] = [(); 5].map(|_| passes.vector());
         let [mut g_now, mut g_next, mut g_y, mut step] = [(); 4].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| {
-            system.gaps_and_friction(&mut bias);
-            bias.iter_mut().for_each(|b| b[0] = rule.bias(b[0]));
-            system.effective_masses(&mut mass);
-            system.impulses(&mut now);
+            system.lane_surfaces(&mut bias);
+            update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+            system.lane_masses(&mut mass);
+            update([&mut mass], [], |[m], []| [[m[0], m[0]]]);
+            system.lane_impulses(&mut now);
             gradient(system, &bias, &mut g_now);
             y.clone_from(&now);
             g_y.clone_from(&g_now);
@@ -82,28 +86,31 @@ fn step(passes: &mut Passes<'_>) {
         for _ in 0..budget.velocity_iterations {
             passes.with_system(Phase::Solve, |system| {
                 for _ in 0..DOUBLINGS {
-                    for i in 0..y.len() {
-                        let scale = mass[i][0] / steepness as f32;
-                        let point = [0, 1].map(|axis| y[i][axis] - scale * g_y[i][axis]);
-                        next[i] = cone::project(point, bias[i][1]);
-                        step[i] = [0, 1].map(|axis| next[i][axis] - now[i][axis]);
-                    }
-                    system.apply(&step);
+                    let shorter = Wide::splat(1.0 / steepness as f32);
+                    update(
+                        [&mut next, &mut step],
+                        [&y, &g_y, &mass, &bias, &now],
+                        |_, [y, g, mass, bias, now]| {
+                            let point = [0, 1].map(|k| y[k] - shorter * mass[k] * g[k]);
+                            let next = cone::project(point, bias[1]);
+                            [next, difference(next, now)]
+                        },
+                    );
+                    system.push_lanes(&mut step);
                     gradient(system, &bias, &mut g_next);
-                    let (mut curve, mut length) = (0.0, 0.0);
-                    for i in 0..y.len() {
-                        for axis in 0..2 {
-                            let d = f64::from(next[i][axis]) - f64::from(y[i][axis]);
-                            curve += d * (f64::from(g_next[i][axis]) - f64::from(g_y[i][axis]));
-                            length += if mass[i][0] > 0.0 { d * d / f64::from(mass[i][0]) } else { 0.0 };
-                        }
-                    }
+                    let curve = sum_of_products([&next, &y, &g_next, &g_y], |[next, y, g_next, g_y]| {
+                        [difference(next, y), difference(g_next, g_y)]
+                    });
+                    let length = sum_of_products([&next, &y, &mass], |[next, y, mass]| {
+                        let d = difference(next, y);
+                        [d, quotient(d, mass)]
+                    });
                     if curve <= steepness * length * (1.0 + 1e-5) {
                         break;
                     }
                     // Velocities back to those of `now`.
-                    step.iter_mut().for_each(|s| *s = [-s[0], -s[1]]);
-                    system.apply(&step);
+                    update([&mut step], [], |[s], []| [scaled(-1.0, s)]);
+                    system.push_lanes(&mut step);
                     steepness *= 2.0;
                     next.clone_from(&now);
                     g_next.clone_from(&g_now);
@@ -112,22 +119,22 @@ fn step(passes: &mut Passes<'_>) {
                 let theta_next = 0.5 * ((square * square + 4.0 * square).sqrt() - square);
                 let mut beta = (theta * (1.0 - theta) / (square + theta_next)) as f32;
                 theta = theta_next;
-                step.iter_mut()
-                    .zip(next.iter().zip(&now))
-                    .for_each(|(s, (a, b))| *s = [a[0] - b[0], a[1] - b[1]]);
-                if System::dot(&g_y, &step) > 0.0 {
+                update([&mut step], [&next, &now], |_, [next, now]| [difference(next, now)]);
+                if dot(&g_y, &step) > 0.0 {
                     (beta, theta) = (0.0, 1.0);
                 }
-                for i in 0..y.len() {
-                    for axis in 0..2 {
-                        y[i][axis] = next[i][axis] + beta * (next[i][axis] - now[i][axis]);
-                        g_y[i][axis] = g_next[i][axis] + beta * (g_next[i][axis] - g_now[i][axis]);
-                    }
-                }
+                update(
+                    [&mut y, &mut g_y],
+                    [&next, &now, &g_next, &g_now],
+                    |_, [next, now, g_next, g_now]| {
+                        let ahead = |to, from| plus_scaled(to, beta, difference(to, from));
+                        [ahead(next, now), ahead(g_next, g_now)]
+                    },
+                );
                 std::mem::swap(&mut now, &mut next);
                 std::mem::swap(&mut g_now, &mut g_next);
                 steepness *= FORGET;
-                system.set_impulses(&now);
+                system.set_lane_impulses(&mut now);
             });
             passes.count_sweep(2);
             passes.iteration_done();
@@ -140,7 +147,7 @@ fn step(passes: &mut Passes<'_>) {
 }
 
 /// J v + b, b along n alone.
-fn gradient(system: &mut System<'_>, bias: &[[f32; 2]], to: &mut Vec<[f32; 2]>) {
-    system.relative_velocities(to);
-    to.iter_mut().zip(bias).for_each(|(g, b)| g[0] += b[0]);
+fn gradient(system: &mut System<'_>, bias: &PointVector, to: &mut PointVector) {
+    system.lane_velocities(to);
+    update([to], [bias], |[g], [b]| [[g[0] + b[0], g[1]]]);
 }

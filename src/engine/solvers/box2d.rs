@@ -3,8 +3,8 @@
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
 //! **Departures.** Bounces are this crate's ([`crate::engine::constraints::restitution`]), which
-//! keep energy; Box2D gives back e times the speed of approach. Manifolds are always found anew; Box2D
-//! keeps one whose bodies hardly moved. The order is that of this crate's colours.
+//! keep energy; Box2D gives back e times the speed of approach. Manifolds of bodies that hardly moved are kept as in
+//! Box2D, but a disc's never ([`crate::engine::world`]). The order is that of this crate's colours.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
 //! without friction and `relax_iterations` rigid ones with it.
@@ -18,8 +18,8 @@ use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::{Rigid, Soft};
 use crate::engine::params::{
-    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, MAX_PUSH_SPEED, Parameter,
-    Parameters,
+    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, MAX_PUSH_SPEED,
+    Parameter, Parameters,
 };
 use std::f32::consts::TAU;
 
@@ -46,6 +46,14 @@ pub static SOLVER: Variant = Variant {
             default: MAX_PUSH_SPEED,
             range: [0.0, 1e3],
             meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+        Parameter {
+            name: super::RECYCLE_DISTANCE,
+            unit: "m",
+            default: 10.0 * LINEAR_SLOP,
+            range: [0.0, 1.0],
+            meaning: "motion against each other within which two bodies keep their manifold; 0: none is kept",
             trials: &[],
         },
     ],

@@ -78,6 +78,9 @@ pub static VARIANTS: [&Variant; 27] = [
 /// The solver that is used where none is named.
 pub const DEFAULT: &str = "shim";
 
+/// Name of a parameter that the world reads, see [`Variant::recycle_distance`].
+pub const RECYCLE_DISTANCE: &str = "recycle_distance";
+
 /// Which fields of a [`Budget`] a solver's schedule has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -191,6 +194,12 @@ impl Variant {
         }
         values[place] = value;
         Ok(())
+    }
+
+    /// How far (m) two bodies may move against each other before the world looks for their manifold again: the
+    /// parameter `recycle_distance`, or 0 without one.
+    pub fn recycle_distance(&self, values: &Parameters) -> f32 {
+        self.parameters.iter().zip(values).find(|(p, _)| p.name == RECYCLE_DISTANCE).map_or(0.0, |(_, v)| *v)
     }
 
     /// Whether it promises `law`.

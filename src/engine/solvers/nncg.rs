@@ -7,7 +7,7 @@
 //! iteration does not go on beyond its sweeps, so that impulses end within their bounds.
 //!
 //! **Cost.** That of [`super::pgs`] with two sweeps an iteration; between iterations impulses are
-//! read, replaced and applied, 3 passes over vectors in natural order, not in lanes.
+//! read, replaced and applied, 3 passes over vectors, in lanes.
 //!
 //! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
 //! left is Gauss–Seidel.
@@ -23,8 +23,9 @@
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::point_vector::{difference, dot, scaled, sum, update};
 use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, SweepOrder, System};
+use crate::engine::constraints::{Passes, SweepOrder};
 use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -57,7 +58,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_velocities();
         passes.warm_start();
         let [mut last, mut swept, mut direction] = [(); 3].map(|_| passes.vector());
-        passes.with_system(Phase::Solve, |system| system.impulses(&mut last));
+        passes.with_system(Phase::Solve, |system| system.lane_impulses(&mut last));
         let mut previous = f64::INFINITY;
         for k in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rule);
@@ -69,22 +70,18 @@ fn step(passes: &mut Passes<'_>) {
                 break;
             }
             passes.with_system(Phase::Solve, |system| {
-                system.impulses(&mut swept);
+                system.lane_impulses(&mut swept);
                 // From here on `last` is r, then what is added to λ.
-                last.iter_mut().zip(&swept).for_each(|(l, s)| *l = [s[0] - l[0], s[1] - l[1]]);
-                let square = System::dot(&last, &last);
+                update([&mut last], [&swept], |[last], [swept]| [difference(swept, last)]);
+                let square = dot(&last, &last);
                 let beta = if square <= previous && square > 0.0 { (square / previous) as f32 } else { 0.0 };
                 previous = square;
-                for ((r, p), s) in last.iter_mut().zip(&mut direction).zip(&mut swept) {
-                    for axis in 0..2 {
-                        let step = beta * p[axis];
-                        p[axis] = r[axis] + step;
-                        s[axis] += step;
-                        r[axis] = step;
-                    }
-                }
-                system.set_impulses(&swept);
-                system.apply(&last);
+                update([&mut last, &mut direction, &mut swept], [], |[r, p, swept], []| {
+                    let step = scaled(beta, p);
+                    [step, sum(r, step), sum(swept, step)]
+                });
+                system.set_lane_impulses(&mut swept);
+                system.push_lanes(&mut last);
                 std::mem::swap(&mut last, &mut swept);
             });
         }

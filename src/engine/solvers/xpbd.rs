@@ -1,7 +1,7 @@
 //! Position-based dynamics: bodies move first, contacts displace them, and velocities are what
 //! the displacements made of them.
 //!
-//! **Source.** `muller2020`; `macklin2016` (compliance, here zero); `catto2024solver2d`, `solve_xpbd`.
+//! **Source.** `muller2020`; `macklin2016` (compliance, zero by default); `catto2024solver2d`, `solve_xpbd`.
 //!
 //! **Departures.** Velocities are corrected by (x − x_before contacts)/h, which is (x − x₀)/h in exact
 //! arithmetic, so that contacts without overlap change no bit. Friction holds places of the start of the
@@ -12,7 +12,8 @@
 //!
 //! **Fails when** stacks are tall or loads heavy: there is no warm start, so each substep begins
 //! cold, and what a sweep leaves over sinks in. Overlap deeper than the limit is pushed apart at
-//! the limit's speed, and that speed stays.
+//! the limit's speed, and that speed stays. With compliance a load sinks in by α times its weight only
+//! while that is less than the limit's speed times h.
 
 use super::{Law, Uses, Variant};
 use crate::engine::constraints::Passes;
@@ -27,14 +28,24 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 4, velocity_iterations: 0, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: false, relax: false, position: true },
     iterations: |k| Budget { substeps: 1, position_iterations: k, ..SOLVER.budget },
-    parameters: &[Parameter {
-        name: "push_speed",
-        unit: "m/s",
-        default: 4.0,
-        range: [0.0, 1e3],
-        meaning: "fastest speed at which overlap is pushed apart",
-        trials: &[],
-    }],
+    parameters: &[
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default: 4.0,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        },
+        Parameter {
+            name: "compliance",
+            unit: "m/N",
+            default: 0.0,
+            range: [0.0, 1.0],
+            meaning: "how far a contact point gives way to a force; 0 is rigid",
+            trials: &[],
+        },
+    ],
     softness: None,
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
@@ -49,13 +60,13 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let push_speed = passes.parameter(0);
+    let [push_speed, compliance] = [0, 1].map(|i| passes.parameter(i));
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.integrate_positions();
         passes.begin_displacing();
         for k in 0..budget.position_iterations {
-            passes.displacing_sweep(push_speed, k == 0);
+            passes.displacing_sweep(push_speed, compliance, k == 0);
             passes.iteration_done();
         }
         passes.velocities_from_displacements();

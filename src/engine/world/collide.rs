@@ -2,6 +2,7 @@
 
 use super::World;
 use super::candidates::Candidate;
+use super::recycle::{Pairs, Recycled};
 use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::lanes::held;
 use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
@@ -22,6 +23,8 @@ pub(super) struct Narrow {
     pub is_changed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
+    /// Manifolds that are kept.
+    pub recycled: Recycled,
     poses: Vec<PoseRow>,
     jobs: [Jobs; Kind::ALL.len()],
     /// New contacts, in the order in which they were met.
@@ -45,6 +48,7 @@ impl World {
             self.contacts.clear();
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
             (narrow.is_changed, narrow.jobs_are_current) = (true, false);
+            narrow.recycled = Recycled::default();
         }
         if self.settings.record_impulses {
             self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
@@ -60,6 +64,10 @@ impl World {
             ],
             rotation: [bodies.rotation_cos[i], bodies.rotation_sin[i], 0.0, 0.0],
         }));
+        let distance = self.settings.solver.recycle_distance(&self.settings.parameters);
+        let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
+        let pairs = Pairs { candidates, of_kind, poses };
+        let mut points = recycled.update(&pairs, &mut self.contacts, distance);
         narrow.list_jobs(self.contacts.len());
 
         let Narrow { candidates, jobs, fresh, is_changed, poses, shapes, .. } = narrow;
@@ -75,13 +83,14 @@ impl World {
             *is_changed = true;
         };
         let input = Input { poses, shapes, speculative: SPECULATIVE_DISTANCE };
-        let mut points = 0;
         for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);
         }
+        let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
+        recycled.take_up(&Pairs { candidates, of_kind, poses }, &mut self.contacts);
         narrow.count = self.contacts.len();
         self.counts.pairs = narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
@@ -95,7 +104,8 @@ impl Narrow {
     pub fn candidate_bytes(&self) -> usize {
         let lists: usize = self.of_kind.iter().map(held).sum();
         let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
-        lists + jobs + held(&self.candidates) + held(&self.last_candidates) + held(&self.poses)
+        let recycled = self.recycled.held_bytes();
+        lists + jobs + held(&self.candidates) + held(&self.last_candidates) + held(&self.poses) + recycled
     }
 
     /// Bytes held for contacts, besides the list itself.
@@ -117,6 +127,7 @@ impl Narrow {
         std::mem::swap(contacts, &mut self.last_contacts);
         self.sort_contacts(contacts);
         (self.is_changed, self.count) = (true, contacts.len());
+        self.recycled = Recycled::default();
     }
 
     /// Lists the candidates that are worth a look.
@@ -125,21 +136,23 @@ impl Narrow {
     /// before their shapes are read; where most do, the lists of the last step still hold.
     fn list_jobs(&mut self, contacts: usize) {
         let cull = 4 * contacts < 3 * self.candidates.len();
-        if self.jobs_are_current && !cull {
+        let recycles = self.recycled.is_used();
+        if self.jobs_are_current && !cull && !recycles {
             return;
         }
-        self.jobs_are_current = !cull;
+        self.jobs_are_current = !cull && !recycles;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                let is_near = !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
+                let is_kept = self.recycled.keeps(name);
+                let is_near = is_kept | !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
                 if !is_near & (candidate.contact != NO_CONTACT) {
                     self.is_changed = true;
                     candidate.contact = NO_CONTACT;
                 }
-                (is_near, candidate.bodies, candidate.numbers, candidate.contact)
+                (is_near & !is_kept, candidate.bodies, candidate.numbers, candidate.contact)
             });
         }
     }

@@ -18,6 +18,7 @@
 //!   be brought back by a reset, so that they remain those of a simulation.
 
 use super::World;
+use super::recycle::Recycled;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
@@ -47,6 +48,7 @@ struct Saved {
     fat_boxes: FatBoxes,
     counts: StepCounts,
     kept: Kept,
+    recycled: Recycled,
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -80,6 +82,7 @@ impl World {
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
             kept: self.work.kept.clone(),
+            recycled: self.narrow.recycled.clone(),
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -92,10 +95,11 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, contacts: &[Contact]) {
+    fn put_back(&mut self, Saved { contacts, recycled, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
+        self.narrow.recycled.clone_from(recycled);
     }
 
     /// `phase` alone; with `counted`, one lane counts its operations.
@@ -153,7 +157,7 @@ impl HeldWorld<'_> {
     pub fn step(&mut self, net: bool) -> Timings {
         self.restore_bodies();
         self.restore_types();
-        self.world.put_back(&self.before.contacts);
+        self.world.put_back(&self.before);
         let mut clock = if net { Clock::without_pauses() } else { Clock::start(true) };
         self.world.pairs_are_stale = true;
         self.world.solve(&mut clock);
@@ -195,7 +199,7 @@ impl HeldWorld<'_> {
         self.world.settings = settings;
         self.restore_bodies();
         self.restore_types();
-        self.world.put_back(&self.before.contacts);
+        self.world.put_back(&self.before);
         self.world.frozen_step();
         probes
     }
@@ -275,7 +279,7 @@ impl Drop for HeldWorld<'_> {
     fn drop(&mut self) {
         self.restore_bodies();
         self.restore_types();
-        self.world.put_back(&self.before.contacts);
+        self.world.put_back(&self.before);
         // Bounds may have followed bodies that repeats have moved.
         self.world.proxies.clone_from(&self.before.proxies);
         self.world.fat_boxes.clone_from(&self.before.fat_boxes);

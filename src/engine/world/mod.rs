@@ -28,6 +28,7 @@ mod held;
 mod lanes;
 mod memory;
 mod pairs;
+mod recycle;
 mod settings;
 mod traits;
 

@@ -8,6 +8,7 @@
 use super::setup;
 use crate::engine::clock::{Clock, PhaseFilter};
 use crate::engine::constraints::assign::{Assignment, Sides};
+use crate::engine::constraints::graph::Graph;
 use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
@@ -107,6 +108,9 @@ pub struct Replay<'a> {
     scratch: Vec<Contact>,
     input: StepInput,
     width: LaneWidth,
+    sequence: Sequence,
+    /// Whether contacts are grouped by their level, as the solver of the last run wants it.
+    by_levels: bool,
 }
 
 impl<'a> Replay<'a> {
@@ -141,8 +145,10 @@ impl<'a> Replay<'a> {
         let mut rows = Vec::new();
         work.motion.load(&bodies, &mut rows, &motion);
         setup::check_range(h, &rows, &contacts)?;
-        let mut replay = Replay { problem, work, rows, contacts, places, scratch: Vec::new(), input, width };
-        replay.assign_lanes(sequence);
+        let (scratch, by_levels) = (Vec::new(), false);
+        let mut replay =
+            Replay { problem, work, rows, contacts, places, scratch, input, width, sequence, by_levels };
+        replay.assign_lanes();
         Ok(replay)
     }
 
@@ -176,6 +182,10 @@ impl<'a> Replay<'a> {
     }
 
     fn reset(&mut self, variant: &Variant, start: Start) {
+        if self.by_levels != variant.by_levels {
+            self.by_levels = variant.by_levels;
+            self.assign_lanes();
+        }
         self.work.rows.clone_from(&self.rows);
         self.work.kept = Kept::default();
         self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
@@ -215,18 +225,24 @@ impl<'a> Replay<'a> {
     }
 
     /// Gives every contact its lane, as a world's step does.
-    fn assign_lanes(&mut self, sequence: Sequence) {
-        let problem = self.problem;
-        let sides =
-            Sides { bodies: problem.bodies.len(), opposite: |body| opposite(problem, body), levels: None };
+    fn assign_lanes(&mut self) {
+        let (problem, bodies) = (self.problem, self.problem.bodies.len());
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
+        let mut graph = Graph::default();
+        if self.by_levels {
+            let is_dynamic = |body| opposite(problem, body) == OppositeKind::Dynamic;
+            graph.build(bodies, contacts.iter().map(|c| [c.body_a, c.body_b]), is_dynamic);
+        }
+        let levels = self.by_levels.then_some(&graph);
+        let sides = Sides { bodies, opposite: |body| opposite(problem, body), levels };
         let mut assignment = Assignment::default();
-        if sequence == Sequence::Colored {
+        if self.sequence == Sequence::Colored {
             assignment.colored(work, [self.width; 2], features, contacts, &sides);
         } else {
-            let order = sequence.order(contacts.len()).into_iter();
+            let order = self.sequence.order(contacts.len()).into_iter();
             assignment.serial(work, features, contacts, order, &sides);
         }
+        work.graph = graph;
     }
 }
 

@@ -112,49 +112,63 @@ pub fn profile_table(records: &[Record]) -> String {
         + &finish(rows, 3)
 }
 
-/// Equal time and equal error, a line per scene and error.
+/// Most scenes beside each other in one table of slices.
+const SCENES_PER_TABLE: usize = 6;
+
+/// Equal time and equal error: a line per solver and a column per scene.
 pub fn slice_tables(records: &[Record]) -> String {
     let solvers = solvers_of(records);
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
     let mut text = String::new();
     let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice<'_>>, equal_time: bool| {
-        let mut header = vec!["error", "scene", "at"];
-        header.extend(&solvers);
-        header.push(if equal_time { "least error" } else { "least time" });
-        let mut rows = table(&header);
+        text += heading;
         for axis in ErrorAxis::ALL {
             let slices: Vec<Slice> = scenes.iter().filter_map(|scene| of(scene, axis)).collect();
-            for slice in &slices {
-                rows.add_row(slice_row(slice, axis.name(), equal_time));
+            let tables = slices.len().div_ceil(SCENES_PER_TABLE).max(1);
+            for part in slices.chunks(slices.len().div_ceil(tables).max(1)) {
+                let mut header = vec![axis.name()];
+                header.extend(part.iter().map(|slice| slice.scene));
+                let mut rows = table(&header);
+                let columns: Vec<_> =
+                    part.iter().map(|slice| slice_column(slice, &solvers, equal_time)).collect();
+                for (i, first) in std::iter::once("at").chain(solvers.iter().copied()).enumerate() {
+                    let cells = columns.iter().map(|column| column[i].clone());
+                    rows.add_row(std::iter::once(first.to_string()).chain(cells).collect::<Vec<_>>());
+                }
+                text += &format!("\n{}", finish(rows, 1));
             }
         }
-        text += &format!("{heading}\n{}", finish(rows, 2));
     };
     add(
-        "Equal time: the least error of a setting that takes at most that long (— none does)",
+        "Equal time: the least error of a setting that takes at most that long (— none does; * the least)\n",
         equal_time,
         true,
     );
     add(
-        "\nEqual error: µs per step of the fastest setting whose error is at most that (— none; = tied)",
+        "\nEqual error: µs per step of the fastest setting whose error is at most that (— none; * the fastest \
+         and what ties with it)\n",
         equal_error,
         false,
     );
     text
 }
 
-fn slice_row(slice: &Slice, axis: &str, equal_time: bool) -> Vec<String> {
+/// What is given, and then the value of each solver.
+fn slice_column(slice: &Slice, solvers: &[&str], equal_time: bool) -> Vec<String> {
     let error = |value: f64| match si(value, slice.unit) {
         text if value <= ERROR_FLOOR => format!("≤ {text}"),
         text => text,
     };
     let time = |ns: f64| digits(1e-3 * ns);
+    let show = |s: &Sample| if equal_time { error(s.error) } else { time(s.time) };
+    let cell = |solver: &&str| {
+        let sample =
+            slice.values.iter().find(|(name, _)| name == solver).and_then(|(_, sample)| sample.as_ref());
+        let mark = if slice.best.contains(solver) { " *" } else { "" };
+        sample.map_or("—".to_string(), |sample| show(sample) + mark)
+    };
     let at = if equal_time { format!("{} µs", time(slice.at)) } else { error(slice.at) };
-    let mut cells = vec![axis.to_string(), slice.scene.to_string(), at];
-    let show = |s: Sample| if equal_time { error(s.error) } else { time(s.time) };
-    cells.extend(slice.values.iter().map(|(_, value)| value.map_or("—".to_string(), show)));
-    cells.push(slice.best.join(" = "));
-    cells
+    std::iter::once(at).chain(solvers.iter().map(cell)).collect()
 }
 
 #[cfg(test)]
@@ -170,9 +184,11 @@ mod tests {
     #[test]
     fn the_slices_say_who_is_tied() {
         let text = slice_tables(&two_solvers());
-        let line = |start: &str| text.lines().rfind(|l| l.starts_with(start)).unwrap();
         // To the same error of 10 mm: between 10 and 20 µs both, within 3 %.
-        assert!(line("greatest penetration").contains("pgs = soft_step"), "{text}");
+        let equal_error = &text[text.find("Equal error").unwrap()..];
+        let penetration = &equal_error[equal_error.find("greatest penetration").unwrap()..];
+        let line = |start: &str| penetration.lines().find(|l| l.starts_with(start)).unwrap();
+        assert!(line("pgs").ends_with(" *") && line("soft_step").ends_with(" *"), "{text}");
         assert!(text.contains("Equal time") && text.contains("—"), "{text}");
     }
 

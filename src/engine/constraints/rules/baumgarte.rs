@@ -37,8 +37,8 @@ impl Baumgarte {
     }
 
     /// b (m/s) at a separation (m).
-    pub fn bias(&self, separation: f32) -> f32 {
-        -self.line::<f32>(false, separation, 1.0, 0.0)[0]
+    pub fn bias<L: Lanes>(&self, separation: L) -> L {
+        -self.line(false, separation, L::splat(1.0), L::zero())[0]
     }
 
     /// As [`Self::rule`], with the factor `relaxation` on what each row asks for.
