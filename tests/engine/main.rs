@@ -5,6 +5,7 @@ mod kernel;
 mod motion;
 mod narrow_batches;
 mod narrowphase;
+mod rows;
 mod shapes;
 mod soundness;
 mod structure;
