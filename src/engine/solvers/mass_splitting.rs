@@ -91,7 +91,7 @@ fn step(passes: &mut Passes<'_>) {
 
 /// Sweeps on split bodies.
 fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
-    passes.scale_masses(phase, |body, graph| graph.edges_of(body).len().max(1) as f32);
+    passes.scale_masses(phase, |body, graph| graph.constraints_of(body).max(1) as f32);
     for _ in 0..times {
         passes.jacobi_sweep(phase, rule, 1.0);
         if phase == Phase::Solve {
