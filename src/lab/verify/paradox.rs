@@ -68,22 +68,8 @@ fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
 fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
     let (sin, cos) = LEAN.sin_cos();
     let body = ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
-    let contact = |a: Option<u32>, b, n: [f64; 2], ra: [f64; 2], rb: [f64; 2], friction, manifold| {
-        let arm = |r: [f64; 2]| [r[0] * n[1] - r[1] * n[0], -r[0] * n[0] - r[1] * n[1]];
-        let (arm_a, arm_b) = (arm(ra), arm(rb));
-        let (gap, rebound, warm_impulse) = (0.0, 0.0, [0.0; 2]);
-        ProblemContact {
-            body_a: a,
-            body_b: b,
-            manifold,
-            normal: n,
-            arm_a,
-            arm_b,
-            gap,
-            friction,
-            rebound,
-            warm_impulse,
-        }
+    let contact = |a, b, normal, ra, rb, friction, manifold| {
+        ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
     };
     let (top, foot) = ([0.5 * sin, 0.5 * cos], [-0.5 * sin, -0.5 * cos]);
     let mirrored = |[x, y]: [f64; 2]| [-x, y];
