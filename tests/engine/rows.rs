@@ -13,10 +13,7 @@ fn parameters_are_found_set_and_refused() {
     assert_eq!(values[hertz], 60.0);
     for bad in [-3.0, f32::NAN, 0.0] {
         let message = soft.set(&mut values, "contact_hertz", bad).unwrap_err().to_string();
-        assert!(
-            message.starts_with("contact_hertz: ") && message.contains(&bad.to_string()),
-            "{message}"
-        );
+        assert!(message.starts_with("contact_hertz: ") && message.contains(&bad.to_string()), "{message}");
     }
     assert_eq!(values[hertz], 60.0);
     let message = soft.set(&mut values, "hertz", 1.0).unwrap_err().to_string();

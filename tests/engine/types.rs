@@ -214,10 +214,15 @@ fn one_jacobi_sweep_moves_the_neighbours_of_what_moves_and_no_others() {
         world.step().unwrap();
         [1, 2, 3, 4, 5, 6].map(|i| world.bodies.velocity_x[i])
     };
+    let close = |found: [f32; 6], expected: [f32; 6]| {
+        // Some roundings at 3 m/s.
+        let off = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-6, "{found:?}");
+    };
     // Rods 2–3 and 3–4, of equal masses, each take half of 3 m/s from disc 3 and give it to the other.
-    assert_eq!(speeds("jacobi"), [0.0, 1.5, 0.0, 1.5, 0.0, 0.0]);
+    close(speeds("jacobi"), [0.0, 1.5, 0.0, 1.5, 0.0, 0.0]);
     // In turn: 2–3 halves 3 m/s, 3–4 halves the rest, and so on to the end of the chain.
-    assert_eq!(speeds("pgs"), [0.0, 1.5, 0.75, 0.375, 0.1875, 0.1875]);
+    close(speeds("pgs"), [0.0, 1.5, 0.75, 0.375, 0.1875, 0.1875]);
 }
 
 #[test]
