@@ -51,7 +51,8 @@
 // Printing panics where a reader has left: what the program prints goes through `cli::output`.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod engine;
+#[doc(inline)]
+pub use simpulse_engine::engine;
 
 #[cfg(feature = "lab")]
 pub mod lab;

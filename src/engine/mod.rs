@@ -16,6 +16,7 @@
 //! # Example
 //!
 //! ```
+//! # use simpulse_engine as simpulse;
 //! use glam::Vec2;
 //! use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 //! use simpulse::engine::shapes::Shape;

@@ -22,6 +22,9 @@ pub const CONTACT_HERTZ: f32 = 30.0;
 /// A soft contact's frequency is capped at this fraction of the substep rate (1).
 pub const CONTACT_HERTZ_FRACTION: f32 = 0.125;
 
+/// The same of solvers without substeps (1).
+pub const CONTACT_HERTZ_FRACTION_OF_STEP: f32 = 1.0 / 3.0;
+
 /// Damping ratio of a soft contact (1): far above critical, so that it does not bounce.
 pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
 
@@ -98,6 +101,70 @@ pub struct Parameter {
     pub meaning: &'static str,
     /// Values that a search for a good setting tries; empty where the standard one is kept.
     pub trials: &'static [f32],
+}
+
+/// What several solvers can be given.
+impl Parameter {
+    /// Share of the overlap that Baumgarte stabilisation removes.
+    pub const BAUMGARTE: Parameter = Parameter {
+        name: "baumgarte",
+        unit: "",
+        default: BAUMGARTE,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that is removed per step",
+        trials: &[],
+    };
+
+    /// Share of the overlap that a position sweep removes.
+    pub const CORRECTION: Parameter = Parameter {
+        name: "correction",
+        unit: "",
+        default: 0.2,
+        range: [0.0, 1.0],
+        meaning: "share of the overlap that a position sweep removes",
+        trials: &[],
+    };
+
+    /// Frequency of soft contacts, capped by [`CONTACT_HERTZ_FRACTION`].
+    pub const CONTACT_HERTZ: Parameter = Parameter {
+        name: "contact_hertz",
+        unit: "Hz",
+        default: CONTACT_HERTZ,
+        range: [1e-3, 1e6],
+        meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
+        trials: &[15.0, 30.0, 60.0, 120.0],
+    };
+
+    /// Frequency of soft contacts, capped by [`CONTACT_HERTZ_FRACTION_OF_STEP`].
+    pub const CONTACT_HERTZ_OF_STEP: Parameter = Parameter {
+        meaning: "stiffness of contacts; at most a third of the substep rate acts",
+        ..Parameter::CONTACT_HERTZ
+    };
+
+    /// Damping of soft contacts.
+    pub const DAMPING_RATIO: Parameter = Parameter {
+        name: "damping_ratio",
+        unit: "",
+        default: CONTACT_DAMPING_RATIO,
+        range: [0.0, 1e3],
+        meaning: "damping of contacts; 1 is critical",
+        trials: &[],
+    };
+
+    /// Fastest speed at which overlap is pushed apart, [`MAX_PUSH_SPEED`].
+    pub const PUSH_SPEED: Parameter = Parameter::push_speed(MAX_PUSH_SPEED);
+
+    /// The same, with a standard value (m/s) of the solver's own.
+    pub const fn push_speed(default: f32) -> Parameter {
+        Parameter {
+            name: "push_speed",
+            unit: "m/s",
+            default,
+            range: [0.0, 1e3],
+            meaning: "fastest speed at which overlap is pushed apart",
+            trials: &[],
+        }
+    }
 }
 
 /// Values of a solver's parameters, in the order of its table; zero past its end.

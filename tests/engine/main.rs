@@ -5,6 +5,8 @@ mod kernel;
 mod motion;
 mod narrow_batches;
 mod narrowphase;
+mod observe;
+mod rows;
 mod shapes;
 mod soundness;
 mod structure;

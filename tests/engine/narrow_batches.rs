@@ -48,7 +48,7 @@ impl Scene {
         });
         let input = Input { poses: &poses, shapes: &self.rows, speculative: SPECULATIVE };
         let (mut changed, mut fresh) = (vec![], vec![]);
-        let points = update(self.kind, width, &jobs, input, &mut self.contacts, |name, contact| {
+        let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
             changed.push(name);
             fresh.push(*contact);
         });

@@ -441,7 +441,7 @@ fn collide(kind: Kind, width: LaneWidth, pairs: u32, contacts: usize, spoil: imp
     spoil(&mut jobs);
     let input = Input { poses: &[PoseRow::default()], shapes: &shapes, speculative: 0.02 };
     let mut contacts = vec![Contact::default(); contacts];
-    update(kind, width, &jobs, input, &mut contacts, |_, _| {});
+    update(kind, width, &jobs, input, &mut contacts, &mut |_, _| {});
 }
 
 #[test]

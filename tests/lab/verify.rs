@@ -30,7 +30,7 @@ fn failed(matrix: &Matrix) -> Vec<&'static str> {
 fn every_case_of_the_list_is_there_once_and_documented() {
     let ids: BTreeSet<_> = CASES.iter().map(|case| case.id).collect();
     assert_eq!(ids.len(), CASES.len(), "an id stands twice");
-    for case in CASES {
+    for case in CASES.iter() {
         let (family, name) = case.id.split_once('.').unwrap_or_else(|| panic!("{} has no family", case.id));
         assert!(family.len() >= 2 && !name.is_empty(), "{}", case.id);
         let (Required::Yes(why) | Required::No(why)) = case.required;
@@ -208,7 +208,7 @@ const FAILS: &[&str] = &[];
 
 #[test]
 fn the_default_solver_keeps_its_promises_but_for_those_that_are_told() {
-    let cases: Vec<&Case> = CASES.iter().filter(|case| case.required.is_required()).collect();
+    let cases: Vec<&Case> = CASES.iter().copied().filter(|case| case.required.is_required()).collect();
     let matrix = verify::run(cases, vec![solvers::find(DEFAULT).unwrap()], 2, Lab::new, &|_| ());
     assert_eq!(matrix.broken_promises(DEFAULT), Some(FAILS.to_vec()));
 }

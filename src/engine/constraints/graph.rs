@@ -18,12 +18,14 @@ pub struct Graph {
     edges: Vec<u32>,
     levels: Vec<u32>,
     queue: Vec<u32>,
+    /// Constraints of each body that are no edges. `[bodies]`
+    others: Vec<u32>,
 }
 
 impl Graph {
     /// Builds the graph of `edges`, given by their two bodies; what is not below `bodies` is the
     /// world, which has no edges of its own. `is_dynamic` tells which bodies are carried by others.
-    pub(crate) fn build(
+    pub fn build(
         &mut self,
         bodies: usize,
         edges: impl Iterator<Item = [u32; 2]>,
@@ -85,6 +87,22 @@ impl Graph {
         }
     }
 
+    /// Counts constraints that are no edges by their two bodies, after [`Self::build`].
+    pub(crate) fn count_others(&mut self, ends: impl Iterator<Item = [u32; 2]>) {
+        self.others.clear();
+        self.others.resize(self.levels.len(), 0);
+        for body in ends.flatten() {
+            if let Some(count) = self.others.get_mut(body as usize) {
+                *count += 1;
+            }
+        }
+    }
+
+    /// Constraints on a body: its edges, and what is none.
+    pub fn constraints_of(&self, body: usize) -> usize {
+        self.edges_of(body).len() + self.others.get(body).map_or(0, |&count| count as usize)
+    }
+
     /// The edges of a body, ascending.
     pub fn edges_of(&self, body: usize) -> &[u32] {
         &self.edges[self.starts[body] as usize..self.starts[body + 1] as usize]
@@ -103,7 +121,7 @@ impl Graph {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.starts, &self.edges, &self.levels, &self.queue];
+        let lists = [&self.starts, &self.edges, &self.levels, &self.queue, &self.others];
         held(&self.ends) + lists.into_iter().map(held).sum::<usize>()
     }
 }
@@ -124,6 +142,8 @@ mod tests {
             assert_eq!(graph.edges_of(3), [2, 3]);
             assert!(graph.edges_of(6).is_empty());
             assert_eq!(graph.ends(3), [2, 3]);
+            graph.count_others([[1, 6], [0, 6]].into_iter());
+            assert_eq!([1, 3, 6].map(|body| graph.constraints_of(body)), [4, 2, 2]);
         }
     }
 

@@ -7,7 +7,7 @@
 //! of rows that reads from one place and adds up in another.
 
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind};
-use super::pass::{Pass, PassInput, PerLane};
+use super::pass::{Pass, PassInput, PassMode, PerLane};
 use super::rules::{Relaxed, Soft};
 use super::sweep::{INV_MASS, VX, VY, W, over_segments, sweep_segment};
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
@@ -24,6 +24,10 @@ impl Pass for JacobiSweep {
         // Both bodies once for their velocities and once for their sums.
         let sweep = PerLane::of_sweep(layout, true, opposite);
         PerLane { rows: sweep.rows + sweep.halves, ..sweep }
+    }
+
+    fn mode(&self) -> PassMode {
+        PassMode::Jacobi { relaxation: self.relaxation }
     }
 
     #[inline(never)]
@@ -57,9 +61,9 @@ pub(super) fn finish(rows: &mut [BodyRow], sums: &[BodyRow], masses: &[[f32; 2]]
 }
 
 /// Reads velocities from before the sweep; a write adds the difference to the sums.
-struct SummedRows<'a> {
-    before: &'a [BodyRow],
-    sums: &'a mut [BodyRow],
+pub(super) struct SummedRows<'a> {
+    pub(super) before: &'a [BodyRow],
+    pub(super) sums: &'a mut [BodyRow],
 }
 
 impl RowStore for SummedRows<'_> {

@@ -70,7 +70,7 @@ impl Kept {
     }
 
     /// Takes the numbers on to the contacts of the coming step, which are sorted by shape pair.
-    pub(crate) fn follow(&mut self, size: KeptSize, contacts: &[Contact], bodies: usize) {
+    pub fn follow(&mut self, size: KeptSize, contacts: &[Contact], bodies: usize) {
         if size != self.size {
             *self = Kept { size, ..Kept::default() };
         }

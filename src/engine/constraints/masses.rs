@@ -7,7 +7,7 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput, PerLane};
+use super::pass::{Pass, PassInput, PassMode, PerLane};
 use super::sweep::{BodyPair, INV_INERTIA, INV_MASS, arms, for_each_batch, over_segments};
 use crate::engine::lanes::{BodyRow, Lanes};
 
@@ -19,6 +19,10 @@ impl Pass for EffectiveMasses {
         let masses = layout.points * if layout.has_friction { 2 } else { 1 };
         let read = layout.points * layout.arms() + masses;
         PerLane { halves: 0, ..PerLane::of_bodies(read, masses, opposite) }
+    }
+
+    fn mode(&self) -> PassMode {
+        PassMode::Masses
     }
 
     #[inline(never)]

@@ -59,12 +59,32 @@ impl PerLane {
     }
 }
 
+/// How a pass treats bodies, for constraints that bring kernels of their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PassMode {
+    /// Each constraint sees what those before it have done to its bodies.
+    #[default]
+    InTurn,
+    /// Each constraint sees the bodies from before the pass. What all of them add to a body is summed up.
+    Jacobi {
+        /// Factor on the increments of velocities and impulses (1).
+        relaxation: f32,
+    },
+    /// Inverse masses have changed: only effective masses are recomputed.
+    Masses,
+}
+
 /// A pass over contacts, compiled per width and features.
 ///
 /// To add one, implement this; [`super::sweep::Sweep`] is the example.
 pub trait Pass {
     /// What it asks for per contact with records of this layout.
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
+
+    /// How constraints of other types take part.
+    fn mode(&self) -> PassMode {
+        PassMode::InTurn
+    }
 
     /// Runs over all segments of `on.batches`, in order.
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>);
@@ -84,6 +104,9 @@ pub trait AnyPass {
     /// [`Pass::traffic`]
     fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
+    /// [`Pass::mode`]
+    fn mode_of(&self) -> PassMode;
+
     /// Runs the instance for this width and these features.
     fn run_at(&self, width: PassWidth, features: &Features, on: PassInput<'_>);
 }
@@ -91,6 +114,10 @@ pub trait AnyPass {
 impl<P: Pass> AnyPass for P {
     fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         self.traffic(layout, opposite)
+    }
+
+    fn mode_of(&self) -> PassMode {
+        self.mode()
     }
 
     fn run_at(&self, width: PassWidth, features: &Features, on: PassInput<'_>) {

@@ -13,7 +13,7 @@ use super::masses::EffectiveMasses;
 use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::order::SweepOrder;
-use super::pass::{AnyPass, PassInput, PassWidth, PerLane};
+use super::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
 use super::point_vector::PointVector;
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
@@ -24,7 +24,7 @@ use super::rules::{NormalRule, Rule, Soft};
 use super::sticky::{BookDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
-use super::types::{Joined, TypeInput};
+use super::types::{Joined, TypeInput, TypeRows};
 use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, held};
@@ -490,7 +490,7 @@ impl<'a> Passes<'a> {
     }
 
     /// Multiplies inverse masses and inertias by `factor(body, graph)`, from what they are without
-    /// any, and lets the effective masses of the contacts follow that the order has. Until
+    /// any, and lets the effective masses of the constraints follow that the order has. Until
     /// [`Self::restore_masses`] a Jacobi sweep takes a factor n for n copies of a body.
     pub fn scale_masses(&mut self, phase: Phase, factor: impl Fn(usize, &Graph) -> f32) {
         if !self.input.phases.runs(phase) {
@@ -506,7 +506,7 @@ impl<'a> Passes<'a> {
             (row.velocity[3], row.delta[3]) = (factor * whole[0], factor * whole[1]);
         }
         self.book_rows([32.0, 32.0]);
-        self.over_contacts(&EffectiveMasses);
+        self.over_batches(phase, &EffectiveMasses);
         self.clock.lap(phase);
     }
 
@@ -581,6 +581,7 @@ impl<'a> Passes<'a> {
         let bodies = self.work.rows.len() - 1;
         let dynamic = |body: u32| self.work.rows[body as usize].velocity[3] > 0.0;
         self.work.graph.build(bodies, self.contacts.iter().map(|c| [c.body_a, c.body_b]), dynamic);
+        self.work.graph.count_others(self.work.types.iter().flat_map(|t| t.kind.ends()).copied());
         &self.work.graph
     }
 
@@ -699,7 +700,7 @@ impl<'a> Passes<'a> {
                 batches.unfocus();
             }
             while let Some(rank) = self.all(part).filter_map(|batches| batches.next_rank()).min() {
-                self.over_types(phase, part, rank);
+                self.over_types(phase, pass.mode_of(), part, rank);
                 let batches = part.of(&mut self.work.lanes, &mut self.work.serial);
                 if batches.next_rank() == Some(rank) {
                     batches.focus_on(rank);
@@ -718,14 +719,15 @@ impl<'a> Passes<'a> {
     }
 
     /// Constraints of other types that come at this rank.
-    fn over_types(&mut self, phase: Phase, part: Part, rank: u64) {
+    fn over_types(&mut self, phase: Phase, mode: PassMode, part: Part, rank: u64) {
         let width = self.width_of(part);
-        let Workspace { rows, types, .. } = &mut *self.work;
+        let Workspace { rows, sums, types, .. } = &mut *self.work;
         for Joined { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
-                kind.run(TypeInput { phase, h: self.input.h, width, rows, batches });
+                let rows = TypeRows::new(rows, sums, mode);
+                kind.run(TypeInput { phase, mode, h: self.input.h, width, rows, batches });
             }
         }
     }

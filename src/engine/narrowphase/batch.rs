@@ -154,7 +154,7 @@ pub fn update(
     jobs: &Jobs,
     input: Input,
     contacts: &mut Vec<Contact>,
-    change: impl FnMut(u32, &Contact),
+    change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
     let count = jobs.name.len();
     let below = |list, limit: usize, what: &str| {
@@ -198,7 +198,7 @@ fn run<L: Lanes>(
     input: Input,
     contacts: &mut [Contact],
     made: usize,
-    change: impl FnMut(u32, &Contact),
+    change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
     let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
     match kind {
@@ -245,7 +245,7 @@ fn run_kernel<L: Lanes>(
     indices: JobIndices,
     contacts: &mut [Contact],
     made: usize,
-    mut change: impl FnMut(u32, &Contact),
+    change: &mut dyn FnMut(u32, &Contact),
     mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> Touch<L>,
 ) -> usize {
     let mut points = 0_u32;

@@ -28,14 +28,8 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Soft;
-use crate::engine::params::{
-    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, MAX_PUSH_SPEED, Parameter, Parameters,
-};
-use std::f32::consts::TAU;
-
-/// A soft contact's frequency is capped at this fraction of the substep rate (1).
-const HERTZ_FRACTION: f32 = 1.0 / 3.0;
+use crate::engine::constraints::rules::{Soft, angular_frequencies};
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -45,25 +39,8 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 4, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
-    parameters: &[
-        Parameter {
-            name: "contact_hertz",
-            unit: "Hz",
-            default: CONTACT_HERTZ,
-            range: [1e-3, 1e6],
-            meaning: "stiffness of contacts; at most a third of the substep rate acts",
-            trials: &[15.0, 30.0, 60.0, 120.0],
-        },
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: MAX_PUSH_SPEED,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
-    ],
-    softness: Some(angular_frequencies),
+    parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::PUSH_SPEED],
+    softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
@@ -76,7 +53,12 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let soft = Soft::new(
+        angular_frequencies(hertz, CONTACT_HERTZ_FRACTION_OF_STEP, h),
+        CONTACT_DAMPING_RATIO,
+        push_speed,
+        h,
+    );
     let rigid = Soft::without_springs(h);
     passes.build_graph();
     for substep in 0..budget.substeps {
@@ -91,7 +73,7 @@ fn step(passes: &mut Passes<'_>) {
 
 /// Sweeps on split bodies.
 fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
-    passes.scale_masses(phase, |body, graph| graph.edges_of(body).len().max(1) as f32);
+    passes.scale_masses(phase, |body, graph| graph.constraints_of(body).max(1) as f32);
     for _ in 0..times {
         passes.jacobi_sweep(phase, rule, 1.0);
         if phase == Phase::Solve {
@@ -99,13 +81,4 @@ fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
         }
     }
     passes.restore_masses(phase);
-}
-
-fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
-    let omega = TAU * hertz.min(HERTZ_FRACTION / h);
-    [omega, 2.0 * omega]
-}
-
-fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
-    frequencies(parameters[0], h)
 }

@@ -15,12 +15,8 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, Parameter, Parameters};
-use std::f32::consts::TAU;
-
-/// A soft contact's frequency is capped at this fraction of the substep rate (1).
-const HERTZ_FRACTION: f32 = 1.0 / 3.0;
+use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -30,25 +26,8 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
-    parameters: &[
-        Parameter {
-            name: "contact_hertz",
-            unit: "Hz",
-            default: CONTACT_HERTZ,
-            range: [1e-3, 1e6],
-            meaning: "stiffness of contacts; at most a third of the substep rate acts",
-            trials: &[15.0, 30.0, 60.0, 120.0],
-        },
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: 2.0,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
-    ],
-    softness: Some(angular_frequencies),
+    parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::push_speed(2.0)],
+    softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
@@ -58,7 +37,12 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let soft = Soft::rule(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h);
+    let soft = Soft::rule(
+        angular_frequencies(hertz, CONTACT_HERTZ_FRACTION_OF_STEP, h),
+        CONTACT_DAMPING_RATIO,
+        push_speed,
+        h,
+    );
     let rigid = Rigid::rule(h);
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
@@ -73,13 +57,4 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.end_substep(substep);
     }
-}
-
-fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
-    let omega = TAU * hertz.min(HERTZ_FRACTION / h);
-    [omega, 2.0 * omega]
-}
-
-fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
-    frequencies(parameters[0], h)
 }

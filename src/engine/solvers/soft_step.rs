@@ -22,11 +22,8 @@ use super::{Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
-use crate::engine::params::{
-    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, MAX_PUSH_SPEED, Parameter,
-    Parameters,
-};
+use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -36,33 +33,8 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
-    parameters: &[
-        Parameter {
-            name: "contact_hertz",
-            unit: "Hz",
-            default: CONTACT_HERTZ,
-            range: [1e-3, 1e6],
-            meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
-            trials: &[15.0, 30.0, 60.0, 120.0],
-        },
-        Parameter {
-            name: "damping_ratio",
-            unit: "",
-            default: CONTACT_DAMPING_RATIO,
-            range: [0.0, 1e3],
-            meaning: "damping of contacts; 1 is critical",
-            trials: &[],
-        },
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: MAX_PUSH_SPEED,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
-    ],
-    softness: Some(angular_frequencies),
+    parameters: &[Parameter::CONTACT_HERTZ, Parameter::DAMPING_RATIO, Parameter::PUSH_SPEED],
+    softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[],
@@ -72,7 +44,8 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, damping_ratio, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-    let soft = Soft::rule(frequencies(hertz, h), damping_ratio, push_speed, h);
+    let soft =
+        Soft::rule(angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h), damping_ratio, push_speed, h);
     let rigid = Rigid::rule(h);
     for substep in 0..budget.substeps {
         if substep == 0 {
@@ -91,15 +64,4 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.end_substep(substep);
     }
-}
-
-/// ω of contacts between dynamic bodies and of those with others (rad/s), where `hertz` (Hz) is
-/// set and the substep is `h` (s): capped by the substep rate, and twice as much with others.
-fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
-    let omega = std::f32::consts::TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
-    [omega, 2.0 * omega]
-}
-
-fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
-    frequencies(parameters[0], h)
 }

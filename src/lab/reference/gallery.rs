@@ -4,7 +4,7 @@
 //! solution in its docs. They are the material for tests of references and for exact
 //! convergence rates.
 
-use super::problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+use super::problem::{ContactProblem, ProblemBody, ProblemContact, Velocity};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -38,26 +38,11 @@ impl Builder {
     /// A contact at `point` in a manifold of its own, `normal` from a to b; `None` is static.
     fn contact(&mut self, a: Option<u32>, b: Option<u32>, point: [f64; 2], normal: [f64; 2], friction: f64) {
         let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold + 1);
-        let arm = |body: Option<u32>| -> Pair {
-            let Some(body) = body else { return [0.0; 2] };
-            let c = self.centers[body as usize];
-            let r = [point[0] - c[0], point[1] - c[1]];
-            let t = [normal[1], -normal[0]];
-            [r[0] * normal[1] - r[1] * normal[0], r[0] * t[1] - r[1] * t[0]]
-        };
-        let (arm_a, arm_b) = (arm(a), arm(b));
-        self.problem.contacts.push(ProblemContact {
-            body_a: a,
-            body_b: b,
-            manifold,
-            normal,
-            arm_a,
-            arm_b,
-            gap: 0.0,
-            friction,
-            rebound: 0.0,
-            warm_impulse: [0.0; 2],
+        let r = [a, b].map(|body| {
+            let [x, y] = body.map_or(point, |body| self.centers[body as usize]);
+            [point[0] - x, point[1] - y]
         });
+        self.problem.contacts.push(ProblemContact::touching([a, b], manifold, normal, r, friction));
     }
 
     /// A manifold of two points.

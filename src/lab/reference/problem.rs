@@ -69,6 +69,38 @@ pub struct ProblemContact {
 }
 
 impl ProblemContact {
+    /// A point without gap or rebound between two bodies, of which none is static: `r` from their
+    /// centres of mass to the point (m).
+    pub fn touching(
+        bodies: [Option<u32>; 2],
+        manifold: u32,
+        normal: [f64; 2],
+        r: [[f64; 2]; 2],
+        friction: f64,
+    ) -> Self {
+        let arm = |k: usize| match bodies[k] {
+            None => [0.0; 2],
+            Some(_) => {
+                let (r, t) = (r[k], [normal[1], -normal[0]]);
+                [r[0] * normal[1] - r[1] * normal[0], r[0] * t[1] - r[1] * t[0]]
+            }
+        };
+        let ([body_a, body_b], [arm_a, arm_b], warm_impulse) = (bodies, [arm(0), arm(1)], [0.0; 2]);
+        let (gap, rebound) = (0.0, 0.0);
+        ProblemContact {
+            body_a,
+            body_b,
+            manifold,
+            normal,
+            arm_a,
+            arm_b,
+            gap,
+            friction,
+            rebound,
+            warm_impulse,
+        }
+    }
+
     /// t = (n_y, −n_x).
     pub fn tangent(&self) -> [f64; 2] {
         [self.normal[1], -self.normal[0]]

@@ -225,24 +225,8 @@ mod tests {
         let (sin, cos) = angle.sin_cos();
         let body =
             ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
-        let contact = |a, b, normal: [f64; 2], ra: [f64; 2], rb: [f64; 2], friction, manifold| {
-            let arm = |r: [f64; 2]| {
-                let t = [normal[1], -normal[0]];
-                [r[0] * normal[1] - r[1] * normal[0], r[0] * t[1] - r[1] * t[0]]
-            };
-            let (arm_a, arm_b) = (arm(ra), arm(rb));
-            ProblemContact {
-                body_a: a,
-                body_b: b,
-                manifold,
-                normal,
-                arm_a,
-                arm_b,
-                gap: 0.0,
-                friction,
-                rebound: 0.0,
-                warm_impulse: [0.0; 2],
-            }
+        let contact = |a, b, normal, ra, rb, friction, manifold| {
+            ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
         };
         // Centres at ∓sin/2; feet outwards below, tops meeting at x = 0.
         let (left_foot, left_top) = ([-0.5 * sin, -0.5 * cos], [0.5 * sin, 0.5 * cos]);

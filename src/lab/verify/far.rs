@@ -1,7 +1,27 @@
 //! B15: the same stack, far from the origin.
 
+use super::Required::Yes;
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B15.kilometre",
+        "distance of ten boxes at 1 km to their twins at the origin, all steps",
+        "m",
+        "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
+        kilometre,
+        Yes("contacts see differences of positions, taken before they are rounded"),
+    ),
+    Case::new(
+        "B15.far",
+        "greatest distance from the origin with the same trajectory",
+        "m",
+        "1e5 m is to hold, with the tolerance of B15.kilometre",
+        distance,
+        Yes("contacts see differences of positions, taken before they are rounded"),
+    ),
+];
 
 /// Greatest error of a difference of 1 m once it is rounded to an `f32`: half of the spacing up to 2 m.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
@@ -14,12 +34,12 @@ fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
 }
 
 /// B15. At a kilometre, where the spacing of `f32`s is 6.1e-5 m.
-pub(super) fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
+fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
     twins(lab, 3)
 }
 
 /// B15. The greatest distance, up to 10⁵ m, at which the trajectory is still the same.
-pub(super) fn distance(lab: &Lab) -> Result<Finding, Failure> {
+fn distance(lab: &Lab) -> Result<Finding, Failure> {
     sweep("distance (m)", &[1.0, 10.0, 100.0, 1e3, 1e4, 1e5], |distance| {
         let found = twins(lab, distance.log10().round() as u32)?;
         Ok((found.measured, found.passed()))

@@ -1,22 +1,98 @@
 //! A5–A7 and A17–A19: bounces.
 
+use super::Required::Yes;
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A5.bounce",
+        "apexes of bounces with e = 1/2 from 10 m, worst",
+        "m",
+        "1e-5 of the height of 10 m: exact in f32, as A0.fall",
+        bounce,
+        Yes("the rebound keeps the discrete energy of flight"),
+    ),
+    Case::new(
+        "A6.elastic",
+        "apexes of twenty elastic bounces from 1 m, worst",
+        "m",
+        "list: 0.5 %",
+        elastic,
+        Yes("the rebound keeps the discrete energy of flight"),
+    ),
+    Case::new(
+        "A7.oblique",
+        "speeds after an oblique elastic collision, worse of two",
+        "m/s",
+        "1e-5 of 2 m/s: exact in f32",
+        oblique,
+        Yes("one contact, one row"),
+    ),
+    Case::new(
+        "A17.billiards",
+        "change of kinetic energy over 1e4 elastic collisions, over the first",
+        "1",
+        "list: 1e-3",
+        billiards,
+        Yes("impacts come before the step, so that discs hardly overlap"),
+    ),
+    Case::new(
+        "A18.sequence",
+        "speed of the last of five discs with small gaps, over the first's",
+        "1",
+        "1 %: one law or the other",
+        cradle_sequence,
+        Yes("impacts run from body to body in waves"),
+    ),
+    Case::new(
+        "A18.law",
+        "distance of the outcome of three touching discs to the nearer of two laws",
+        "1",
+        "1 %: one law or the other",
+        cradle_law,
+        Yes("impacts run from body to body in waves"),
+    ),
+    Case::new(
+        "A18.energy",
+        "largest gain of energy in four cradles, over the first's",
+        "1",
+        "1e-5: none, in f32",
+        cradle_energy,
+        Yes("an impact between two smooth bodies makes no energy, and waves are such impacts"),
+    ),
+    Case::new(
+        "A19.disc",
+        "velocities after a rough oblique impact of a disc, worst of e and µ",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        rough_disc,
+        Yes("friction of an impact is bounded by all of its normal impulse"),
+    ),
+    Case::new(
+        "A19.corner",
+        "velocities after a rough oblique impact of a corner, worst of e and µ",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        rough_corner,
+        Yes("normal and tangential impulse of an impact are found together"),
+    ),
+];
 
 /// A5. Worst apex of four bounces from 10 m with e = ½. Rebounds keep the discrete energy of flight, so
 /// apexes are off by rounding alone: 1e-5 of the height, as in A0.
-pub(super) fn bounce(lab: &Lab) -> Result<Finding, Failure> {
+fn bounce(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce", 1e-5 * 10.0)
 }
 
 /// A6. Worst apex of twenty elastic bounces from 1 m.
-pub(super) fn elastic(lab: &Lab) -> Result<Finding, Failure> {
+fn elastic(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce_elastic", 0.005)
 }
 
 /// A7. The worse of two outgoing speeds, at 2 m/s.
-pub(super) fn oblique(lab: &Lab) -> Result<Finding, Failure> {
+fn oblique(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("oblique_collision", 1e-5 * 2.0)
 }
 
@@ -25,7 +101,7 @@ fn smooth_disc(radius: f64) -> SceneShape {
 }
 
 /// A17. Sixteen smooth elastic discs in a box of 10 m: change of kinetic energy over 10⁴ collisions.
-pub(super) fn billiards(lab: &Lab) -> Result<Finding, Failure> {
+fn billiards(lab: &Lab) -> Result<Finding, Failure> {
     let wall = |x: f64, y: f64| {
         let half = if x == 0.0 { [6.0, 0.5] } else { [0.5, 6.0] };
         SceneBody::fixed([x, y], SceneShape::rectangle(half[0], half[1]).friction(0.0).restitution(1.0))
@@ -69,14 +145,14 @@ fn list(speeds: &[f64]) -> String {
 }
 
 /// A18. Gaps of 10⁻³ r: one impact after the other, so the last of five leaves with all the speed.
-pub(super) fn cradle_sequence(lab: &Lab) -> Result<Finding, Failure> {
+fn cradle_sequence(lab: &Lab) -> Result<Finding, Failure> {
     let (speeds, _) = cradle(lab, 5, 5e-4)?;
     Ok(Finding::new(speeds[4], 1.0, 0.01).note(list(&speeds)))
 }
 
 /// A18. Three that touch: two laws conserve momentum and energy, the sequential (0, 0, 1) and the
 /// simultaneous (−1/3, 2/3, 2/3). The distance to the nearer.
-pub(super) fn cradle_law(lab: &Lab) -> Result<Finding, Failure> {
+fn cradle_law(lab: &Lab) -> Result<Finding, Failure> {
     let (speeds, _) = cradle(lab, 3, 0.0)?;
     let (distance, law) = nearest_law(&speeds);
     Ok(Finding::new(distance, 0.0, 0.01).note(format!("nearest law: {law}; {}", list(&speeds))))
@@ -89,7 +165,7 @@ fn nearest_law(speeds: &[f64]) -> (f64, &'static str) {
 }
 
 /// A18. Energy never grows, touching or not, three or five.
-pub(super) fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
+fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     let mut gain = 0.0;
     for (n, gap) in [(3, 0.0), (3, 5e-4), (5, 0.0), (5, 5e-4)] {
         gain = largest([gain, cradle(lab, n, gap)?.1]);
@@ -157,7 +233,7 @@ fn rough_impact(lab: &Lab, rough: impl Fn() -> Rough) -> Result<Finding, Failure
 }
 
 /// A19. A disc, at 3 m/s along the ground and with a spin that is not that of rolling.
-pub(super) fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
+fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
     let radius = 0.5;
     let density = 1.0 / (std::f64::consts::PI * radius * radius);
     rough_impact(lab, || Rough {
@@ -171,7 +247,7 @@ pub(super) fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// A19. A unit square on a corner, 20° to the left of below its centre.
-pub(super) fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
+fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
     let angle = 25f64.to_radians();
     // The corner (−½, −½) turned by the angle.
     let (sin, cos) = angle.sin_cos();

@@ -1,8 +1,8 @@
 //! Hard cases: set-ups whose truth is known on paper, run against every solver.
 //!
 //! A case runs a scene, reads one number from the state in `f64` and compares it with the
-//! truth. It does not know which solver ran. A new case is one function in the file of its
-//! family and one row in [`CASES`]; ids such as A5 or B12 are those of the list of hard cases.
+//! truth. It does not know which solver ran. A new case is one function and one row in the file of
+//! its group; [`CASES`] has them all. Ids such as A5 or B12 are those of the list of hard cases.
 //!
 //! # Tolerances
 //!
@@ -44,6 +44,7 @@
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
+mod columns;
 mod far;
 mod impacts;
 mod lab;
@@ -111,7 +112,30 @@ pub struct Case {
     /// The solvers whose own law the truth is.
     pub law_of: LawOf,
     /// Runs it.
-    pub measure: fn(&Lab) -> Result<Finding, Failure>,
+    pub measure: Measure,
+}
+
+type Measure = fn(&Lab) -> Result<Finding, Failure>;
+
+impl Case {
+    const fn new(
+        id: &'static str,
+        summary: &'static str,
+        unit: &'static str,
+        tolerance: &'static str,
+        measure: Measure,
+        required: Required,
+    ) -> Self {
+        Case { id, summary, unit, tolerance, required, law_of: LawOf::Everyone, measure }
+    }
+
+    const fn springs(self) -> Self {
+        Case { law_of: LawOf::Springs, ..self }
+    }
+
+    const fn swept_once(self) -> Self {
+        Case { law_of: LawOf::SpringsSweptOnce, ..self }
+    }
 }
 
 /// Whether the mathematics of the default solver promises a case.

@@ -1,17 +1,85 @@
 //! A0, A16, A17 and B14: bodies that move freely, and how small or large a step may be.
 
+use super::Required::{No, Yes};
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::engine::world::World;
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A0.fall",
+        "height of a thrown disc, worst of all steps",
+        "m",
+        "1e-5 of the path of 10 m: exact in f32",
+        fall,
+        Yes("semi-implicit Euler is exact on its discrete formula"),
+    ),
+    Case::new(
+        "A16.spin",
+        "angle of a free spin at 50 rad/s, worst of all steps",
+        "rad",
+        "1e-5 of 100 rad: exact in f32",
+        free_spin,
+        Yes("rotation by h ω is exact"),
+    ),
+    Case::new(
+        "A17.momentum",
+        "change of linear momentum in a collision of 16 bodies, over the sum of its parts",
+        "1",
+        "f32: 1e-6 √sweeps",
+        linear_momentum,
+        Yes("impulses come in opposite pairs"),
+    ),
+    Case::new(
+        "A17.spin",
+        "change of angular momentum, over the sum of its parts",
+        "1",
+        "f32: 1e-6 √sweeps",
+        angular_momentum,
+        No("arms are those of the step's beginning; bodies slide past each other within it"),
+    ),
+    Case::new(
+        "B14.large",
+        "largest step at which slide and roll down an incline are right to 1 %",
+        "s",
+        "1/15 s is to hold",
+        large_steps,
+        Yes("the cold first substep is a sixteenth of the step"),
+    ),
+    Case::new(
+        "B14.order",
+        "error at 1/60 s over error at 1/120 s",
+        "1",
+        "list: 1.8 to 2.2",
+        order,
+        Yes("semi-implicit Euler is of order 1"),
+    ),
+    Case::new(
+        "B14.freeze",
+        "motion in a first step of 1 µs, over that of semi-implicit Euler",
+        "1",
+        "1 %",
+        freeze,
+        Yes("positions keep what their sums round away"),
+    ),
+    Case::new(
+        "B14.tiny",
+        "shortest step at which 2000 steps of a fall are right to 1 %",
+        "s",
+        "1e-6 s is to hold",
+        tiny_steps,
+        Yes("positions keep what their sums round away"),
+    ),
+];
+
 /// A0. x_n = x0 + v0 t + g t²/2 (1 + 1/n), over a path of 10 m.
-pub(super) fn fall(lab: &Lab) -> Result<Finding, Failure> {
+fn fall(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("free_fall", 1e-5 * 10.0)
 }
 
 /// A16. θ = ω t: 50 rad/s for 2 s are 100 rad.
-pub(super) fn free_spin(lab: &Lab) -> Result<Finding, Failure> {
+fn free_spin(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("free_spin:50", 1e-5 * 100.0)
 }
 
@@ -43,12 +111,12 @@ fn drift(lab: &Lab, angular: bool) -> Result<Finding, Failure> {
 }
 
 /// See [`drift`].
-pub(super) fn linear_momentum(lab: &Lab) -> Result<Finding, Failure> {
+fn linear_momentum(lab: &Lab) -> Result<Finding, Failure> {
     drift(lab, false)
 }
 
 /// See [`drift`].
-pub(super) fn angular_momentum(lab: &Lab) -> Result<Finding, Failure> {
+fn angular_momentum(lab: &Lab) -> Result<Finding, Failure> {
     drift(lab, true)
 }
 
@@ -74,7 +142,7 @@ fn momentum(world: &World) -> Momentum {
 
 /// B14. The worst relative error of the distance that a box slides and a disc rolls down the incline
 /// of A1 and A3 in two seconds, against the discrete formula, for steps from 1/15 s to 1/1000 s.
-pub(super) fn large_steps(lab: &Lab) -> Result<Finding, Failure> {
+fn large_steps(lab: &Lab) -> Result<Finding, Failure> {
     let steps = [1.0 / 1000.0, 1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0, 1.0 / 30.0, 1.0 / 15.0];
     let mut found = sweep("dt (s)", &steps, |dt| {
         let mut worst = 0.0;
@@ -90,7 +158,7 @@ pub(super) fn large_steps(lab: &Lab) -> Result<Finding, Failure> {
 
 /// B14. A first-order scheme's error halves with the step: the ratio of the errors of the sliding distance
 /// against the continuous parabola, at 1/60 s and 1/120 s.
-pub(super) fn order(lab: &Lab) -> Result<Finding, Failure> {
+fn order(lab: &Lab) -> Result<Finding, Failure> {
     let (_, coarse) = slid(lab, "incline_slip", 1.0 / 60.0)?;
     let (_, fine) = slid(lab, "incline_slip", 1.0 / 120.0)?;
     Ok(Finding::new(coarse / fine, 2.0, 0.2))
@@ -115,7 +183,7 @@ fn slid(lab: &Lab, name: &str, dt: f64) -> Result<(f64, f64), Failure> {
 /// of h move it by g h² (1 + … + n) = g dt² (1 + 1/n)/2, 6 pm. `f32`s are 0.12 µm apart there: a scheme
 /// that adds this to a position of one `f32` stands still (below steps of 77 µs), one that keeps
 /// what the sum rounds away does not.
-pub(super) fn freeze(lab: &Lab) -> Result<Finding, Failure> {
+fn freeze(lab: &Lab) -> Result<Finding, Failure> {
     let (start, dt) = (1.5, 1e-6);
     let mut world = lab.world(thrown(start, dt))?;
     world.step()?;
@@ -124,7 +192,7 @@ pub(super) fn freeze(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// B14. The shortest step at which 2000 steps of a fall from rest at 1.5 m are right to 1 %.
-pub(super) fn tiny_steps(lab: &Lab) -> Result<Finding, Failure> {
+fn tiny_steps(lab: &Lab) -> Result<Finding, Failure> {
     let steps = [1.0 / 60.0, 1e-3, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6];
     sweep("dt (s)", &steps, |dt| {
         let mut world = lab.world(thrown(1.5, dt))?;

@@ -1,16 +1,61 @@
 //! B3 and B19: bodies that start in each other.
 
+use super::Required::{No, Yes};
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ, MAX_PUSH_SPEED};
 use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneShape};
 use std::f64::consts::TAU;
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B3.recovery",
+        "depth of a disc pushed out of the ground, against the spring's recursion, worst",
+        "m",
+        "half an f32 spacing per step",
+        soft_recovery,
+        Yes("the spring's own recursion"),
+    )
+    .swept_once(),
+    Case::new(
+        "B3.pile",
+        "ground load of a pile that started overlapping, last second of five",
+        "N",
+        "what the jitter limit of B5 does to momentum in a step",
+        pile,
+        Yes("ten boxes: the rate of four rows leaves nothing after 5 s"),
+    ),
+    Case::new(
+        "B19.peak",
+        "greatest rms speed in the over-full box",
+        "m/s",
+        "every contact at the cap",
+        confined_peak,
+        Yes("the push is capped"),
+    ),
+    Case::new(
+        "B19.decay",
+        "rms speed of the last second of ten, over the greatest",
+        "1",
+        "a hundredth of the energy",
+        confined_decay,
+        No("that it comes to rest follows from no promise: the problem has no solution"),
+    ),
+    Case::new(
+        "B19.share",
+        "greatest overlap over the mean",
+        "1",
+        "list: below 3",
+        confined_share,
+        No("how it is shared follows from no promise: the problem has no solution"),
+    ),
+];
 
 /// B3. A disc a quarter of a metre deep in the ground: the worst difference from the soft contact's own
 /// recovery over half a second, which a substep advances by d' = d − h min(γ β d, v_max) + γ_i g h²
 /// with ω = 2π 60 Hz, ζ = 10. Positions are read at 0.25 to 0.5 m, where `f32`s are 2⁻²⁵ m apart: 30
 /// steps may be half of that off each.
-pub(super) fn soft_recovery(lab: &Lab) -> Result<Finding, Failure> {
+fn soft_recovery(lab: &Lab) -> Result<Finding, Failure> {
     let disc = SceneBody::dynamic([0.0, 0.25], SceneShape::disc(0.5));
     let scene = Scene::new("recovery", vec![ground(20.0, 0.6), disc]);
     let h = scene.dt / lab.substeps();
@@ -33,7 +78,7 @@ fn recovered(depth: f64, h: f64) -> f64 {
 
 /// B3. A pile of ten boxes that start a quarter deep in each other ends at rest on the ground, whose
 /// load is the weight.
-pub(super) fn pile(lab: &Lab) -> Result<Finding, Failure> {
+fn pile(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("overlap_recovery", load_tolerance(10.0, 1.0 / 60.0))
 }
 
@@ -86,14 +131,14 @@ fn share(depths: impl Iterator<Item = f64>) -> f64 {
 
 /// B19. Kinetic energy is bounded: if each of the 12 contacts between the centre and a wall opens at
 /// the cap of 3 m/s, speeds grow from 0 to 36 m/s along x and y, √(2/3) of that in the mean.
-pub(super) fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
+fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
     let bound = (2.0f64 / 3.0).sqrt() * 12.0 * f64::from(MAX_PUSH_SPEED);
     Ok(Finding::new(confined(lab)?.peak, 0.0, bound))
 }
 
 /// B19. It decays: the rms speed of the last of ten seconds is below a tenth of the peak, the energy
 /// below a hundredth.
-pub(super) fn confined_decay(lab: &Lab) -> Result<Finding, Failure> {
+fn confined_decay(lab: &Lab) -> Result<Finding, Failure> {
     let found = confined(lab)?;
     // What never moved has nothing left.
     let left = if found.peak == 0.0 { 0.0 } else { found.end / found.peak };
@@ -101,7 +146,7 @@ pub(super) fn confined_decay(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// B19. The overlap is shared.
-pub(super) fn confined_share(lab: &Lab) -> Result<Finding, Failure> {
+fn confined_share(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(confined(lab)?.share, 1.0, 2.0))
 }
 

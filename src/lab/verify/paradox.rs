@@ -1,10 +1,46 @@
 //! B10 and B12: whether rest is possible at all, and Painlevé's rod.
 
+use super::Required::{No, Yes};
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::lab::reference::statics::rest_is_possible;
 use crate::lab::reference::{ContactProblem, ProblemBody, ProblemContact, Velocity};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B10.statics",
+        "least friction under leaning cards by statics, relative",
+        "1",
+        "1e-6: six digits",
+        cards_in_statics,
+        Yes("statics, no solver involved"),
+    ),
+    Case::new(
+        "B10.cards",
+        "least friction under leaning cards by simulation",
+        "1",
+        "1 %: overlap of a slop turns the cards",
+        cards_in_motion,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "B12.impulse",
+        "impulse on the end of Painlevé's rod",
+        "N s",
+        "twice the term of order h",
+        rod_impulse,
+        No("Gauss-Seidel on a matrix that friction makes indefinite need not converge"),
+    ),
+    Case::new(
+        "B12.end",
+        "speed of the end, which sticks",
+        "m/s",
+        "1 % of what it was",
+        rod_end,
+        No("Gauss-Seidel on a matrix that friction makes indefinite need not converge"),
+    ),
+];
 
 /// Angle of a card from the vertical (rad).
 const LEAN: f64 = 25.0 * std::f64::consts::PI / 180.0;
@@ -12,7 +48,7 @@ const LEAN: f64 = 25.0 * std::f64::consts::PI / 180.0;
 /// B10. Least friction at the feet of two leaning cards, by statics alone. Moments
 /// about the top of one card: tan φ (W/2 + P)/(W + P) for a load P on its top; here the worst of P = 0,
 /// W and 10 W, relative.
-pub(super) fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
+fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
     let mut worst = 0.0;
     for extra in [0.0, 1.0, 10.0] {
         let truth = LEAN.tan() * (0.5 + extra) / (1.0 + extra);
@@ -32,22 +68,8 @@ pub(super) fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
 fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
     let (sin, cos) = LEAN.sin_cos();
     let body = ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
-    let contact = |a: Option<u32>, b, n: [f64; 2], ra: [f64; 2], rb: [f64; 2], friction, manifold| {
-        let arm = |r: [f64; 2]| [r[0] * n[1] - r[1] * n[0], -r[0] * n[0] - r[1] * n[1]];
-        let (arm_a, arm_b) = (arm(ra), arm(rb));
-        let (gap, rebound, warm_impulse) = (0.0, 0.0, [0.0; 2]);
-        ProblemContact {
-            body_a: a,
-            body_b: b,
-            manifold,
-            normal: n,
-            arm_a,
-            arm_b,
-            gap,
-            friction,
-            rebound,
-            warm_impulse,
-        }
+    let contact = |a, b, normal, ra, rb, friction, manifold| {
+        ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
     };
     let (top, foot) = ([0.5 * sin, 0.5 * cos], [-0.5 * sin, -0.5 * cos]);
     let mirrored = |[x, y]: [f64; 2]| [-x, y];
@@ -68,7 +90,7 @@ const CARD: [f64; 2] = [2.0, 0.02];
 /// the outer one of its top, so its centre is t cos φ nearer to the line through the top: µ = tan φ/2 −
 /// t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and the threshold
 /// by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
-pub(super) fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {
+fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {
     let truth = 0.5 * LEAN.tan() - CARD[1] / (2.0 * CARD[0]);
     let found = bisect(0.0, 2.0 * truth, |friction| {
         let scene = cards(friction);
@@ -113,12 +135,12 @@ fn rod(lab: &Lab) -> Result<[f64; 2], Failure> {
 const ROD_STEP: f64 = 1e-3;
 
 /// B12. λn (N·s).
-pub(super) fn rod_impulse(lab: &Lab) -> Result<Finding, Failure> {
+fn rod_impulse(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(rod(lab)?[0], 0.3, 2.0 * 0.85 * G * ROD_STEP))
 }
 
 /// B12. The end's speed: below a hundredth of what it was.
-pub(super) fn rod_end(lab: &Lab) -> Result<Finding, Failure> {
+fn rod_end(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(rod(lab)?[1], 0.0, 0.01))
 }
 

@@ -1,22 +1,50 @@
 //! B4: heavy discs on light ones, and light ones on heavy.
 
+use super::Required::{No, Yes};
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
 
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B4.hundred",
+        "ground load under 100 kg on 1 kg, last second of five",
+        "N",
+        "what the jitter limit of B5 does to momentum in a step",
+        hundred,
+        Yes("(100/101) per sweep to the power 2400 is 4e-11"),
+    ),
+    Case::new(
+        "B4.heavy",
+        "greatest mass ratio, heavy on light, that rests",
+        "1",
+        "the list's 1e4 is to hold",
+        heavy_on_light,
+        No("the depth (1 + R) g/ω² exceeds the radius from R = 1776 on"),
+    ),
+    Case::new(
+        "B4.light",
+        "greatest mass ratio, light on heavy, that rests",
+        "1",
+        "the list's 1e4 is to hold",
+        light_on_heavy,
+        Yes("1/(1 + R) per sweep"),
+    ),
+];
+
 /// B4. A heavy disc of 100 kg on one of 1 kg, ground load in the last second.
-pub(super) fn hundred(lab: &Lab) -> Result<Finding, Failure> {
+fn hundred(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("mass_ratio:100", load_tolerance(101.0, 1.0 / 60.0))
 }
 
 /// B4. The greatest ratio, heavy on light, that rests after ten seconds.
-pub(super) fn heavy_on_light(lab: &Lab) -> Result<Finding, Failure> {
+fn heavy_on_light(lab: &Lab) -> Result<Finding, Failure> {
     sweep("mass ratio", RATIOS, |ratio| rests(lab, [1.0, ratio]))
 }
 
 /// B4. The same, light on heavy.
-pub(super) fn light_on_heavy(lab: &Lab) -> Result<Finding, Failure> {
+fn light_on_heavy(lab: &Lab) -> Result<Finding, Failure> {
     sweep("mass ratio", RATIOS, |ratio| rests(lab, [ratio, 1.0]))
 }
 

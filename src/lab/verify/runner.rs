@@ -67,7 +67,7 @@ pub fn select(wanted: &[String]) -> Result<Vec<&'static Case>, Error> {
         }
     }
     let chosen = |case: &&Case| wanted.is_empty() || wanted.iter().any(|name| names(name, case));
-    Ok(CASES.iter().filter(chosen).collect())
+    Ok(CASES.iter().copied().filter(chosen).collect())
 }
 
 /// What has just begun.

@@ -1,20 +1,136 @@
 //! A1–A4, A8 and B13: one body on a surface with friction.
 
+use super::Required::Yes;
 use super::lab::*;
-use super::{Failure, Finding, Lab};
+use super::{Case, Failure, Finding, Lab};
 use crate::engine::bodies::BodyKind;
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A1.stick",
+        "drift of a box on an incline, µ 2 % above tan θ, 60 s",
+        "m",
+        "list: 1e-4 m",
+        stick,
+        Yes("friction rows are rigid and warm started"),
+    ),
+    Case::new(
+        "A1.creep",
+        "its speed from 30 s to 60 s",
+        "m/s",
+        "list: 1e-6 m/s",
+        creep,
+        Yes("friction rows are rigid and warm started"),
+    ),
+    Case::new(
+        "A1.slip",
+        "distance slid with µ below tan θ, worst of all steps",
+        "m",
+        "list: 1 % of 0.297 m",
+        slip,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "A1.threshold",
+        "stick/slip angle over atan µ - 1, worst of µ = 0.1, 0.3, 0.6",
+        "1",
+        "list: 0.1 %",
+        slope_threshold,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "A1.split",
+        "load on the front corner of a sliding box",
+        "N",
+        "1 %, as for slip",
+        split,
+        Yes("two rows of one body converge in a few warm-started steps"),
+    ),
+    Case::new(
+        "A2.stop",
+        "distance of a box until friction stops it, worst of all steps",
+        "m",
+        "1 % of 1.5 m, as for slip",
+        stop,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "A3.roll",
+        "distance of a rolling disc, worst of all steps",
+        "m",
+        "list: 0.5 %",
+        roll,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "A3.slip",
+        "distance of a disc that slips, worst of all steps",
+        "m",
+        "0.5 %, as for rolling",
+        slipping_disc,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "A3.contact",
+        "speed of the rolling disc's contact point",
+        "m/s",
+        "list: 1e-4 m/s",
+        slip_speed,
+        Yes("preload takes away the sag that would lift the contact point"),
+    ),
+    Case::new(
+        "A3.threshold",
+        "least friction for rolling, tan θ/3",
+        "1",
+        "0.1 %, as for A1",
+        roll_threshold,
+        Yes("the contact point of a disc does not turn with it"),
+    ),
+    Case::new(
+        "A4.roll",
+        "speed 2/3 v0 once a sliding disc rolls, worst of µ = 0.05 … 2",
+        "m/s",
+        "arm shorter by half a slop: 4/9 δ/r v0",
+        slide_to_roll,
+        Yes("the impulse acts at the contact point: angular momentum is kept"),
+    ),
+    Case::new(
+        "A4.back",
+        "speed of a disc that back-spin brings back",
+        "m/s",
+        "arm shorter by half a slop: 7/9 δ/r v0",
+        back_spin,
+        Yes("the contact point of a disc does not turn with it"),
+    ),
+    Case::new(
+        "A8.conveyor",
+        "slip of a box on a moving belt until it is as fast",
+        "m",
+        "1 %, as for A1",
+        conveyor,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "B13.hop",
+        "height to which a sliding box is lifted",
+        "m",
+        "the slop; the convex relaxation lifts it by 0.033 m",
+        hop,
+        Yes("normal and friction rows are separate: no dilatation"),
+    ),
+];
 
 /// rad
 const SLOPE: f64 = 0.25;
 
 /// A1. µ = 0.26 > tan 0.25 = 0.2553: the worst drift in a minute.
-pub(super) fn stick(lab: &Lab) -> Result<Finding, Failure> {
+fn stick(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("incline_stick", 1e-4)
 }
 
 /// A1. The same, its speed from 30 s on.
-pub(super) fn creep(lab: &Lab) -> Result<Finding, Failure> {
+fn creep(lab: &Lab) -> Result<Finding, Failure> {
     let scene = lab.scene("incline_stick")?;
     let mut path = Vec::new();
     lab.run(scene, 60.0, |world| {
@@ -26,14 +142,14 @@ pub(super) fn creep(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// A1. µ = 0.24: 1 % of the distance a t²/2 = 0.297 m in two seconds.
-pub(super) fn slip(lab: &Lab) -> Result<Finding, Failure> {
+fn slip(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("incline_slip", 0.01 * 0.2973)
 }
 
 /// A1. The slope from which a unit box accelerates is atan µ, whatever speed it starts with: it slides
 /// if after two seconds it is faster than after one. Beyond the threshold by ε it gains µ g cos θ ε in
 /// that second: a gain of 5e-5 m/s tells the threshold to 1e-4 or better for µ ≥ 0.1.
-pub(super) fn slope_threshold(lab: &Lab) -> Result<Finding, Failure> {
+fn slope_threshold(lab: &Lab) -> Result<Finding, Failure> {
     let mut found = sweep("µ", &[0.1, 0.3, 0.6], |friction| {
         let tangent = bisect(0.0, 2.0 * friction, |tangent: f64| {
             let angle = tangent.atan();
@@ -59,7 +175,7 @@ fn worst(found: &Finding) -> f64 {
 
 /// A1. A box of 2 kg and side 1 that slides on the flat with µ = 0.3 leans forward: moments about its
 /// centre give N = m g/2 (1 ± µ H/w), 13 N in front.
-pub(super) fn split(lab: &Lab) -> Result<Finding, Failure> {
+fn split(lab: &Lab) -> Result<Finding, Failure> {
     let (mass, friction) = (2.0, 0.3);
     let shape = SceneShape::rectangle(0.5, 0.5).density(mass).friction(friction);
     let body = SceneBody::dynamic([0.0, 0.5], shape).moving([5.0, 0.0], 0.0);
@@ -78,22 +194,22 @@ pub(super) fn split(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// A2. Against the discrete sum, over 1.5 m.
-pub(super) fn stop(lab: &Lab) -> Result<Finding, Failure> {
+fn stop(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("sliding_stop", 0.01 * 1.5)
 }
 
 /// A3. 0.5 % of the 3.299 m that a = 2/3 g sin θ makes in two seconds.
-pub(super) fn roll(lab: &Lab) -> Result<Finding, Failure> {
+fn roll(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("rolling_incline", 0.005 * 3.299)
 }
 
 /// A3. 0.5 % of 3.979 m.
-pub(super) fn slipping_disc(lab: &Lab) -> Result<Finding, Failure> {
+fn slipping_disc(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("slipping_disc", 0.005 * 3.979)
 }
 
 /// A3. Speed of the rolling disc's contact point, from half a second on.
-pub(super) fn slip_speed(lab: &Lab) -> Result<Finding, Failure> {
+fn slip_speed(lab: &Lab) -> Result<Finding, Failure> {
     let mut fastest = 0.0;
     lab.run(lab.scene("rolling_incline")?, 2.0, |world| {
         if time(world) >= 0.5 {
@@ -110,7 +226,7 @@ fn disc_slip(world: &crate::engine::world::World) -> f64 {
 
 /// A3. The friction that rolling needs is tan θ/3. Below it by ε the contact slips by g sin θ ε t: 5e-4
 /// m/s after 2 s tell 1e-4.
-pub(super) fn roll_threshold(lab: &Lab) -> Result<Finding, Failure> {
+fn roll_threshold(lab: &Lab) -> Result<Finding, Failure> {
     let truth = SLOPE.tan() / 3.0;
     let friction = bisect(0.0, 2.0 * truth, |friction| {
         let world = lab.run(on_slope(SLOPE, friction, SceneShape::disc(0.5), 0.5), 2.0, |_| ())?;
@@ -126,7 +242,7 @@ const START: f64 = 5.0;
 /// contact is kept. What can be off is the arm: overlap by up to the slop shortens it by half of that,
 /// δ, and with v = v0/(1 + r²/(2 a²)), a = r − δ, the speed falls by 2/3 δ/r v0 … of first order; here
 /// r = 0.5 m.
-pub(super) fn slide_to_roll(lab: &Lab) -> Result<Finding, Failure> {
+fn slide_to_roll(lab: &Lab) -> Result<Finding, Failure> {
     let mut found = sweep("µ", &[0.05, 0.2, 0.6, 2.0], |friction| {
         let speed = rolling_speed(lab, friction, 0.0)?;
         Ok((speed, (speed - 2.0 / 3.0 * START).abs() <= 4.0 / 9.0 * ARM * START))
@@ -144,7 +260,7 @@ const ARM: f64 = 0.5 * SLOP / 0.5;
 
 /// A4. With back-spin w0 the speed becomes (2 v0 − r w0)/3: for r w0 = 3 v0 it comes back at v0/3. The
 /// shorter arm a = r − δ gives v = (v0 − r² w0/(2a))/(1 + r²/(2a²)): off by 7/9 δ/r v0.
-pub(super) fn back_spin(lab: &Lab) -> Result<Finding, Failure> {
+fn back_spin(lab: &Lab) -> Result<Finding, Failure> {
     let speed = rolling_speed(lab, 0.5, 3.0 * START / 0.5)?;
     Ok(Finding::new(speed, -START / 3.0, 7.0 / 9.0 * ARM * START))
 }
@@ -159,7 +275,7 @@ fn rolling_speed(lab: &Lab, friction: f64, back_spin: f64) -> Result<f64, Failur
 
 /// A8. A box laid on a belt of speed V slips on it by Σ (V − j µ g h) h until it has caught up:
 /// V²/(2 µ g) − V h/2.
-pub(super) fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
+fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
     let (speed, friction) = (2.0, 0.5);
     let belt = SceneShape::rectangle(50.0, 0.5).friction(friction);
     let belt = SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], belt).moving([speed, 0.0], 0.0);
@@ -173,7 +289,7 @@ pub(super) fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
 
 /// B13. A box that slides with µ = 0.5 stays on the ground. The convex relaxation of Coulomb's law has
 /// un = µ |ut| instead and lifts it: at 2 m/s by 3.3 cm.
-pub(super) fn hop(lab: &Lab) -> Result<Finding, Failure> {
+fn hop(lab: &Lab) -> Result<Finding, Failure> {
     let friction = 0.5;
     let shape = SceneShape::rectangle(0.5, 0.25).friction(friction);
     let body = SceneBody::dynamic([0.0, 0.25], shape).moving([2.0, 0.0], 0.0);

@@ -3,6 +3,7 @@
 use super::{Frictionless, Rule, Turned};
 use crate::engine::constraints::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
+use std::f32::consts::TAU;
 
 /// The coefficients of a spring of angular frequency ω and damping ratio ζ, integrated
 /// implicitly over h (`catto2011`):
@@ -28,6 +29,13 @@ impl Softness {
         let a = h * omega * denominator;
         Softness { bias_rate: omega / denominator, mass_scale: a / (1.0 + a), impulse_scale: 1.0 / (1.0 + a) }
     }
+}
+
+/// ω of contacts between dynamic bodies and of those with others (rad/s), where `hertz` (Hz) is set:
+/// at most `fraction` of the rate of substeps of `h` (s), and twice as much with others.
+pub fn angular_frequencies(hertz: f32, fraction: f32, h: f32) -> [f32; 2] {
+    let omega = TAU * hertz.min(fraction / h);
+    [omega, 2.0 * omega]
 }
 
 /// The soft row for overlap; for a gap the rigid row that closes it, no more.
