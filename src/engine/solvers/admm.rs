@@ -34,7 +34,7 @@ use crate::engine::constraints::rules::Baumgarte;
 use crate::engine::constraints::sweep::Sweep;
 use crate::engine::constraints::{Passes, PointVector, System, cone};
 use crate::engine::lanes::Lanes;
-use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -45,14 +45,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: false },
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
-        Parameter {
-            name: "baumgarte",
-            unit: "",
-            default: BAUMGARTE,
-            range: [0.0, 1.0],
-            meaning: "share of the overlap that is removed per step",
-            trials: &[],
-        },
+        Parameter::BAUMGARTE,
         Parameter {
             name: "penalty",
             unit: "",

@@ -16,12 +16,8 @@ use super::{Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
-use crate::engine::params::{
-    Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, MAX_PUSH_SPEED,
-    Parameter, Parameters,
-};
-use std::f32::consts::TAU;
+use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -32,22 +28,8 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
     parameters: &[
-        Parameter {
-            name: "contact_hertz",
-            unit: "Hz",
-            default: CONTACT_HERTZ,
-            range: [1e-3, 1e6],
-            meaning: "stiffness of contacts; at most an eighth of the substep rate acts",
-            trials: &[15.0, 30.0, 60.0, 120.0],
-        },
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: MAX_PUSH_SPEED,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
+        Parameter::CONTACT_HERTZ,
+        Parameter::PUSH_SPEED,
         Parameter {
             name: super::RECYCLE_DISTANCE,
             unit: "m",
@@ -57,7 +39,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    softness: Some(angular_frequencies),
+    softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[],
@@ -67,7 +49,8 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let soft = Soft::new(frequencies(hertz, h), CONTACT_DAMPING_RATIO, push_speed, h).frictionless();
+    let omega = angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h);
+    let soft = Soft::new(omega, CONTACT_DAMPING_RATIO, push_speed, h).frictionless();
     let rigid = Rigid::rule(h);
     for substep in 0..budget.substeps {
         if substep == 0 {
@@ -86,13 +69,4 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.end_substep(substep);
     }
-}
-
-fn frequencies(hertz: f32, h: f32) -> [f32; 2] {
-    let omega = TAU * hertz.min(CONTACT_HERTZ_FRACTION / h);
-    [omega, 2.0 * omega]
-}
-
-fn angular_frequencies(parameters: &Parameters, h: f32) -> [f32; 2] {
-    frequencies(parameters[0], h)
 }

@@ -26,7 +26,7 @@ use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::point_vector::{difference, dot, scaled, sum, update};
 use crate::engine::constraints::rules::Baumgarte;
 use crate::engine::constraints::{Passes, SweepOrder};
-use crate::engine::params::{BAUMGARTE, Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -36,14 +36,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
     uses: Uses { velocity: true, relax: false, position: false },
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
-    parameters: &[Parameter {
-        name: "baumgarte",
-        unit: "",
-        default: BAUMGARTE,
-        range: [0.0, 1.0],
-        meaning: "share of the overlap that is removed per step",
-        trials: &[],
-    }],
+    parameters: &[Parameter::BAUMGARTE],
     softness: None,
     by_levels: false,
     kept: KeptSize { per_point: 0, per_body: 0 },

@@ -22,7 +22,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::{Bearing, Rigid, Soft};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// See the [module](self).
@@ -42,22 +42,8 @@ pub static SOLVER: Variant = Variant {
             meaning: "frequency of contacts, as a part of the substep rate",
             trials: &[],
         },
-        Parameter {
-            name: "damping_ratio",
-            unit: "",
-            default: CONTACT_DAMPING_RATIO,
-            range: [0.0, 1e3],
-            meaning: "damping of contacts; 1 is critical",
-            trials: &[],
-        },
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: MAX_PUSH_SPEED,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
+        Parameter::DAMPING_RATIO,
+        Parameter::PUSH_SPEED,
         Parameter {
             name: "height",
             unit: "",

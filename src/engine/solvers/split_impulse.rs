@@ -29,12 +29,8 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter {
-        name: "correction",
-        unit: "",
-        default: 0.2,
-        range: [0.0, 1.0],
         meaning: "share of the overlap that pseudo-velocities remove per step",
-        trials: &[],
+        ..Parameter::CORRECTION
     }],
     softness: None,
     by_levels: false,

@@ -29,14 +29,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: false, relax: false, position: true },
     iterations: |k| Budget { substeps: 1, position_iterations: k, ..SOLVER.budget },
     parameters: &[
-        Parameter {
-            name: "push_speed",
-            unit: "m/s",
-            default: 4.0,
-            range: [0.0, 1e3],
-            meaning: "fastest speed at which overlap is pushed apart",
-            trials: &[],
-        },
+        Parameter::push_speed(4.0),
         Parameter {
             name: "compliance",
             unit: "m/N",

@@ -47,7 +47,7 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "list: below 3",
         confined_share,
-        No("how it is shared follows from no promise: the problem has no solution"),
+        Yes("springs bear a load however deep: the deepest pushes hardest"),
     ),
 ];
 
