@@ -1,6 +1,6 @@
 //! B4: heavy discs on light ones, and light ones on heavy.
 
-use super::Required::{No, Yes};
+use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
