@@ -64,7 +64,7 @@ fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
         write(&root, name, (x + 10, 44), 14, HPos::Left)?;
         x += 34 + 8 * name.len() as i32;
     }
-    write(&root, "number: substeps; contacts at 30 Hz unless told", (x, 44), 14, HPos::Left)?;
+    write(&root, "number: substeps; ′: contacts at 60 Hz, not 30; shim has its own", (x, 44), 14, HPos::Left)?;
     for (i, (name, outcomes)) in scenes.iter().enumerate() {
         let (column, row) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
         panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), name, outcomes)?;
@@ -107,7 +107,7 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     let failed: Vec<String> =
         failed.map(|(k, o)| format!("{} {}", ENGINES[k], setting(&o.contender))).collect();
     if !failed.is_empty() {
-        let line = format!("falls: {}", failed.join(", "));
+        let line = format!("fails: {}", failed.join(", "));
         for (i, line) in wrapped(&line, LINE).iter().enumerate() {
             write(area, line, (corner.0 + 8, bottom + 44 + 14 * i as i32), 11, HPos::Left)?;
         }
@@ -116,6 +116,5 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
 }
 
 fn setting(contender: &Contender) -> String {
-    let stiffer = if contender.hertz == 30.0 { String::new() } else { format!(" ({} Hz)", contender.hertz) };
-    format!("{}{stiffer}", contender.substeps)
+    format!("{}{}", contender.substeps, if contender.hertz == 30.0 { "" } else { "′" })
 }
