@@ -1,7 +1,8 @@
 //! The law of rest: piles of a few boxes stay where they are at the standard budget.
 
-use simpulse::engine::solvers::{Law, VARIANTS, Variant};
+use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
 use simpulse::engine::world::World;
+use simpulse::lab::scenes::Scene;
 
 /// Piles of a few boxes: a stack, a pyramid, and one box held by friction.
 const PILES: [&str; 3] = ["stack:10", "pyramid:4", "incline_stick"];
@@ -44,4 +45,24 @@ fn not_every_solver_keeps_them() {
     // Else the bound would hold nobody to anything.
     let variant = VARIANTS.iter().find(|v| v.name == "projection").unwrap();
     assert!(!variant.promises(Law::Rest) && creep("stack:10", variant) > CREEP);
+}
+
+/// Forty smooth discs in a row along the ground, which a tenth of their weight presses against a wall: as long a
+/// chain as a column of forty, and no load that tells it.
+#[test]
+fn a_pressed_row_does_not_swing_on_its_preload() {
+    let fixed = |position: [f64; 2], half: [f64; 2]| {
+        let shape = format!(r#"{{"box":{{"half":[{},{}]}},"friction":0}}"#, half[0], half[1]);
+        format!(r#"{{"type":"static","position":[{},{}],"shapes":[{shape}]}}"#, position[0], position[1])
+    };
+    let mut bodies = vec![fixed([0.0, -1.0], [200.0, 1.0]), fixed([-1.0, 5.0], [1.0, 5.0])];
+    bodies.extend((0..40).map(|i| {
+        let shape = r#"{"circle":{"radius":0.5},"friction":0}"#;
+        format!(r#"{{"type":"dynamic","position":[{},0.5],"shapes":[{shape}]}}"#, 0.5 + f64::from(i))
+    }));
+    let text = format!(r#"{{"name":"row","gravity":[-1,-10],"bodies":[{}]}}"#, bodies.join(","));
+    let scene = Scene::from_json(&text, "row.json".as_ref()).unwrap();
+    let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 900);
+    let fastest = world.bodies.velocity_x.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+    assert!(fastest < 1e-4, "{fastest} m/s");
 }

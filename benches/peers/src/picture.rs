@@ -64,7 +64,13 @@ fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
         write(&root, name, (x + 10, 44), 14, HPos::Left)?;
         x += 34 + 8 * name.len() as i32;
     }
-    write(&root, "number: substeps; ′: contacts at 60 Hz, not 30; shim has its own", (x, 44), 14, HPos::Left)?;
+    write(
+        &root,
+        "number: substeps; ′: contacts at 60 Hz, not 30; shim has its own",
+        (x, 44),
+        14,
+        HPos::Left,
+    )?;
     for (i, (name, outcomes)) in scenes.iter().enumerate() {
         let (column, row) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
         panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), name, outcomes)?;

@@ -154,3 +154,23 @@ fn preload_segment<L: Lanes>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_column_is_longer_than_all_bodies_or_the_limit() {
+        let row = |inverse: f32| BodyRow { velocity: [0.0, 0.0, 0.0, inverse], ..BodyRow::default() };
+        let column = |inverses: &[f32]| {
+            let rows: Vec<BodyRow> = inverses.iter().map(|&inverse| row(inverse)).collect();
+            longest_column(&rows, 300.0)
+        };
+        // The ground and the inert row have no inverse mass.
+        assert_eq!(column(&[0.0, 1.0, 1.0, 0.0]), 2.0 * SAFETY);
+        assert_eq!(column(&[0.0, 1.0, 0.01]), 2.0 * SAFETY * 10.0);
+        assert_eq!(column(&[1.0; 99]), 99.0 * SAFETY);
+        assert_eq!(column(&[1.0; 1000]), 300.0);
+        assert_eq!(column(&[0.0]), 1.0);
+    }
+}

@@ -135,3 +135,34 @@ impl NormalRule for Bearing {
         [beyond.select_positive(kept, constant), slope]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn springs_bear_at_any_depth_what_their_stiffness_says() {
+        let springs = Soft::new([900.0, 1800.0], 10.0, 3.0, 1.0 / 960.0);
+        let mass = 2.0;
+        let bears = |depth: f32| mass * 900.0f32.powi(2) * depth / 960.0;
+        // What remains of an impulse at rest, after the soft row and after the one that bears.
+        let kept = |depth: f32| {
+            let after = |rule: [f32; 2]| rule[0] / bears(depth) - 1.0;
+            let row = [-depth, mass, bears(depth)];
+            [
+                after(springs.line::<f32>(false, row[0], row[1], row[2])),
+                after(Bearing(springs).line::<f32>(false, row[0], row[1], row[2])),
+            ]
+        };
+        for shallow in [1e-4, 1e-2, 0.06] {
+            assert!(kept(shallow).iter().all(|change| change.abs() < 1e-5), "{shallow}: {:?}", kept(shallow));
+        }
+        for deep in [0.1, 0.5, 10.0] {
+            let [soft, bearing] = kept(deep);
+            assert!(soft < -1e-3 && bearing.abs() < 1e-5, "{deep}: {soft} {bearing}");
+        }
+        // Without a load both push at γ_m u.
+        let unloaded = Bearing(springs).line::<f32>(false, -1.0, mass, 0.0);
+        assert_eq!(unloaded, springs.line(false, -1.0, mass, 0.0));
+    }
+}
