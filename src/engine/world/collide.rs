@@ -136,17 +136,23 @@ impl Narrow {
     /// before their shapes are read; where most do, the lists of the last step still hold.
     fn list_jobs(&mut self, contacts: usize) {
         let cull = 4 * contacts < 3 * self.candidates.len();
-        let recycles = self.recycled.is_used();
-        if self.jobs_are_current && !cull && !recycles {
-            return;
+        if self.recycled.is_used() {
+            self.jobs_are_current = false;
+            self.list::<true>(cull);
+        } else if !self.jobs_are_current || cull {
+            self.jobs_are_current = !cull;
+            self.list::<false>(cull);
         }
-        self.jobs_are_current = !cull && !recycles;
+    }
+
+    /// The same; `RECYCLES`: some manifolds may be kept.
+    fn list<const RECYCLES: bool>(&mut self, cull: bool) {
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                let is_kept = self.recycled.keeps(name);
+                let is_kept = RECYCLES && self.recycled.keeps(name);
                 let is_near = is_kept | !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
                 if !is_near & (candidate.contact != NO_CONTACT) {
                     self.is_changed = true;
