@@ -66,3 +66,20 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
     let fastest = world.bodies.velocity_x.iter().fold(0.0f32, |most, v| most.max(v.abs()));
     assert!(fastest < 1e-4, "{fastest} m/s");
 }
+
+/// Lemke's method and Newton's end in the same state of the contact law, far closer to it than sweeps do.
+#[test]
+fn lemke_and_newton_agree_on_a_stack() {
+    let direct = find("direct").unwrap();
+    let scene = crate::common::scene("stack:5");
+    let heights = [0.0, 1.0].map(|lemke| {
+        let mut settings = crate::common::settings(direct);
+        direct.set(&mut settings.parameters, "lemke", lemke).unwrap();
+        let world = crate::common::run(&scene, settings, 120);
+        (1..world.bodies.len()).map(|i| world.bodies.position_y[i]).collect::<Vec<_>>()
+    });
+    for (i, (newton, lemke)) in heights[0].iter().zip(&heights[1]).enumerate() {
+        let truth = i as f32 + 0.5;
+        assert!((newton - truth).abs() < 1e-6 && (lemke - truth).abs() < 1e-6, "{i}: {newton} {lemke}");
+    }
+}

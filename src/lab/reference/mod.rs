@@ -1,21 +1,21 @@
 //! What the answer should have been: exact and certified solutions of one contact problem.
 //!
 //! Reading order: [`problem`] states the problem, [`residual`] the law and how far from it an
-//! answer is. [`stewart_trinkle`] solves small problems exactly through [`lcp`] and [`dense`];
+//! answer is. [`stewart_trinkle`] solves small problems exactly by Lemke's method
+//! ([`crate::engine::constraints::lemke`]);
 //! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
 //! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
 //! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by
 //! hand, [`rates`] measures convergence in iterations and in the step size, [`baseline`] that of
 //! Gauss–Seidel.
 //!
-//! Nothing here knows the simulation's own solvers, so that it can judge them.
+//! Nothing here knows the simulation's own solvers, so that it can judge them; it shares Lemke's method with
+//! `direct`, and certifies what that finds.
 
 pub mod baseline;
 pub mod certify;
-pub mod dense;
 pub mod frozen;
 pub mod gallery;
-pub mod lcp;
 pub mod newton;
 pub mod nncg;
 pub mod nnls;

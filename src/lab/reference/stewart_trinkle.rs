@@ -22,10 +22,10 @@
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
 
-use super::dense::Matrix;
-use super::lcp::{Outcome, lemke};
 use super::problem::{ContactProblem, Pair};
 use super::residual::{Target, natural_map};
+use crate::engine::constraints::lemke::{Outcome, lemke};
+use crate::engine::constraints::matrix::Matrix;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;

@@ -14,7 +14,7 @@
 //! `x_B + T x_N = q̄`. The lexicographic rule compares rows of (q̄ | B⁻¹) / T_·c; the columns of B⁻¹
 //! are those of w₁ … w_n: unit vectors while basic, columns of T otherwise.
 
-use super::dense::{Lu, Matrix};
+use super::matrix::{Lu, Matrix};
 use std::cmp::Ordering;
 
 /// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
