@@ -82,7 +82,7 @@ struct Given {
     batches: Batches,
     bounces: Bounces,
     contacts: Vec<Contact>,
-    increments: Vec<Quad>,
+    increments: Vec<[f32; 4]>,
 }
 
 impl Given {
@@ -92,7 +92,7 @@ impl Given {
             batches,
             bounces: Bounces::default(),
             contacts: vec![Contact::default(); CONTACTS],
-            increments: vec![Quad::default(); ROWS],
+            increments: vec![[0.0; 4]; ROWS],
         }
     }
 

@@ -34,9 +34,8 @@
 //! λ₁ = max(0, x₂ < 0 ? q₁ : x₁)      λ₂ = max(0, x₁ < 0 ? q₂ : x₂)
 //! ```
 //!
-//! Where A is close to singular (its
-//! determinant below a thousandth of a₁₁ a₂₂) or there is one point only, rows are solved one after
-//! the other.
+//! Where A is close to singular (its determinant below a thousandth of a₁₁ a₂₂) or there is one point only,
+//! rows are solved one after the other.
 //!
 //! Friction rows come first, bounded by the normal impulses so far, so that normal rows have the last word
 //! (`catto2024solver2d`, `solve_pgs_ngs_block`); or they come last, bounded by the new ones, so that the cone

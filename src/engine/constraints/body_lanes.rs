@@ -9,7 +9,7 @@
 
 use super::graph::Graph;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Indices, LaneVec, held};
+use crate::engine::lanes::{Indices, LaneVec, LaneWidth, held};
 
 /// Bodies that are solved together.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ pub(super) struct Ends {
 #[derive(Clone, Debug, Default)]
 pub(super) struct BodyLanes {
     /// Lanes per batch.
-    pub width: usize,
+    pub width: LaneWidth,
     /// In the order in which they are solved.
     pub batches: Vec<BodyBatch>,
     /// Rows of bodies; the inert one in an empty lane. `[batches × width]`
@@ -85,7 +85,7 @@ impl BodyLanes {
     /// Gives lanes to the bodies that have contacts and are dynamic, by colours or `one_by_one`; `inert` is the number of bodies.
     pub fn assign(
         &mut self,
-        width: usize,
+        width: LaneWidth,
         graph: &Graph,
         contacts: &[Contact],
         inert: u32,
@@ -93,6 +93,7 @@ impl BodyLanes {
         one_by_one: bool,
     ) {
         self.width = width;
+        let width = width.lanes();
         self.order.clear();
         self.order.extend((0..inert).filter(|&b| is_dynamic(b) && !graph.edges_of(b as usize).is_empty()));
         self.color(graph, inert);

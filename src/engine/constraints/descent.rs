@@ -22,6 +22,7 @@
 use super::body_lanes::{BodyLanes, Ends};
 use super::graph::Graph;
 use super::kept::Kept;
+use super::pass::at_width;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
 
@@ -64,18 +65,6 @@ pub(super) struct Bodies<'a> {
     pub friction: bool,
 }
 
-/// Runs a pass at the lanes of `$width`.
-macro_rules! at_width {
-    ($width:expr, $pass:ident($($arg:expr),*)) => {
-        match $width {
-            1 => $pass::<f32>($($arg),*),
-            4 => $pass::<wide::f32x4>($($arg),*),
-            8 => $pass::<wide::f32x8>($($arg),*),
-            _ => $pass::<wide::f32x16>($($arg),*),
-        }
-    };
-}
-
 impl Descent {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
@@ -84,19 +73,26 @@ impl Descent {
     }
 
     /// Gives bodies their lanes, by colours or one by one.
-    pub(super) fn assign(&mut self, on: &Bodies<'_>, graph: &Graph, width: LaneWidth, one_by_one: bool) {
-        let inert = on.rows.len() as u32 - 1;
-        let is_dynamic = |body: u32| on.rows[body as usize].velocity[3] > 0.0;
-        let width = if one_by_one { 1 } else { width.lanes() };
-        self.lanes.assign(width, graph, on.contacts, inert, is_dynamic, one_by_one);
+    pub(super) fn assign(
+        &mut self,
+        rows: &[BodyRow],
+        contacts: &[Contact],
+        graph: &Graph,
+        width: LaneWidth,
+        one_by_one: bool,
+    ) {
+        let inert = rows.len() as u32 - 1;
+        let is_dynamic = |body: u32| rows[body as usize].velocity[3] > 0.0;
+        let width = if one_by_one { LaneWidth::W1 } else { width };
+        self.lanes.assign(width, graph, contacts, inert, is_dynamic, one_by_one);
         let BodyLanes { batches, ends, contacts, .. } = &self.lanes;
         for (records, vectors) in [
             (&mut self.bodies, BODY * batches.len()),
-            (&mut self.ends, RECORD * ends.contact.len() / width),
-            (&mut self.contacts, RECORD * contacts.contact.len() / width),
+            (&mut self.ends, RECORD * ends.contact.len() / width.lanes()),
+            (&mut self.contacts, RECORD * contacts.contact.len() / width.lanes()),
         ] {
             records.clear();
-            records.resize((vectors * width).div_ceil(16), Block::default());
+            records.resize((vectors * width.lanes()).div_ceil(16), Block::default());
         }
     }
 

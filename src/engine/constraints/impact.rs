@@ -31,7 +31,7 @@ use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::restitution::{largest, point, rebound};
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use glam::Vec2;
 use std::cell::Cell;
 
@@ -148,7 +148,7 @@ fn load<L: Lanes>(
     layout: &Layout,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    increments: &[Quad],
+    increments: &[[f32; 4]],
     &Load { h, dt }: &Load,
 ) {
     let SegmentRecords { contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
@@ -163,7 +163,7 @@ fn load<L: Lanes>(
         for (lane, &contact) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
             let Contact { restitution, manifold, .. } = &contacts[contact as usize];
             let along = |row: u32| {
-                let [x, y, ..] = increments[row as usize].0;
+                let [x, y, ..] = increments[row as usize];
                 manifold.normal.dot(Vec2::new(x, y))
             };
             let (a, b) = (along(row_a.entries()[lane]) / h, along(row_b.entries()[lane]) / h);

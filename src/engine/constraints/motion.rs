@@ -12,7 +12,7 @@
 
 use super::features::Features;
 use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::lanes::{BodyRow, Quad, held};
+use crate::engine::lanes::{BodyRow, held};
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
@@ -57,7 +57,7 @@ pub struct MotionInput {
 #[derive(Debug, Default)]
 pub struct Motion {
     /// What forces add to a velocity in one substep: `[h aₓ, h a_y, h α, 0]`.
-    velocity_increment: Vec<Quad>,
+    velocity_increment: Vec<[f32; 4]>,
     /// Damping factors `[1/(1+hc), 1/(1+hc), 1/(1+hc_ω), 1]`; empty when nothing is damped.
     damp: Vec<[f32; 4]>,
     /// Velocity before constraints acted in this substep.
@@ -92,7 +92,7 @@ impl Motion {
                 velocity: [bodies.velocity_x[i], bodies.velocity_y[i], bodies.angular_velocity[i], inv_mass],
                 delta: [0.0, 0.0, 0.0, inv_inertia],
             });
-            self.velocity_increment.push(Quad(if bodies.kind[i] == BodyKind::Dynamic {
+            self.velocity_increment.push(if bodies.kind[i] == BodyKind::Dynamic {
                 let scale = bodies.gravity_scale[i];
                 [
                     h * (gravity[0] * scale + bodies.force_x[i] * inv_mass),
@@ -102,7 +102,7 @@ impl Motion {
                 ]
             } else {
                 [0.0; 4]
-            }));
+            });
             if damped {
                 let linear = 1.0 / (1.0 + h * bodies.linear_damping[i]);
                 let angular = 1.0 / (1.0 + h * bodies.angular_damping[i]);
@@ -111,7 +111,7 @@ impl Motion {
             }
         }
         rows.push(BodyRow::default());
-        self.velocity_increment.push(Quad::default());
+        self.velocity_increment.push([0.0; 4]);
         if damped {
             self.damp.push([1.0; 4]);
         }
@@ -124,7 +124,7 @@ impl Motion {
     }
 
     /// Changes of velocity in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.
-    pub fn velocity_increments(&self) -> &[Quad] {
+    pub fn velocity_increments(&self) -> &[[f32; 4]] {
         &self.velocity_increment
     }
 
@@ -152,14 +152,14 @@ impl Motion {
         if self.damp.is_empty() {
             for ((row, velocity_increment), free) in each {
                 let v = f32x4::from(row.velocity);
-                let new = v + f32x4::from(velocity_increment.0);
+                let new = v + f32x4::from(*velocity_increment);
                 row.velocity = guess(v, new, f32x4::from(*free)).to_array();
                 *free = new.to_array();
             }
         } else {
             for (((row, velocity_increment), free), damp) in each.zip(&self.damp) {
                 let v = f32x4::from(row.velocity);
-                let new = v * f32x4::from(*damp) + f32x4::from(velocity_increment.0);
+                let new = v * f32x4::from(*damp) + f32x4::from(*velocity_increment);
                 row.velocity = guess(v, new, f32x4::from(*free)).to_array();
                 *free = new.to_array();
             }

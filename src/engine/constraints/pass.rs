@@ -9,7 +9,7 @@ use super::bounces::Bounces;
 use super::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
 use super::kept::Kept;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth, Lanes, Quad};
+use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 
 /// What a pass runs on: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -26,7 +26,7 @@ pub struct PassInput<'a> {
     /// Numbers that the solver keeps per contact point and per body.
     pub kept: &'a mut Kept,
     /// Changes of velocity in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
-    pub increments: &'a [Quad],
+    pub increments: &'a [[f32; 4]],
 }
 
 /// What a pass requests per contact.
@@ -73,6 +73,19 @@ pub enum PassMode {
     /// Inverse masses have changed: only effective masses are recomputed.
     Masses,
 }
+
+/// Calls a function that is compiled per width alone, at the lanes of `$width`.
+macro_rules! at_width {
+    ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
+        match $width {
+            LaneWidth::W1 => $($pass)::+::<f32>($($arg),*),
+            LaneWidth::W4 => $($pass)::+::<wide::f32x4>($($arg),*),
+            LaneWidth::W8 => $($pass)::+::<wide::f32x8>($($arg),*),
+            LaneWidth::W16 => $($pass)::+::<wide::f32x16>($($arg),*),
+        }
+    };
+}
+pub(super) use at_width;
 
 /// A pass over contacts, compiled per width and features.
 ///

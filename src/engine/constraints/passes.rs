@@ -384,17 +384,21 @@ impl<'a> Passes<'a> {
         self.run(Phase::Prepare, &Preload { springs, share, rate });
     }
 
-    /// Begins a substep of block descent, see [`super::descent`]: bodies get their lanes and go to their inertial
-    /// place; of multipliers and of penalties remains a share.
+    /// Gives bodies their lanes for block descent, see [`super::descent`]: once a step, before all else of it.
+    pub fn assign_descent(&mut self) {
+        if !self.input.phases.runs(Phase::Solve) {
+            return;
+        }
+        self.build_graph();
+        let Workspace { rows, graph, descent, lanes, .. } = &mut *self.work;
+        descent.assign(rows, self.contacts, graph, self.width, lanes.segments().is_empty());
+    }
+
+    /// Begins a substep of block descent: bodies go to their inertial place; of multipliers and of penalties
+    /// remains a share.
     pub fn begin_descent(&mut self, keep: f32, keep_penalty: f32) {
         let (h, motion) = (self.input.h, self.motion_after_velocities());
-        if self.input.phases.runs(Phase::Solve) {
-            self.build_graph();
-        }
-        let width = self.width;
-        let one_by_one = self.work.lanes.segments().is_empty();
-        self.with_descent(Phase::Solve, |descent, bodies, graph| {
-            descent.assign(bodies, graph, width, one_by_one);
+        self.with_descent(Phase::Solve, |descent, bodies| {
             descent.begin(bodies, h, motion, [keep, keep_penalty]);
         });
     }
@@ -402,28 +406,28 @@ impl<'a> Passes<'a> {
     /// Body pass: every body takes a step of block descent; of errors at the start of the substep the share
     /// `alpha` is left alone.
     pub fn descend(&mut self, phase: Phase, alpha: f32) {
-        self.with_descent(phase, |descent, bodies, _| descent.descend(bodies, alpha));
+        self.with_descent(phase, |descent, bodies| descent.descend(bodies, alpha));
         self.count_sweep(2);
     }
 
     /// Constraint pass: multipliers take forces over, and penalties grow by `beta` (N/m²) times error.
     pub fn raise_penalties(&mut self, phase: Phase, alpha: f32, beta: f32) {
-        self.with_descent(phase, |descent, bodies, _| descent.raise(bodies, alpha, beta));
+        self.with_descent(phase, |descent, bodies| descent.raise(bodies, alpha, beta));
     }
 
     /// Body pass: v ← v + (x − y)/h, y being the inertial place.
     pub fn velocities_of_descent(&mut self) {
         let h = self.input.h;
-        self.with_descent(Phase::Solve, |descent, bodies, _| descent.velocities(bodies, h));
+        self.with_descent(Phase::Solve, |descent, bodies| descent.velocities(bodies, h));
     }
 
-    fn with_descent(&mut self, phase: Phase, work: impl FnOnce(&mut Descent, &mut Bodies<'_>, &Graph)) {
+    fn with_descent(&mut self, phase: Phase, work: impl FnOnce(&mut Descent, &mut Bodies<'_>)) {
         if !self.input.phases.runs(phase) {
             return;
         }
-        let Workspace { rows, graph, kept, descent, .. } = &mut *self.work;
+        let Workspace { rows, kept, descent, .. } = &mut *self.work;
         let Features { rotation, friction, .. } = self.input.features;
-        work(descent, &mut Bodies { rows, kept, contacts: self.contacts, rotation, friction }, graph);
+        work(descent, &mut Bodies { rows, kept, contacts: self.contacts, rotation, friction });
         // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
         let (contacts, size) = (self.contacts.len() as f64, 4.0 * self.work.kept.size().per_point as f64);
         self.clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);

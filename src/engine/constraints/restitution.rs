@@ -34,7 +34,7 @@ use super::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::Vec2;
 use std::cell::Cell;
@@ -118,7 +118,7 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     batches: &mut Batches,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    increments: &[Quad],
+    increments: &[[f32; 4]],
     h: f32,
 ) -> f32 {
     bounces.reserve(batches.lanes(), N::POINTS);
@@ -141,7 +141,7 @@ fn prepare_segment<L: Lanes>(
     layout: &Layout,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    increments: &[Quad],
+    increments: &[[f32; 4]],
     h: f32,
 ) -> f32 {
     let mut most = L::zero();
@@ -160,8 +160,7 @@ fn prepare_segment<L: Lanes>(
             } else {
                 (0.0, Vec2::ZERO)
             };
-            let increment =
-                |row: u32| Vec2::new(increments[row as usize].0[0], increments[row as usize].0[1]);
+            let increment = |row: u32| Vec2::new(increments[row as usize][0], increments[row as usize][1]);
             let [a, b] = [row_a, row_b].map(|row| increment(row.entries()[lane]));
             floats[lane] = -n.dot(b - a) / h;
             floats[L::WIDTH + lane] = e;

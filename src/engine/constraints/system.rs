@@ -9,23 +9,12 @@
 
 use super::batches::Batches;
 use super::features::{Features, Layout};
+use super::pass::at_width;
 use super::point_passes::{self, On};
 use super::point_vector::PointVector;
 use crate::engine::clock::Clock;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
-
-/// Runs a pass at the lanes of `$width`.
-macro_rules! at_width {
-    ($width:expr, $pass:ident($($arg:expr),*)) => {
-        match $width {
-            LaneWidth::W1 => point_passes::$pass::<f32>($($arg),*),
-            LaneWidth::W4 => point_passes::$pass::<wide::f32x4>($($arg),*),
-            LaneWidth::W8 => point_passes::$pass::<wide::f32x8>($($arg),*),
-            LaneWidth::W16 => point_passes::$pass::<wide::f32x16>($($arg),*),
-        }
-    };
-}
 
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];
@@ -56,13 +45,13 @@ impl<'a> System<'a> {
     pub fn lane_impulses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_impulse, layout.tangent_impulse];
         self.book_points([8.0, 8.0]);
-        self.over_lanes(to, |width, on| at_width!(width, read(on, of)));
+        self.over_lanes(to, |width, on| at_width!(width, point_passes::read(on, of)));
     }
 
     /// Replaces all accumulated impulses (N·s), in lanes; velocities stay as they are.
     pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
         self.book_points([8.0, 8.0]);
-        self.over_lanes(from, |width, on| at_width!(width, write_impulses(on)));
+        self.over_lanes(from, |width, on| at_width!(width, point_passes::write_impulses(on)));
     }
 
     /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes; of the
@@ -70,25 +59,25 @@ impl<'a> System<'a> {
     pub fn lane_masses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
         self.book_points([8.0, 8.0]);
-        self.over_lanes(to, |width, on| at_width!(width, read(on, of)));
+        self.over_lanes(to, |width, on| at_width!(width, point_passes::read(on, of)));
     }
 
     /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes.
     pub fn lane_surfaces(&mut self, to: &mut PointVector) {
         self.book_points([8.0, 8.0]);
-        self.over_lanes(to, |width, on| at_width!(width, read_surfaces(on)));
+        self.over_lanes(to, |width, on| at_width!(width, point_passes::read_surfaces(on)));
     }
 
     /// J v: how fast the surfaces part and slide at each point (m/s), in lanes.
     pub fn lane_velocities(&mut self, to: &mut PointVector) {
         self.book_points([GEOMETRY, 8.0]);
-        self.over_lanes(to, |width, on| at_width!(width, read_velocities(on)));
+        self.over_lanes(to, |width, on| at_width!(width, point_passes::read_velocities(on)));
     }
 
     /// v ← v + M⁻¹ Jᵀ Δλ, in lanes, in the order of the lanes. Accumulated impulses stay as they are.
     pub fn push_lanes(&mut self, delta: &mut PointVector) {
         self.book_points([8.0 + GEOMETRY, 32.0]);
-        self.over_lanes(delta, |width, on| at_width!(width, push(on)));
+        self.over_lanes(delta, |width, on| at_width!(width, point_passes::push(on)));
     }
 
     /// Coloured batches at their width, then serial ones at one lane.
@@ -225,17 +214,6 @@ impl<'a> System<'a> {
             let contact = &self.contacts[at / 2];
             let friction = if self.features.friction { contact.friction } else { 0.0 };
             to[at] = [contact.manifold.points[at % 2].separation, friction];
-        }
-    }
-
-    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg); zero of
-    /// absent ones.
-    pub fn effective_masses(&self, to: &mut Vec<Pair>) {
-        to.clear();
-        to.resize(self.len(), [0.0; 2]);
-        let view = self.view();
-        for (at, bodies, _, arms) in view.points() {
-            to[at] = arms.map(|arms| view.effective_mass(bodies, arms) as f32);
         }
     }
 

@@ -1,9 +1,10 @@
 //! How many lanes there are, and which of them this build has instructions for.
 
 /// How many contacts one instruction processes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LaneWidth {
     /// Scalar code.
+    #[default]
     W1,
     /// 128-bit lanes.
     W4,

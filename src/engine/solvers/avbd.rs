@@ -83,6 +83,7 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [alpha, beta, gamma] = [0, 1, 2].map(|i| passes.parameter(i));
+    passes.assign_descent();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.begin_descent(alpha * gamma, gamma);
