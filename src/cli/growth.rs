@@ -177,10 +177,9 @@ fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate
 pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     let (solver, width) = (args.setting.solver, args.lanes.or_native());
     let settings = Settings {
-        width,
         budget: args.setting.budget()?,
         parameters: args.setting.parameters()?,
-        ..Settings::new(solver)
+        ..Settings::new(solver).exactly(width)
     };
     let targets = targets(&args.contacts)?;
     // Unknown names first; a path is read when it is opened.

@@ -112,8 +112,7 @@ fn phase() -> impl TypedValueParser<Value = Which> {
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
     let setting = &args.setting;
-    let own = Settings::new(setting.solver);
-    let own = args.lanes.lanes.map_or(own.clone(), |width| own.exactly(width));
+    let own = Settings::new(setting.solver).exactly(args.lanes.or_native());
     Ok(Settings { budget: setting.budget()?, parameters: setting.parameters()?, ..own })
 }
 

@@ -187,8 +187,8 @@ impl SettingArgs {
 /// `--lanes` of commands that run at one width.
 #[derive(Args, Clone, Debug)]
 pub struct Lanes {
-    /// Lanes per instruction [default: the widest that this build has instructions for, or fewer where the
-    /// colours do not fill them; wider ones are emulated]
+    /// Lanes per instruction [default: the widest that this build has instructions for; wider ones
+    /// are emulated]
     #[arg(long, value_name = "N", value_parser = lanes())]
     pub lanes: Option<LaneWidth>,
 }

@@ -30,7 +30,7 @@ impl Simpulse {
     /// Another solver at the widest lanes and its own parameters. Errors: as above.
     pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
-        let mut settings = Settings { width: LaneWidth::W16, ..Settings::new(solver) };
+        let mut settings = Settings::new(solver).exactly(LaneWidth::W16);
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }

@@ -8,7 +8,7 @@ use crate::race::Outcome;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use simpulse::lab::report::axes::{
-    Area, Drawn, GRID, INK, Scale, color, marker, wrapped, write, write_upwards,
+    Area, Drawn, Edges, INK, Scale, color, marker, wrapped, write, write_upwards,
 };
 use simpulse::lab::report::units::si_short;
 
@@ -91,16 +91,9 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     write(area, name, (left, top - 14), 15, HPos::Left)?;
     let overlaps = Scale::of(shown.iter().map(|s| s.3), 5);
     let times = Scale::of(shown.iter().map(|s| s.2), 6);
-    for &tick in &overlaps.ticks {
-        let x = overlaps.pixel(tick, left, right);
-        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
-        write(area, &si_short(tick, "m"), (x, bottom + 12), 12, HPos::Center)?;
-    }
-    for &tick in &times.ticks {
-        let y = times.pixel(tick, bottom, top);
-        area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
-        write(area, &si_short(1e-3 * tick, "s"), (left - 6, y), 12, HPos::Right)?;
-    }
+    let labels: [&dyn Fn(f64) -> String; 2] =
+        [&|overlap| si_short(overlap, "m"), &|ms| si_short(1e-3 * ms, "s")];
+    Edges { left, right, top, bottom }.grid(area, [&overlaps, &times], 12, labels)?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write_upwards(area, "time of a step", (corner.0 + 14, (top + bottom) / 2), 12)?;
     write(area, "mean overlap", ((left + right) / 2, bottom + 28), 13, HPos::Center)?;

@@ -77,9 +77,8 @@ impl Setting {
         Settings {
             order: self.order,
             budget: self.budget,
-            width,
             parameters: self.parameters,
-            ..Settings::new(self.solver)
+            ..Settings::new(self.solver).exactly(width)
         }
     }
 

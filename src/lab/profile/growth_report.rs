@@ -3,7 +3,7 @@
 use super::growth::{Change, Row, Verdict};
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, GRID, INK, Scale, color, write, write_upwards};
+use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, write, write_upwards};
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, ratio, si};
 use plotters::element::DashedPathElement;
@@ -216,16 +216,7 @@ fn panel(
     let shown = |value: &f64| value.is_finite() && *value >= 0.1;
     let values: Vec<f64> = curves.iter().flat_map(|c| c.1.iter().copied().filter(shown)).collect();
     let (x, y) = (Scale::of(contacts.iter().copied(), 7), Scale::of(values.iter().copied(), 8));
-    for &tick in &x.ticks {
-        let at = x.pixel(tick, left, right);
-        area.draw(&PathElement::new(vec![(at, top), (at, bottom)], GRID))?;
-        write(area, &si_count(tick), (at, bottom + 13), 12, HPos::Center)?;
-    }
-    for &tick in &y.ticks {
-        let at = y.pixel(tick, bottom, top);
-        area.draw(&PathElement::new(vec![(left, at), (right, at)], GRID))?;
-        write(area, &label(tick), (left - 6, at), 12, HPos::Right)?;
-    }
+    Edges { left, right, top, bottom }.grid(area, [&x, &y], 13, [&si_count, &label])?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write(area, "contacts", ((left + right) / 2, bottom + 34), 13, HPos::Center)?;
     write_upwards(area, name, (corner + 18, (top + bottom) / 2), 13)?;

@@ -3,7 +3,7 @@
 use super::text::bytes;
 use super::{Bandwidth, PhaseReport, Report};
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, GRID, INK, Scale, color, write};
+use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, write};
 use crate::lab::report::units::digits;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -56,16 +56,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
     let ys: Vec<f64> = ys.filter(|y| y.is_finite() && *y > 0.0).collect();
     let y = Scale::of(ys.iter().copied(), 7);
     let (left, right, top, bottom) = (LEFT, SIZE.0 - RIGHT, TOP, SIZE.1 - BOTTOM);
-    for &tick in &x.ticks {
-        let at = x.pixel(tick, left, right);
-        root.draw(&PathElement::new(vec![(at, top), (at, bottom)], GRID))?;
-        write(&root, &number(tick), (at, bottom + 14), 12, HPos::Center)?;
-    }
-    for &tick in &y.ticks {
-        let at = y.pixel(tick, bottom, top);
-        root.draw(&PathElement::new(vec![(left, at), (right, at)], GRID))?;
-        write(&root, &number(tick), (left - 6, at), 12, HPos::Right)?;
-    }
+    Edges { left, right, top, bottom }.grid(&root, [&x, &y], 14, [&number, &number])?;
     let at = |intensity: f64, rate: f64| (x.pixel(intensity, left, right), y.pixel(rate, bottom, top));
     let mut free = top;
     for (level, bandwidth) in &report.levels {

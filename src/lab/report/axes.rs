@@ -85,6 +85,40 @@ impl Scale {
     }
 }
 
+/// Pixels of a panel's left, right, upper and lower edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Edges {
+    pub left: i32,
+    pub right: i32,
+    pub top: i32,
+    pub bottom: i32,
+}
+
+impl Edges {
+    /// Lines at the ticks of a horizontal and a vertical axis, and what `labels` makes of the ticks: below, by
+    /// `gap` pixels, and on the left.
+    pub fn grid(
+        &self,
+        area: &Area,
+        [x, y]: [&Scale; 2],
+        gap: i32,
+        labels: [&dyn Fn(f64) -> String; 2],
+    ) -> Drawn {
+        let Edges { left, right, top, bottom } = *self;
+        for &tick in &x.ticks {
+            let x = x.pixel(tick, left, right);
+            area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
+            write(area, &labels[0](tick), (x, bottom + gap), 12, HPos::Center)?;
+        }
+        for &tick in &y.ticks {
+            let y = y.pixel(tick, bottom, top);
+            area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
+            write(area, &labels[1](tick), (left - 6, y), 12, HPos::Right)?;
+        }
+        Ok(())
+    }
+}
+
 /// Text in ink, anchored at its left, middle or right.
 pub fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
     let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));

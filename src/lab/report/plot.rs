@@ -6,7 +6,7 @@
 //! and between them there is nothing.
 
 use super::axes::{
-    Area, Drawn, GRID, INK, Scale, marker, solver_color, solver_legend, wrapped, write, write_upwards,
+    Area, Drawn, Edges, INK, Scale, marker, solver_color, solver_legend, wrapped, write, write_upwards,
 };
 use super::units::si_short;
 use crate::engine::world::Order;
@@ -78,16 +78,8 @@ fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -
     let errors = Scale::of(samples().map(|s| s.error), 5);
     let times = Scale::of(samples().map(|s| s.time), 6);
     let unit = axis.unit(records);
-    for &tick in &errors.ticks {
-        let x = errors.pixel(tick, left, right);
-        area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
-        write(area, &label(tick, unit), (x, bottom + 12), 12, HPos::Center)?;
-    }
-    for &tick in &times.ticks {
-        let y = times.pixel(tick, bottom, top);
-        area.draw(&PathElement::new(vec![(left, y), (right, y)], GRID))?;
-        write(area, &si_short(1e-9 * tick, "s"), (left - 6, y), 12, HPos::Right)?;
-    }
+    let labels: [&dyn Fn(f64) -> String; 2] = [&|error| label(error, unit), &|ns| si_short(1e-9 * ns, "s")];
+    Edges { left, right, top, bottom }.grid(area, [&errors, &times], 12, labels)?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write_upwards(area, "time of a step", (corner.0 + 14, (top + bottom) / 2), 12)?;
     for (i, line) in title(axis, records).iter().enumerate() {

@@ -341,10 +341,7 @@ fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Se
         // Checked with the plan.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
     }
-    let own = Settings::new(cell.solver);
-    // One width is the widest that is to be used; several are compared.
-    let own = if plan.widths.len() > 1 { own.exactly(width) } else { Settings { width, ..own } };
-    Settings { order, budget: cell.budget, parameters, ..own }
+    Settings { order, budget: cell.budget, parameters, ..Settings::new(cell.solver).exactly(width) }
 }
 
 /// Steps of a timing run of scenes that take turns.

@@ -75,7 +75,7 @@ pub fn savings(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result
         for scene in &scenes {
             progress(Progress { done, total, what: format!("{} · {}", scene.name, solver.name) });
             done += 1;
-            savings.extend(of_scene(plan, scene, Settings { width, ..Settings::new(solver) })?);
+            savings.extend(of_scene(plan, scene, Settings::new(solver).exactly(width))?);
         }
     }
     Ok(savings)
