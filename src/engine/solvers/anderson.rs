@@ -25,10 +25,11 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::matrix::solve_in_place;
 use crate::engine::constraints::point_vector::{difference, dot, plus_scaled, update};
 use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, dense};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -117,7 +118,7 @@ fn step(passes: &mut Passes<'_>) {
                 }
                 let trace: f64 = (0..columns).map(|i| gram[i * columns + i]).sum();
                 (0..columns).for_each(|i| gram[i * columns + i] += RIDGE * trace);
-                if !dense::solve(&mut gram[..columns * columns], &mut right[..columns], 0.0) {
+                if !solve_in_place(&mut gram[..columns * columns], &mut right[..columns], 0.0) {
                     return;
                 }
                 for (j, gamma) in right[..columns].iter().enumerate() {
