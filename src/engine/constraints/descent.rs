@@ -72,19 +72,19 @@ impl Descent {
         self.lanes.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
-    /// Gives bodies their lanes, by colours or one by one.
+    /// Gives bodies their lanes, by colours or one by one in the `sequence` of contacts.
     pub(super) fn assign(
         &mut self,
         rows: &[BodyRow],
         contacts: &[Contact],
         graph: &Graph,
         width: LaneWidth,
-        one_by_one: bool,
+        sequence: Option<&[u32]>,
     ) {
         let inert = rows.len() as u32 - 1;
         let is_dynamic = |body: u32| rows[body as usize].velocity[3] > 0.0;
-        let width = if one_by_one { LaneWidth::W1 } else { width };
-        self.lanes.assign(width, graph, contacts, inert, is_dynamic, one_by_one);
+        let width = if sequence.is_some() { LaneWidth::W1 } else { width };
+        self.lanes.assign(width, graph, contacts, inert, is_dynamic, sequence);
         let BodyLanes { batches, ends, contacts, .. } = &self.lanes;
         for (records, vectors) in [
             (&mut self.bodies, BODY * batches.len()),

@@ -396,8 +396,9 @@ impl<'a> Passes<'a> {
             return;
         }
         self.build_graph();
-        let Workspace { rows, graph, descent, lanes, .. } = &mut *self.work;
-        descent.assign(rows, self.contacts, graph, self.width, lanes.segments().is_empty());
+        let Workspace { rows, graph, descent, lanes, serial, .. } = &mut *self.work;
+        let sequence = lanes.segments().is_empty().then(|| serial.contact());
+        descent.assign(rows, self.contacts, graph, self.width, sequence);
     }
 
     /// Begins a substep of block descent: bodies go to their inertial place; of multipliers and of penalties
