@@ -6,7 +6,8 @@
 //! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
 //! last sweep is not extrapolated, so that impulses end within their bounds.
 //!
-//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes.
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
+//! of a step request 3830 B per contact.
 //!
 //! **Fails when** iterations are few, or contacts open and close: the combination is right for a
 //! linear sweep, and a clamp is a corner in it.

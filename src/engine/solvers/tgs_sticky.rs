@@ -8,7 +8,7 @@
 //!
 //! **Cost.** Per substep 2 body passes and `velocity_iterations` sticky sweeps; per step
 //! `relax_iterations` sticky sweeps without push, 1 pass that brings drifts into the order of the lanes and 1 that
-//! books them.
+//! books them. Sweeps of a step request 1292 B per contact.
 //!
 //! **Fails when** stacks are tall: without a warm start each step begins cold, and 0.8 of an
 //! overlap per substep is pushed out as velocity.
