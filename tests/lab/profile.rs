@@ -386,7 +386,7 @@ fn files_of_solvers_say_how_many_bytes_a_step_requests() {
         let header: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//!")).collect();
         let header = header.join(" ");
         let words: Vec<&str> = header.split_whitespace().collect();
-        let unit = ["B", "per", "contact"];
+        let unit = ["B", "per", "contact."];
         let at = words.windows(3).position(|w| w == unit);
         let said = at.and_then(|at| words.get(at.wrapping_sub(1))).and_then(|word| word.parse::<f64>().ok());
         let measured = bytes / contacts;
