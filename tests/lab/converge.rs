@@ -13,7 +13,7 @@ use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, sliding_box};
 use simpulse::lab::reference::residual::{Target, natural_map};
 use simpulse::lab::reference::sweeps::{Stop, Sweep, pgs};
-use simpulse::lab::reference::{ContactProblem, Velocity};
+use simpulse::lab::reference::{ContactProblem, Pair, Velocity};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -343,6 +343,78 @@ fn reports_say_what_was_measured() {
     assert!(text.contains("which the problem has"), "{text}");
     assert!(text.contains("every step begins from zero: projection."), "{text}");
     assert!(text.contains("no bias and compliance of normal rows say what is solved: avbd."), "{text}");
+}
+
+/// `mazhar2015`: f(λ_k) − f(λ*) ≤ 2 L |λ*|²/(k + 1)² from zero, f = λᵀ G λ/2 + λᵀ b with Lipschitz constant L = ‖G‖ of
+/// its gradient. A step of the solver's own is never longer than one of 1/L, and restarts only help.
+#[test]
+fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() {
+    let problem = disc_column(20);
+    let truth = reference(&problem).unwrap();
+    let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; 20]));
+    let objective = |impulses: &[Pair]| {
+        let product = problem.delassus_product(impulses);
+        let one = |((l, g), b): ((&Pair, &Pair), &Pair)| l[0] * (0.5 * g[0] + b[0]);
+        impulses.iter().zip(&product).zip(&free).map(one).sum::<f64>()
+    };
+    let least = objective(&truth.impulses);
+    // Rows of G of equal discs: −1, 2, −1 over the mass, here 1 kg; ‖G‖ < 4.
+    assert!(problem.bodies.iter().all(|b| b.inv_mass == 1.0));
+    let square: f64 = truth.impulses.iter().map(|l| l[0] * l[0]).sum();
+    let apgd = solvers::find("apgd").unwrap();
+    let mut replay = replay(&problem, Sequence::Natural, apgd);
+    let rounding = 1e-6 * least.abs();
+    for k in 1..200 {
+        let Outcome { impulses, .. } = replay.run(apgd, (apgd.iterations)(k), Start::Cold);
+        let bound = 2.0 * 4.0 * square / f64::from(k + 1).powi(2) + rounding;
+        let gap = objective(&impulses) - least;
+        assert!(gap < bound, "{k}: {gap:e} for {bound:e}");
+    }
+}
+
+/// `anitescu2006`: where the convex relaxation slides, it parts at un = µ |ut|.
+#[test]
+fn the_relaxation_parts_in_proportion_to_sliding() {
+    let problem = sliding_box();
+    let apgd = solvers::find("apgd").unwrap();
+    let mut replay = replay(&problem, Sequence::Natural, apgd);
+    let Outcome { velocities, impulses, .. } = replay.run(apgd, (apgd.iterations)(2000), Start::Cold);
+    let mut pushing = 0;
+    for ((c, [un, ut]), l) in
+        problem.contacts.iter().zip(problem.contact_velocities(&velocities)).zip(&impulses)
+    {
+        if l[0] > 0.0 {
+            pushing += 1;
+            assert!((un - c.friction * ut.abs()).abs() < 1e-5, "{un} at {ut}");
+            assert!(un > 0.1, "{un}");
+        }
+    }
+    assert!(pushing > 0);
+}
+
+/// `tonge2012`: the result does not depend on the order, and from zero nothing rises on the way.
+#[test]
+fn split_masses_converge_without_rising_and_in_any_order() {
+    for file in ["box-pyramid-5", "disc-column-10", "plank-4-supports"] {
+        let file = frozen_files().into_iter().find(|f| f.ends_with(format!("{file}.frozen"))).unwrap();
+        let Frozen { problem, reference } = Frozen::read(&file).unwrap();
+        let settings = Options { max_iterations: 500, ..options(&["mass_splitting"]) };
+        let report = converge(&problem, reference.as_ref(), &settings).unwrap();
+        let of = |c: &&Curve| c.solver == "mass_splitting" && c.start == Start::Cold;
+        let curves: Vec<&Curve> = report.curves.iter().filter(of).collect();
+        assert_eq!(curves.len(), 3);
+        for curve in &curves {
+            for pair in curve.points.windows(2).filter(|pair| pair[1].rigid > 1e-5) {
+                let [before, after] = [pair[0].rigid, pair[1].rigid];
+                // Sums of f32 in another order.
+                assert!(after < 1.005 * before, "{}: {before:e}, {after:e}", file.display());
+            }
+            for (x, y) in curve.points.iter().zip(&curves[0].points) {
+                assert_eq!(x.iterations, y.iterations);
+                assert!((x.rigid - y.rigid).abs() < 1e-3 * y.rigid + 1e-6, "{} {}", curve.order, x.iterations);
+            }
+        }
+    }
 }
 
 #[test]
