@@ -24,14 +24,14 @@ use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::{Bearing, Rigid, Soft};
 use crate::engine::params::{Budget, Parameter};
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::TAU;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
     name: "shim",
     source: "shim",
     summary: "substeps, and soft contacts whose springs are preloaded until they do not sag",
-    budget: Budget { substeps: 16, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    budget: Budget { substeps: 14, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
     parameters: &[
@@ -46,11 +46,11 @@ pub static SOLVER: Variant = Variant {
         Parameter::DAMPING_RATIO,
         Parameter::PUSH_SPEED,
         Parameter {
-            name: "height",
+            name: "patience",
             unit: "",
-            default: 300.0,
-            range: [1.0, 1e6],
-            meaning: "bodies in the highest column that preload may not make swing, if the scene has so many",
+            default: 4.0,
+            range: [1e-3, 1e6],
+            meaning: "time in which preload follows the load, over what the slowest mode of the pile needs",
             trials: &[],
         },
         Parameter {
@@ -61,9 +61,18 @@ pub static SOLVER: Variant = Variant {
             meaning: "part of its sag that a contact is preloaded by; 0 is none",
             trials: &[],
         },
+        Parameter {
+            name: "column_sweeps",
+            unit: "",
+            default: 32.0,
+            range: [0.0, 1000.0],
+            meaning: "most rigid sweeps per substep added for stiffer springs, where a column would buckle on these",
+            trials: &[],
+        },
     ],
     softness: None,
     by_levels: false,
+    piles: true,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     step,
@@ -71,13 +80,16 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let [stiffness, damping_ratio, push_speed, height, share] = [0, 1, 2, 3, 4].map(|i| passes.parameter(i));
-    let omega = TAU * stiffness / h;
+    let [stiffness, damping_ratio, push_speed, patience, share, most] =
+        [0, 1, 2, 3, 4, 5].map(|i| passes.parameter(i));
+    let (usual, piles) = (TAU * stiffness / h, passes.pile_modes());
+    let added = added_sweeps(piles.critical_frequency / usual, budget, most);
+    let sweeps = (budget.velocity_iterations + budget.relax_iterations).max(1) as f32;
+    let omega = usual * (1.0 + added as f32 / sweeps).sqrt();
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
     let rigid = Rigid::new(h);
-    let tallest = passes.longest_column(height);
-    let (dt, slowest) = (h * budget.substeps as f32, FRAC_PI_2 / tallest);
-    let time = 1.0 / (2.0 * damping_ratio * omega * slowest * slowest);
+    let dt = h * budget.substeps as f32;
+    let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
     passes.preload(springs, share, dt / (dt + time));
     for substep in 0..budget.substeps {
         if substep == 0 {
@@ -93,9 +105,16 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_positions();
         // Impulses of the step before meet contacts that came, went or moved: one sweep more.
         let settling = u32::from(substep == 0);
-        for _ in 0..budget.relax_iterations + settling {
+        for _ in 0..budget.relax_iterations + added + settling {
             passes.block_sweep_normal_first(Phase::Relax, rigid);
         }
         passes.end_substep(substep);
     }
+}
+
+/// Rigid sweeps per substep for springs `ratio` times as fast as the usual ones: (h ω)² < q, the number of sweeps
+/// (`papers/shim.md`), which so has to grow with ω².
+fn added_sweeps(ratio: f32, budget: Budget, most: f32) -> u32 {
+    let sweeps = (budget.velocity_iterations + budget.relax_iterations) as f32;
+    (sweeps * (ratio * ratio - 1.0)).ceil().clamp(0.0, most) as u32
 }
