@@ -411,7 +411,12 @@ fn split_masses_converge_without_rising_and_in_any_order() {
             }
             for (x, y) in curve.points.iter().zip(&curves[0].points) {
                 assert_eq!(x.iterations, y.iterations);
-                assert!((x.rigid - y.rigid).abs() < 1e-3 * y.rigid + 1e-6, "{} {}", curve.order, x.iterations);
+                assert!(
+                    (x.rigid - y.rigid).abs() < 1e-3 * y.rigid + 1e-6,
+                    "{} {}",
+                    curve.order,
+                    x.iterations
+                );
             }
         }
     }

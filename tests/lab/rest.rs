@@ -123,7 +123,10 @@ fn round_positions(world: &mut World) {
 fn speeds_at_rest_grow_with_what_positions_are_rounded_to() {
     let speeds = ["many_pyramids:5", "many_pyramids:10"].map(|name| {
         let scene = crate::common::scene(name);
-        [residual_speed(&scene, "box2d", None, |_| ()), residual_speed(&scene, "box2d", None, round_positions)]
+        [
+            residual_speed(&scene, "box2d", None, |_| ()),
+            residual_speed(&scene, "box2d", None, round_positions),
+        ]
     });
     let [[low, low_rounded], [high, high_rounded]] = speeds;
     assert!(low_rounded > 20.0 * low && high_rounded > 20.0 * high, "{speeds:?}");
