@@ -1,6 +1,11 @@
 //! The law of rest: piles of a few boxes stay where they are at the standard budget.
 
-use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
+use simpulse::engine::clock::Phase;
+use simpulse::engine::constraints::Passes;
+use simpulse::engine::constraints::rules::{Frictionless, NormalRule, Soft, angular_frequencies};
+use simpulse::engine::lanes::Lanes;
+use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION};
+use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::Scene;
 
@@ -87,7 +92,16 @@ fn lemke_and_newton_agree_on_a_stack() {
 /// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s), with `after` called after each step;
 /// each substep of the standard budget is `parts` steps of one substep if there are any.
 fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
-    let mut settings = crate::common::settings(find(solver).unwrap());
+    residual_speed_of(scene, find(solver).unwrap(), parts, after)
+}
+
+fn residual_speed_of(
+    scene: &Scene,
+    solver: &'static Variant,
+    parts: Option<u32>,
+    after: impl Fn(&mut World),
+) -> f64 {
+    let mut settings = crate::common::settings(solver);
     let parts = parts.map_or(1, |parts| parts * std::mem::replace(&mut settings.budget.substeps, 1));
     settings.dt /= parts as f32;
     let mut world = scene.build(settings).unwrap();
@@ -109,6 +123,60 @@ fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl F
         }
     }
     1e3 * squares.sqrt()
+}
+
+/// Springs that see separations rounded as points of the world are 200 m away from the origin.
+#[derive(Clone, Copy, Debug)]
+struct Grainy<R>(R);
+
+impl<R: NormalRule> NormalRule for Grainy<R> {
+    const FRICTION: bool = R::FRICTION;
+
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        let far = L::splat(200.0);
+        self.0.line(against_static, (separation + far) - far, mass, old)
+    }
+}
+
+/// `rapier` with such springs.
+static GRAINY: Variant = Variant { name: "grainy", step: grainy_step, ..rapier::SOLVER };
+
+fn grainy_step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let omega = angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h);
+    let soft = Grainy(Frictionless(Soft::new(omega, CONTACT_DAMPING_RATIO, push_speed, h)));
+    let rigid = Grainy(Soft::without_springs(h));
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.block_sweep(Phase::Solve, soft);
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.block_sweep_normal_first(Phase::Relax, rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+#[test]
+#[ignore = "prints a figure of papers/peers.md"]
+fn speeds_at_rest_with_rounded_separations() {
+    let scene = crate::common::scene("many_pyramids");
+    let speed = |parts, after: fn(&mut World)| residual_speed_of(&scene, &GRAINY, parts, after);
+    let figures = [
+        speed(None, |_| ()),
+        speed(None, round_positions),
+        speed(Some(1), |_| ()),
+        speed(Some(1), round_positions),
+    ];
+    println!("separations in f32: {figures:.5?} mm/s");
 }
 
 /// Forgets what positions have beyond `f32`, as engines that keep positions in one `f32` do.
