@@ -5,9 +5,9 @@
 //!
 //! **Departures.** Bodies go colour by colour; in natural order one by one, as the contacts name them. They begin
 //! at their inertial place. Friction anchors are those of the start of the step; what has crept before is not
-//! taken back. There is no geometric stiffness: rows are
-//! linear in the motion of a step. The last iterations without a share of old error, which take overlap
-//! out of positions after velocities are known, are `position_iterations`.
+//! taken back. There is no geometric stiffness: rows are linear in the motion of a step. The last iterations without a
+//! share of old error, which take overlap out of positions after velocities are known, are `position_iterations`.
+//! There are rows of contacts alone: constraints of other types do nothing.
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
