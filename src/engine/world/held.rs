@@ -51,6 +51,7 @@ struct Saved {
     kept: Kept,
     recycled: Recycled,
     found: Found,
+    is_changed: bool,
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -86,6 +87,7 @@ impl World {
             kept: self.work.kept.clone(),
             recycled: self.narrow.recycled.clone(),
             found: self.found,
+            is_changed: self.narrow.is_changed,
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -98,12 +100,13 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, found, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, recycled, found, is_changed, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.narrow.recycled.clone_from(recycled);
-        self.found = *found;
+        // The list is another, but no contact has come or gone.
+        (self.found, self.narrow.is_changed, self.lanes_are_for) = (*found, *is_changed, None);
     }
 
     /// `phase` alone; with `counted`, one lane counts its operations.
