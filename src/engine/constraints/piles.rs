@@ -33,6 +33,16 @@
 //! through the contacts whose normal is within 60° of it: boxes in a row along the ground that are pressed against
 //! a wall swing as a column of as many does. Parts that nothing fixed bears along d, and that loads hold together (cards
 //! that lean on each other), count as a column of all their bodies that is held in its middle.
+//!
+//! Preload has no moment on one contact, and so does not rock a column of boxes; on two legs of a table it has. With J_j
+//! the inertia above a joint about its middle, and K′_j its resistance with the points of each contact in one place,
+//! Dunkerley's formula for rotations, times the part of the stiffness that preload shortens, is
+//!
+//! ```text
+//! 1/κ ≤ Σ_j (J_j ω²/K_j) (K′_j/K_j)
+//! ```
+//!
+//! and the greater of both counts.
 
 use super::graph::{Graph, UNSUPPORTED};
 use super::statics::{self, Support};
@@ -66,11 +76,15 @@ struct Part {
     mass: f64,
     /// Σ m (x, z), z along the direction (kg·m).
     moment: DVec2,
+    /// Σ m (x² + z²) + I (kg·m²)
+    inertia: f64,
     /// Its bodies, and the least of their masses (kg).
     bodies: u32,
     lightest: f64,
     /// Greatest sum of what makes joints buckle, on a path to a top (s⁻²).
     buckling: f64,
+    /// The same of what makes preload rock them (1).
+    rocking: f64,
     /// Its joint to the level below.
     joint: Joint,
 }
@@ -91,8 +105,9 @@ struct Joint {
     mass: f64,
     /// Σ m_p (x, z) (kg·m)
     moment: DVec2,
-    /// Σ m_p x² (kg·m²)
+    /// Σ m_p x² (kg·m²), and the same with the points of each contact in their middle.
     second: f64,
+    between: f64,
     /// Least and greatest x of its points (m).
     range: [f64; 2],
     /// A body moves on what bears it.
@@ -100,6 +115,11 @@ struct Joint {
 }
 
 impl Joint {
+    /// Adds a contact, the sums of mass and moment of whose points are these.
+    fn add_contact(&mut self, mass: f64, moment: f64) {
+        self.between += if mass > 0.0 { moment * moment / mass } else { 0.0 };
+    }
+
     /// Adds a point at x, z (m).
     fn add(&mut self, mass: f64, at: DVec2, moves: bool) {
         let [least, greatest] = if self.mass > 0.0 { self.range } else { [at.x; 2] };
@@ -110,11 +130,24 @@ impl Joint {
         self.moves |= moves;
     }
 
+    /// Resistance to rotation over ω² (kg·m²): Σ m_p (x_p − x̄)², and the part of it that each contact adds as a whole.
+    fn resistance(&self) -> [f64; 2] {
+        [self.second, self.between].map(|sum| sum - self.moment.x * self.moment.x / self.mass)
+    }
+
+    /// Inertia above it over the resistance of its springs at 1 rad/s (s⁻²), times the part of these that preload
+    /// shortens.
+    fn rocking(&self, above: &Part) -> f64 {
+        let (middle, [all, between]) = (self.moment / self.mass, self.resistance());
+        let inertia = above.inertia - 2.0 * middle.dot(above.moment) + above.mass * middle.length_squared();
+        // What rounding leaves of a contact alone is none.
+        if between > 1e-9 * self.second { inertia * between / (all * all) } else { 0.0 }
+    }
+
     /// Moment of the weight above it over the resistance of its springs at 1 rad/s (s⁻²), for gravity g (m/s²) and
     /// bodies of the radius of gyration √`gyration` (m²); 0 where the part does not stand on it.
     fn buckling(&self, above: &Part, gyration: f64, g: f64) -> f64 {
-        let middle = self.moment / self.mass;
-        let resistance = self.second - self.mass * middle.x * middle.x;
+        let (middle, [resistance, _]) = (self.moment / self.mass, self.resistance());
         let lever = above.moment / above.mass;
         let stands = (self.range[0]..=self.range[1]).contains(&lever.x) && lever.y > middle.y;
         if stands && !self.moves && resistance > NARROWEST * NARROWEST * gyration * self.mass {
@@ -136,6 +169,8 @@ struct Search<'w> {
     g: f64,
     /// Speed (m/s) above which a body moves on what bears it.
     still: f32,
+    /// Step (s).
+    dt: f32,
 }
 
 impl Search<'_> {
@@ -148,8 +183,9 @@ impl Search<'_> {
     /// A body alone.
     fn part(&self, body: usize) -> Part {
         let mass = 1.0 / f64::from(self.bodies.inv_mass[body]);
-        let moment = mass * self.upright(center(self.bodies, body));
-        Part { mass, moment, bodies: 1, lightest: mass, ..Part::default() }
+        let at = self.upright(center(self.bodies, body));
+        let inertia = mass * at.length_squared() + 1.0 / f64::from(self.bodies.inv_inertia[body]);
+        Part { mass, moment: mass * at, inertia, bodies: 1, lightest: mass, ..Part::default() }
     }
 
     /// Of a contact along the direction, over ω² (kg).
@@ -159,9 +195,10 @@ impl Search<'_> {
         along * along * points.map(|point| effective_mass(self.bodies, contact, point)).sum::<f64>()
     }
 
-    /// It is one of those that bear along the direction.
+    /// It bears along the direction and touches, or will within the step.
     fn bears(&self, contact: &Contact) -> bool {
-        contact.manifold.normal.dot(self.up).abs() >= BEARING
+        let near = |p: &ManifoldPoint| p.separation <= LINEAR_SLOP + self.dt * speed(self.bodies, contact, p);
+        contact.manifold.normal.dot(self.up).abs() >= BEARING && contact.manifold.points().iter().any(near)
     }
 }
 
@@ -184,30 +221,34 @@ pub struct Piles {
 }
 
 impl Piles {
-    /// The modes under `gravity` (m/s²); without any there is no vertical, and x and y are searched. Joints that move
-    /// by more than `still` (m/s) do not buckle.
-    /// Writes [`Contact::weight`], and impulses per substep of `h` (s) where there have been none.
+    /// The modes under `gravity` (m/s²), in steps of `dt` (s); without gravity there is no vertical, and x and y are
+    /// searched. Writes [`Contact::weight`], and impulses per substep of `h` (s) where there have been none.
     pub fn modes(
         &mut self,
         bodies: &Bodies,
         contacts: &mut [Contact],
         gravity: Vec2,
-        [still, h]: [f32; 2],
+        [dt, h]: [f32; 2],
     ) -> PileModes {
         contacts.iter_mut().for_each(|contact| contact.weight = 0.0);
         let up = -gravity.try_normalize().unwrap_or(Vec2::NEG_Y);
         let g = f64::from(gravity.length());
-        let search = Search { bodies, contacts, up, g, still };
+        // What gravity does in a step is still.
+        let still = gravity.length() * dt;
+        let search = Search { bodies, contacts, up, g, still, dt };
         self.build(&search);
-        let buckling = if g > 0.0 { self.buckling(&search) } else { 0.0 };
+        let [buckling, rocking] = if g > 0.0 { self.joints(&search) } else { [0.0; 2] };
         let vertical = self.slowness(&search);
         if g > 0.0 {
             self.weigh(bodies, contacts, gravity.as_dvec2(), still, h);
         }
-        let search = Search { bodies, contacts, up: up.perp(), g, still };
+        let search = Search { bodies, contacts, up: up.perp(), g, still, dt };
         self.build(&search);
         let horizontal = self.slowness(&search);
-        PileModes { critical_frequency: buckling.sqrt() as f32, slowness: vertical.max(horizontal) as f32 }
+        PileModes {
+            critical_frequency: buckling.sqrt() as f32,
+            slowness: vertical.max(horizontal).max(rocking) as f32,
+        }
     }
 
     /// Builds the graph of the contacts that bear along a direction.
@@ -223,9 +264,9 @@ impl Piles {
         self.parts.extend((0..bodies.len()).map(|body| search.part(body)));
     }
 
-    /// The greatest Σ_j of what makes joints buckle (s⁻²).
-    fn buckling(&mut self, search: &Search<'_>) -> f64 {
-        let mut greatest = 0.0;
+    /// The greatest Σ_j of what makes joints buckle (s⁻²), and of what makes preload rock them (1).
+    fn joints(&mut self, search: &Search<'_>) -> [f64; 2] {
+        let mut greatest = [0.0; 2];
         let mut end = self.graph.upwards().len();
         while end > 0 {
             let level = self.level_of(self.graph.upwards()[end - 1]);
@@ -233,7 +274,7 @@ impl Piles {
             let begin = below.map_or(0, |last| last + 1);
             self.join_level(begin..end);
             self.add_joints(begin..end, search);
-            greatest = f64::max(greatest, self.bear(begin..end, search));
+            self.bear(begin..end, search, &mut greatest);
             end = begin;
         }
         greatest
@@ -264,19 +305,20 @@ impl Piles {
                     continue;
                 }
                 let contact = &contacts[contact as usize];
+                let joint = &mut self.parts[root].joint;
+                let before = (joint.mass, joint.moment.x);
                 for point in contact.manifold.points() {
                     let at = center(bodies, contact.body_b as usize) + point.anchor_b.as_dvec2();
                     let moves = speed(bodies, contact, point) > still;
-                    let joint = &mut self.parts[root].joint;
                     joint.add(effective_mass(bodies, contact, point), search.upright(at), moves);
                 }
+                joint.add_contact(joint.mass - before.0, joint.moment.x - before.1);
             }
         }
     }
 
     /// Lets the joints of a level bear what is above them.
-    fn bear(&mut self, range: Range<usize>, search: &Search<'_>) -> f64 {
-        let mut greatest = 0.0;
+    fn bear(&mut self, range: Range<usize>, search: &Search<'_>, greatest: &mut [f64; 2]) {
         for i in range {
             let body = self.graph.upwards()[i] as usize;
             let root = self.root(body as u32) as usize;
@@ -286,10 +328,10 @@ impl Piles {
             if joint.mass > 0.0 {
                 let gyration = f64::from(search.bodies.inv_mass[body] / search.bodies.inv_inertia[body]);
                 part.buckling += joint.buckling(part, gyration, search.g);
+                part.rocking += joint.rocking(part);
             }
-            greatest = f64::max(greatest, part.buckling);
+            *greatest = [greatest[0].max(part.buckling), greatest[1].max(part.rocking)];
         }
-        greatest
     }
 
     /// The slowness of the slowest column (1).
@@ -411,9 +453,11 @@ impl Piles {
         let part = &mut self.parts[a as usize];
         part.mass += other.mass;
         part.moment += other.moment;
+        part.inertia += other.inertia;
         part.bodies += other.bodies;
         part.lightest = part.lightest.min(other.lightest);
         part.buckling = part.buckling.max(other.buckling);
+        part.rocking = part.rocking.max(other.rocking);
         self.parent[b as usize] = a;
     }
 

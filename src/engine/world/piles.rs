@@ -30,10 +30,12 @@ impl World {
         let grown = 4 * self.contacts.len() > 5 * found.contacts;
         if found.is_stale && (grown || self.step_index.is_multiple_of(EVERY)) {
             let gravity = Vec2::from(self.settings.gravity);
-            // What gravity does in a step.
-            let still = gravity.length() * self.settings.dt;
-            let modes =
-                self.piles.modes(&self.bodies, &mut self.contacts, gravity, [still, self.settings.h()]);
+            let modes = self.piles.modes(
+                &self.bodies,
+                &mut self.contacts,
+                gravity,
+                [self.settings.dt, self.settings.h()],
+            );
             *found = Found { modes, contacts: self.contacts.len(), is_stale: false };
         }
     }
