@@ -204,18 +204,20 @@ fn run<L: Lanes>(
     match kind {
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
-            rectangles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+            let pair = ShapePair::gather(poses, rows, shapes);
+            rectangles::collide(&pair, speculative).on_held(poses.held[0])
         }),
         Kind::Circles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
-            circles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+            let pair = ShapePair::gather(poses, rows, shapes);
+            circles::collide(&pair, speculative).on_held(poses.held[0])
         }),
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                pair.collide(&poses, speculative)
+                pair.collide(&poses, speculative).on_held(poses.held[0])
             })
         }
         Kind::HullCircle => {
@@ -223,7 +225,7 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
-                pair.collide(&poses, speculative)
+                pair.collide(&poses, speculative).on_held(poses.held[0])
             })
         }
         Kind::CircleHull => {
@@ -231,7 +233,7 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
-                pair.collide(&poses, speculative).swapped()
+                pair.collide(&poses, speculative).swapped().on_held(poses.held[1])
             })
         }
     }

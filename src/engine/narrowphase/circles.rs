@@ -7,7 +7,7 @@ use crate::engine::lanes::Lanes;
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
-    let Poses { centers, rotation } = pair.poses;
+    let Poses { centers, rotation, .. } = pair.poses;
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
     let center_a = rotate(rotation[0], [place_a[0], place_a[1]]);
     let center_b = rotate(rotation[1], [place_b[0], place_b[1]]);

@@ -12,7 +12,7 @@ use glam::Vec2;
 pub struct PoseRow {
     /// Centre of mass and what it is short of: `[x, y, x rest, y rest]` (m).
     pub position: [f32; 4],
-    /// `[cos θ, sin θ, 0, 0]`
+    /// `[cos θ, sin θ, 1 if no impulse moves it, 0]`
     pub rotation: [f32; 4],
 }
 
@@ -105,6 +105,8 @@ pub struct Poses<L> {
     pub centers: [L; 2],
     /// Rotations of a and b, (cos, sin).
     pub rotation: [[L; 2]; 2],
+    /// Whether no impulse moves a and b: 1, else 0.
+    pub held: [L; 2],
 }
 
 impl<L: Lanes> Poses<L> {
@@ -118,21 +120,23 @@ impl<L: Lanes> Poses<L> {
             // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
             centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
             rotation: [[r[0], r[1]], [s[0], s[1]]],
+            held: [r[2], s[2]],
         }
     }
 
     /// The same poses with a and b exchanged.
     #[inline(always)]
     pub fn swapped(self) -> Self {
-        let [a, b] = self.rotation;
-        Poses { centers: self.centers.map(|x| -x), rotation: [b, a] }
+        let ([a, b], [held_a, held_b]) = (self.rotation, self.held);
+        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], held: [held_b, held_a] }
     }
 }
 
 impl Poses<f32> {
-    /// Two poses.
+    /// Two poses of bodies that impulses move.
     pub fn new(a: &Pose, b: &Pose) -> Self {
-        Poses { centers: (b.position - a.position).into(), rotation: [a.rotation.into(), b.rotation.into()] }
+        let rotation = [a.rotation.into(), b.rotation.into()];
+        Poses { centers: (b.position - a.position).into(), rotation, held: [0.0; 2] }
     }
 }
 
@@ -178,6 +182,26 @@ impl<L: Lanes> Touch<L> {
     pub fn swapped(self) -> Self {
         let normal = self.normal.map(|x| -x);
         Touch { normal, anchor_a: self.anchor_b, anchor_b: self.anchor_a, ..self }
+    }
+
+    /// The same contacts with points on the surface of b where `held` is 1, midway between both surfaces
+    /// where it is 0.
+    ///
+    /// Points have to be the same for two bodies that move, or impulses would change their angular momentum.
+    /// A body on a held one has friction at its own surface: a disc that overlaps the ground by s and slides at v
+    /// rolls away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v with a = r, and 2/9 s/r v less
+    /// with a = r − s/2.
+    #[inline(always)]
+    pub fn on_held(self, held: L) -> Self {
+        let [nx, ny] = self.normal;
+        let half = L::splat(0.5) * held;
+        let moved = |anchors: [[L; 2]; 2]| {
+            std::array::from_fn(|p| {
+                let to_surface = half * self.separation[p];
+                [to_surface.mul_add(nx, anchors[p][0]), to_surface.mul_add(ny, anchors[p][1])]
+            })
+        };
+        Touch { anchor_a: moved(self.anchor_a), anchor_b: moved(self.anchor_b), ..self }
     }
 }
 

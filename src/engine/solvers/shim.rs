@@ -93,7 +93,7 @@ fn step(passes: &mut Passes<'_>) {
         // Impulses of the step before meet contacts that came, went or moved: one sweep more.
         let settling = u32::from(substep == 0);
         for _ in 0..budget.relax_iterations + settling {
-            passes.block_sweep_normal_first(Phase::Relax, rigid);
+            passes.parting_sweep(Phase::Relax, rigid, substep);
         }
         passes.end_substep(substep);
     }

@@ -62,7 +62,12 @@ impl World {
                 bodies.position_x_lo[i],
                 bodies.position_y_lo[i],
             ],
-            rotation: [bodies.rotation_cos[i], bodies.rotation_sin[i], 0.0, 0.0],
+            rotation: [
+                bodies.rotation_cos[i],
+                bodies.rotation_sin[i],
+                f32::from(u8::from(!bodies.is_dynamic(i))),
+                0.0,
+            ],
         }));
         let distance = self.settings.solver.recycle_distance(&self.settings.parameters);
         let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
