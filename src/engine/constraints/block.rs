@@ -50,7 +50,8 @@
 //! I_a Δω_a = I_b Δω_b = −½ (h/j) (v_t δ_n − v_n δ_t)
 //! ```
 //!
-//! Without friction bodies exchange no spin but by their arms, and nothing is taken.
+//! Without friction bodies exchange no spin but by their arms, and nothing is taken. Nor is it from bodies that rest
+//! on each other: those that slide by less than a hundredth of the slop in a step.
 //!
 //! # Order of rows
 //!
@@ -67,6 +68,7 @@ use super::sweep::{
     spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
+use crate::engine::params::LINEAR_SLOP;
 
 /// A matrix with a determinant below this part of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
@@ -82,7 +84,19 @@ pub struct Parting<R> {
     pub rule: R,
     /// h/j: substep over the substeps that it still counts in (s).
     pub time: f32,
+    /// Bodies that slide slower rest on each other (m/s).
+    pub slowest: f32,
 }
+
+impl<R> Parting<R> {
+    /// In a substep of `h` (s), one of `substeps`, of which `to_come` are left with it.
+    pub fn new(rule: R, h: f32, substeps: u32, to_come: u32) -> Self {
+        Parting { rule, time: h / to_come as f32, slowest: RESTING_SLIDE / (h * substeps as f32) }
+    }
+}
+
+/// By how much bodies slide at most in a step that rest on each other (m).
+const RESTING_SLIDE: f32 = 0.01 * LINEAR_SLOP;
 
 impl<R: NormalRule> Pass for Parting<R> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
@@ -91,7 +105,7 @@ impl<R: NormalRule> Pass for Parting<R> {
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R, true, true>(on.rows, on.batches, self.rule, self.time);
+        sweep::<L, F, R, true, true>(on.rows, on.batches, self.rule, [self.time, self.slowest]);
     }
 }
 
@@ -102,7 +116,7 @@ impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRS
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        sweep::<L, F, R, NORMAL_FIRST, false>(on.rows, on.batches, self.0, 0.0);
+        sweep::<L, F, R, NORMAL_FIRST, false>(on.rows, on.batches, self.0, [0.0; 2]);
     }
 }
 
@@ -111,9 +125,9 @@ fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool, c
     rows: &mut [BodyRow],
     batches: &mut Batches,
     rule: R,
-    time: f32,
+    [time, slowest]: [f32; 2],
 ) {
-    over_segments!(segment, L, N, R, NORMAL_FIRST, PARTING; rows, batches, rule, time);
+    over_segments!(segment, L, N, R, NORMAL_FIRST, PARTING; rows, batches, rule, [time, slowest]);
 }
 
 /// Velocities of a contact while its rows are solved, and what they have applied.
@@ -165,12 +179,12 @@ fn segment<
     batches: &mut Batches,
     segment: &Segment,
     rule: R,
-    time: f32,
+    [time, slowest]: [f32; 2],
 ) {
     let layout = const { Layout::of::<N, O>() };
     let pushes_a = segment.pushes_a();
-    // Bodies that nothing pushes have all the momentum they need.
-    let half_time = if pushes_a { 0.5 * time } else { 0.0 };
+    // Momentum is that of two bodies that move: against others nothing slides.
+    let (half_time, slowest) = (0.5 * time, if pushes_a { slowest } else { f32::INFINITY });
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
@@ -219,11 +233,15 @@ fn segment<
             friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
         }
         if const { PARTING && O::HAS_ROW && N::FRICTION && R::FRICTION } {
-            let [normal, tangent] = progress.sum;
-            let orbital = along_t.mul_add(normal, -(along_n * tangent)) * L::splat(half_time);
-            let taken = record[layout.friction].select_positive(orbital, L::zero());
-            for (w, inertia) in progress.w.iter_mut().zip(inertia) {
-                *w = inertia.neg_mul_add(taken, *w);
+            let slides = along_t.max(-along_t) - L::splat(slowest);
+            if slides.any_positive() {
+                let [normal, tangent] = progress.sum;
+                let orbital = along_t.mul_add(normal, -(along_n * tangent)) * L::splat(half_time);
+                let rough = record[layout.friction].min(slides);
+                let taken = rough.select_positive(orbital, L::zero());
+                for (w, inertia) in progress.w.iter_mut().zip(inertia) {
+                    *w = inertia.neg_mul_add(taken, *w);
+                }
             }
         }
         apply::<L, O>(&mut a, &mut b, n, progress.sum, progress.w);

@@ -274,8 +274,8 @@ impl<'a> Passes<'a> {
     /// Constraint pass: as [`Self::block_sweep_normal_first`], in substep `substep`; what springs have pushed is taken
     /// back without changing angular momentum.
     pub fn parting_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R, substep: u32) {
-        let to_come = self.input.budget.substeps - substep;
-        if self.run(phase, &Parting { rule, time: self.input.h / to_come as f32 }) {
+        let substeps = self.input.budget.substeps;
+        if self.run(phase, &Parting::new(rule, self.input.h, substeps, substeps - substep)) {
             self.solved(&Sweep(rule));
         }
     }
