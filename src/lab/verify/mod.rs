@@ -44,12 +44,15 @@
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
+mod balance;
+mod carried;
 mod columns;
 mod far;
 mod impacts;
 mod lab;
 mod motion;
 mod overlap;
+mod pairs;
 mod paradox;
 mod ratios;
 mod runner;
