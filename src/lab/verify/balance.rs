@@ -100,7 +100,8 @@ fn groove(lab: &Lab) -> Result<Finding, Failure> {
     let side = |angle: f64| {
         // A box whose upper face goes through the origin.
         let (sin, cos) = angle.sin_cos();
-        SceneBody::fixed([0.5 * sin, -0.5 * cos], SceneShape::rectangle(10.0, 0.5).friction(0.0)).turned(angle)
+        SceneBody::fixed([0.5 * sin, -0.5 * cos], SceneShape::rectangle(10.0, 0.5).friction(0.0))
+            .turned(angle)
     };
     // Its centre is half a metre from both faces.
     let (na, nb) = ([alpha.sin(), alpha.cos()], [-beta.sin(), beta.cos()]);

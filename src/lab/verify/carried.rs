@@ -96,13 +96,19 @@ fn lift(lab: &Lab) -> Result<Finding, Failure> {
     let scene = Scene::new("lift", vec![platform_of(0.6), body]);
     let truth = mass * (G + a);
     let mut worst = truth;
-    carry(lab, scene, 2.0, |t| [0.0, a * t], |world| {
-        if time(world) > 1.0 {
-            let load: f64 = world.contacts.iter().map(|c| impulse(c)[1]).sum();
-            let load = load / f64::from(world.settings.dt);
-            worst = if (load - truth).abs() >= (worst - truth).abs() { load } else { worst };
-        }
-    })?;
+    carry(
+        lab,
+        scene,
+        2.0,
+        |t| [0.0, a * t],
+        |world| {
+            if time(world) > 1.0 {
+                let load: f64 = world.contacts.iter().map(|c| impulse(c)[1]).sum();
+                let load = load / f64::from(world.settings.dt);
+                worst = if (load - truth).abs() >= (worst - truth).abs() { load } else { worst };
+            }
+        },
+    )?;
     Ok(Finding::new(worst, truth, 0.01 * truth))
 }
 
@@ -130,15 +136,21 @@ fn train(lab: &Lab) -> Result<Finding, Failure> {
     }
     let scene = Scene::new("train", bodies);
     let mut worst = 0.0;
-    carry(lab, scene, 3.0, |t| [a * t, 0.0], |world| {
-        if time(world) > 2.0 {
-            for c in world.contacts.iter().filter(|c| c.manifold.normal.x.abs() > 0.9) {
-                let first = c.body_a.min(c.body_b).saturating_sub(1);
-                let load = normal_impulse(c) / f64::from(world.settings.dt);
-                worst = largest([worst, (load - f64::from(count as u32 - first) * a).abs()]);
+    carry(
+        lab,
+        scene,
+        3.0,
+        |t| [a * t, 0.0],
+        |world| {
+            if time(world) > 2.0 {
+                for c in world.contacts.iter().filter(|c| c.manifold.normal.x.abs() > 0.9) {
+                    let first = c.body_a.min(c.body_b).saturating_sub(1);
+                    let load = normal_impulse(c) / f64::from(world.settings.dt);
+                    worst = largest([worst, (load - f64::from(count as u32 - first) * a).abs()]);
+                }
             }
-        }
-    })?;
+        },
+    )?;
     Ok(Finding::new(worst, 0.0, 0.01 * f64::from(count) * a))
 }
 
@@ -162,9 +174,8 @@ fn belt(lab: &Lab) -> Result<Finding, Failure> {
 
 /// A floor at height 0 of squares of side 1, from −3 m to 20 m.
 fn tiled(friction: f64) -> Vec<SceneBody> {
-    let tile = |i: i32| {
-        SceneBody::fixed([f64::from(i), -0.5], SceneShape::rectangle(0.5, 0.5).friction(friction))
-    };
+    let tile =
+        |i: i32| SceneBody::fixed([f64::from(i), -0.5], SceneShape::rectangle(0.5, 0.5).friction(friction));
     (-3..=20).map(tile).collect()
 }
 

@@ -40,6 +40,14 @@ pub(super) static CASES: &[Case] = &[
         Yes("impacts run from body to body in waves"),
     ),
     Case::new(
+        "A20.plastic",
+        "speeds after a plastic impact of a box on a row of four, over the common one",
+        "1",
+        "1 %",
+        plastic_row,
+        Yes("the row moves on as one body"),
+    ),
+    Case::new(
         "A21.wedge",
         "way of a smooth wedge from under a smooth block that slides down it",
         "m",
@@ -144,7 +152,8 @@ fn rough_hit(lab: &Lab, bodies: [(Hit, SceneShape, f64); 2]) -> Result<Finding, 
 fn rough_discs(lab: &Lab) -> Result<Finding, Failure> {
     let disc = |radius: f64, density: f64, up: f64, velocity, spin| {
         let mass = density * PI * radius * radius;
-        let hit = Hit { mass, inertia: 0.5 * mass * radius * radius, arm: [0.0, -up * radius], velocity, spin };
+        let hit =
+            Hit { mass, inertia: 0.5 * mass * radius * radius, arm: [0.0, -up * radius], velocity, spin };
         (hit, SceneShape::disc(radius).density(density), 0.0)
     };
     rough_hit(lab, [disc(0.8, 1.0, -1.0, [-1.0, 0.5], 1.5), disc(0.5, 2.0, 1.0, [2.0, -3.5], 3.0)])
@@ -195,6 +204,17 @@ fn stacked(lab: &Lab) -> Result<Finding, Failure> {
     let world = lab.run(Scene::new("stacked", bodies).weightless(), 0.2, |_| ())?;
     let found = [velocity(&world, 1)[1] / speed, velocity(&world, 2)[1] / speed];
     let off = largest([found[0].abs(), (found[1] - 2.0).abs()]);
+    Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
+}
+
+/// A20. Five boxes go on together, at a fifth of the first one's speed.
+fn plastic_row(lab: &Lab) -> Result<Finding, Failure> {
+    let square = || SceneShape::rectangle(0.5, 0.5).friction(0.0);
+    let mut bodies = vec![SceneBody::dynamic([-1.3, 0.0], square()).moving([5.0, 0.0], 0.0)];
+    bodies.extend((0..4).map(|i| SceneBody::dynamic([f64::from(i), 0.0], square())));
+    let world = lab.run(Scene::new("row", bodies).weightless(), 1.0, |_| ())?;
+    let found: Vec<_> = (0..5).map(|i| velocity(&world, i)[0]).collect();
+    let off = largest(found.iter().map(|v| (v - 1.0).abs()));
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }
 
@@ -257,9 +277,11 @@ mod tests {
 
     #[test]
     fn impacts_keep_momentum_and_energy_where_they_have_to() {
-        let body = |mass: f64, y: f64, velocity| Hit { mass, inertia: 0.7, arm: [0.3, y], velocity, spin: 1.0 };
+        let body =
+            |mass: f64, y: f64, velocity| Hit { mass, inertia: 0.7, arm: [0.3, y], velocity, spin: 1.0 };
         let (a, b) = (body(2.0, 0.5, [0.0, 1.0]), body(1.0, -0.4, [1.0, -3.0]));
-        let energy = |h: &Hit, v: [f64; 3]| 0.5 * (h.mass * (v[0] * v[0] + v[1] * v[1]) + h.inertia * v[2] * v[2]);
+        let energy =
+            |h: &Hit, v: [f64; 3]| 0.5 * (h.mass * (v[0] * v[0] + v[1] * v[1]) + h.inertia * v[2] * v[2]);
         let before = energy(&a, [0.0, 1.0, 1.0]) + energy(&b, [1.0, -3.0, 1.0]);
         for (e, mu) in [(1.0, 0.0), (0.5, 0.1), (0.5, 5.0)] {
             let [va, vb] = after_hit(&a, &b, e, mu);
@@ -267,7 +289,8 @@ mod tests {
             let after = energy(&a, va) + energy(&b, vb);
             assert!(if mu == 0.0 { (after - before).abs() < 1e-14 } else { after < before });
             // Angular momentum about the point that is hit.
-            let about = |h: &Hit, v: [f64; 3]| h.mass * (h.arm[1] * v[0] - h.arm[0] * v[1]) + h.inertia * v[2];
+            let about =
+                |h: &Hit, v: [f64; 3]| h.mass * (h.arm[1] * v[0] - h.arm[0] * v[1]) + h.inertia * v[2];
             let start = about(&a, [0.0, 1.0, 1.0]) + about(&b, [1.0, -3.0, 1.0]);
             assert!((about(&a, va) + about(&b, vb) - start).abs() < 1e-13);
             if mu == 5.0 {
