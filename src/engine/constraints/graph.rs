@@ -119,6 +119,11 @@ impl Graph {
         &self.levels
     }
 
+    /// Bodies that a chain of contacts connects with the ground, the nearest first.
+    pub fn upwards(&self) -> &[u32] {
+        &self.queue
+    }
+
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         let lists = [&self.starts, &self.edges, &self.levels, &self.queue, &self.others];
@@ -138,6 +143,7 @@ mod tests {
         for _ in 0..2 {
             graph.build(7, edges.into_iter(), |body| body != 0);
             assert_eq!(graph.levels(), [0, 1, 2, 2, UNSUPPORTED, UNSUPPORTED, UNSUPPORTED]);
+            assert_eq!(graph.upwards(), [1, 2, 3]);
             assert_eq!(graph.edges_of(1), [0, 1, 2]);
             assert_eq!(graph.edges_of(3), [2, 3]);
             assert!(graph.edges_of(6).is_empty());

@@ -120,6 +120,8 @@ pub struct StepInput {
     pub record_impulses: bool,
     /// Points of all contacts, to count rows by.
     pub points: usize,
+    /// See [`Passes::critical_frequency`] (rad/s).
+    pub critical_frequency: f32,
 }
 
 /// One step's problem, prepared.
@@ -186,6 +188,12 @@ impl<'a> Passes<'a> {
     /// The solver's own parameter of this index in [`crate::engine::solvers::Variant::parameters`].
     pub fn parameter(&self, index: usize) -> f32 {
         self.input.parameters[index]
+    }
+
+    /// Angular frequency (rad/s) that springs need so that no column buckles on them, see [`super::columns`]; 0 unless
+    /// [`crate::engine::solvers::Variant::columns`] is set.
+    pub fn critical_frequency(&self) -> f32 {
+        self.input.critical_frequency
     }
 
     /// Points of all contacts.

@@ -135,6 +135,9 @@ pub struct Variant {
     /// Contacts are grouped by their level in the contact graph, see
     /// [`crate::engine::constraints::SweepOrder::Level`].
     pub by_levels: bool,
+    /// It is told how stiff contacts have to be so that no column buckles, see
+    /// [`crate::engine::constraints::Passes::critical_frequency`].
+    pub columns: bool,
     /// What it keeps from step to step beside impulses.
     pub kept: KeptSize,
     /// What it cannot promise, and why.

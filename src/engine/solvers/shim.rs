@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     name: "shim",
     source: "shim",
     summary: "substeps, and soft contacts whose springs are preloaded until they do not sag",
-    budget: Budget { substeps: 16, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    budget: Budget { substeps: 14, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
     parameters: &[
@@ -60,9 +60,18 @@ pub static SOLVER: Variant = Variant {
             meaning: "part of its sag that a contact is preloaded by; 0 is none",
             trials: &[],
         },
+        Parameter {
+            name: "column_sweeps",
+            unit: "",
+            default: 32.0,
+            range: [0.0, 1000.0],
+            meaning: "most rigid sweeps per substep added for stiffer springs, where a column would buckle on these",
+            trials: &[],
+        },
     ],
     softness: None,
     by_levels: false,
+    columns: true,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     step,
@@ -70,8 +79,12 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let [stiffness, damping_ratio, push_speed, height, share] = [0, 1, 2, 3, 4].map(|i| passes.parameter(i));
-    let omega = TAU * stiffness / h;
+    let [stiffness, damping_ratio, push_speed, height, share, most] =
+        [0, 1, 2, 3, 4, 5].map(|i| passes.parameter(i));
+    let usual = TAU * stiffness / h;
+    let added = added_sweeps(passes.critical_frequency() / usual, budget, most);
+    let sweeps = (budget.velocity_iterations + budget.relax_iterations).max(1) as f32;
+    let omega = usual * (1.0 + added as f32 / sweeps).sqrt();
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
     let rigid = Rigid::new(h);
     let tallest = passes.longest_column(height);
@@ -92,9 +105,16 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_positions();
         // Impulses of the step before meet contacts that came, went or moved: one sweep more.
         let settling = u32::from(substep == 0);
-        for _ in 0..budget.relax_iterations + settling {
+        for _ in 0..budget.relax_iterations + added + settling {
             passes.parting_sweep(Phase::Relax, rigid, substep);
         }
         passes.end_substep(substep);
     }
+}
+
+/// Rigid sweeps per substep for springs `ratio` times as fast as the usual ones: (h ω)² < q, the number of sweeps
+/// (`papers/shim.md`), which so has to grow with ω².
+fn added_sweeps(ratio: f32, budget: Budget, most: f32) -> u32 {
+    let sweeps = (budget.velocity_iterations + budget.relax_iterations) as f32;
+    (sweeps * (ratio * ratio - 1.0)).ceil().clamp(0.0, most) as u32
 }

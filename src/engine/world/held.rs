@@ -49,6 +49,7 @@ struct Saved {
     counts: StepCounts,
     kept: Kept,
     recycled: Recycled,
+    critical: (f32, bool),
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -83,6 +84,7 @@ impl World {
             counts: self.counts,
             kept: self.work.kept.clone(),
             recycled: self.narrow.recycled.clone(),
+            critical: (self.critical.frequency, self.critical.is_stale),
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -95,11 +97,12 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, recycled, critical, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.narrow.recycled.clone_from(recycled);
+        (self.critical.frequency, self.critical.is_stale) = *critical;
     }
 
     /// `phase` alone; with `counted`, one lane counts its operations.

@@ -18,11 +18,13 @@ use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
 use collide::Narrow;
+use columns::Critical;
 use glam::Vec2;
 use traits::Traits;
 
 mod candidates;
 mod collide;
+mod columns;
 mod counts;
 mod held;
 mod lanes;
@@ -80,6 +82,7 @@ pub struct World {
     assignment: Assignment,
     /// What the present lanes were assigned for.
     lanes_are_for: Option<([LaneWidth; 2], Order, bool, Features)>,
+    critical: Critical,
     work: Workspace,
 }
 
@@ -106,6 +109,7 @@ impl World {
             narrow: Narrow::default(),
             assignment: Assignment::default(),
             lanes_are_for: None,
+            critical: Critical::default(),
             work: Workspace::default(),
         }
     }
@@ -206,6 +210,7 @@ impl World {
         clock.lap(Phase::Pairs);
         self.update_contacts();
         clock.lap(Phase::Collide);
+        self.find_columns();
         self.assign_lanes(&self.kernel_features());
         clock.lap(Phase::Color);
         self.load_rows();
@@ -238,6 +243,7 @@ impl World {
             phases,
             record_impulses: s.record_impulses,
             points: self.counts.points,
+            critical_frequency: self.critical.frequency,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());

@@ -132,7 +132,18 @@ impl<'a> Replay<'a> {
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         let phases = PhaseFilter::ALL;
-        let input = StepInput { features, budget, h, parameters, phases, record_impulses: false, points };
+        // No column buckles in one step.
+        let (record_impulses, critical_frequency) = (false, 0.0);
+        let input = StepInput {
+            features,
+            budget,
+            h,
+            parameters,
+            phases,
+            record_impulses,
+            points,
+            critical_frequency,
+        };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],
