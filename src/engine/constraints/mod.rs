@@ -5,7 +5,7 @@
 //! solves), [`prepare`], [`impact`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
 //! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
 //! sweep; [`system`] shows the problem as vectors, in lanes as [`point_vector`], [`graph`] as nodes and edges, and [`kept`]
-//! keeps a solver's own numbers, [`columns`] says which of them buckle. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
+//! keeps a solver's own numbers, [`piles`] says how stiff and how slow contacts have to be. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
 //! added, and [`types`] how constraints of other types join.
 
 pub mod assign;
@@ -13,7 +13,6 @@ pub mod batches;
 pub mod block;
 mod body_lanes;
 pub mod bounces;
-pub mod columns;
 pub mod cone;
 pub mod dense;
 pub mod descent;
@@ -30,6 +29,7 @@ pub mod observe;
 pub mod order;
 pub mod pass;
 pub mod passes;
+pub mod piles;
 mod point_passes;
 pub mod point_vector;
 pub mod position;

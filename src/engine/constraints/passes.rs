@@ -14,10 +14,11 @@ use super::motion::Motion;
 use super::observe::ObservedRule;
 use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
+use super::piles::PileModes;
 use super::point_vector::PointVector;
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
-use super::preload::{Preload, longest_column};
+use super::preload::Preload;
 use super::prepare::{Prepare, Store};
 use super::restitution;
 use super::rules::{NormalRule, Rule, Soft};
@@ -120,8 +121,8 @@ pub struct StepInput {
     pub record_impulses: bool,
     /// Points of all contacts, to count rows by.
     pub points: usize,
-    /// See [`Passes::critical_frequency`] (rad/s).
-    pub critical_frequency: f32,
+    /// See [`Passes::pile_modes`].
+    pub pile_modes: PileModes,
 }
 
 /// One step's problem, prepared.
@@ -190,10 +191,10 @@ impl<'a> Passes<'a> {
         self.input.parameters[index]
     }
 
-    /// Angular frequency (rad/s) that springs need so that no column buckles on them, see [`super::columns`]; 0 unless
-    /// [`crate::engine::solvers::Variant::columns`] is set.
-    pub fn critical_frequency(&self) -> f32 {
-        self.input.critical_frequency
+    /// What the piles of the scene ask of soft contacts, see [`super::piles`]; nothing unless
+    /// [`crate::engine::solvers::Variant::piles`] is set.
+    pub fn pile_modes(&self) -> PileModes {
+        self.input.pile_modes
     }
 
     /// Points of all contacts.
@@ -388,11 +389,6 @@ impl<'a> Passes<'a> {
         if self.input.features.friction {
             self.run(Phase::Store, &BookDrift { reach });
         }
-    }
-
-    /// A bound on how many bodies the longest column of the scene has, `most` or less; see `preload.rs`.
-    pub fn longest_column(&self, most: f32) -> f32 {
-        longest_column(&self.work.rows, most)
     }
 
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under

@@ -30,13 +30,9 @@
 //!
 //! # How slowly
 //!
-//! The rate has to be that of the slowest mode (`papers/shim.md`). Loads do not tell it: boxes in a row along the
-//! ground that are pressed against a wall by a tenth of their weight swing as a column of as many does. But no
-//! chain is longer than all bodies, and none is slower than one of the heaviest on the lightest:
-//!
-//! ```text
-//! N ≤ n √(m_max/m_min)
-//! ```
+//! The rate has to be that of the slowest mode (`papers/shim.md`), of which [`super::piles`] has a bound. Loads do
+//! not tell it: boxes in a row along the ground that are pressed against a wall by a tenth of their weight swing as
+//! a column of as many does.
 //!
 //! # How deep springs see it
 //!
@@ -55,7 +51,7 @@ use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::rules::{Soft, Softness};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::engine::lanes::Lanes;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
 /// Follows the load and shortens the springs; see the [module](self).
@@ -100,24 +96,6 @@ impl Pass for Preload {
     }
 }
 
-/// Part of a column that swings when preload follows at the pace of all of it, measured on pyramids and rows.
-const SAFETY: f32 = 3.0;
-
-/// A bound on the length of the column (bodies) whose slowest mode is slower than any of these bodies', but no
-/// more than `most`.
-pub(super) fn longest_column(rows: &[BodyRow], most: f32) -> f32 {
-    let (mut count, mut least, mut greatest) = (0.0, f32::INFINITY, 0.0f32);
-    for inverse in rows.iter().map(|row| row.velocity[3]).filter(|&inverse| inverse > 0.0) {
-        count += SAFETY;
-        (least, greatest) = (least.min(inverse), greatest.max(inverse));
-        if count >= most {
-            return most;
-        }
-    }
-    // Without bodies there is none.
-    if count > 0.0 { (count * (greatest / least).sqrt()).min(most) } else { 1.0 }
-}
-
 /// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m).
 #[inline(never)]
 fn preload_segment<L: Lanes>(
@@ -152,25 +130,5 @@ fn preload_segment<L: Lanes>(
         for (&preload, &contact) in floats.iter().zip(filled) {
             contacts[contact as usize].preload = preload;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_column_is_longer_than_all_bodies_or_the_limit() {
-        let row = |inverse: f32| BodyRow { velocity: [0.0, 0.0, 0.0, inverse], ..BodyRow::default() };
-        let column = |inverses: &[f32]| {
-            let rows: Vec<BodyRow> = inverses.iter().map(|&inverse| row(inverse)).collect();
-            longest_column(&rows, 300.0)
-        };
-        // The ground and the inert row have no inverse mass.
-        assert_eq!(column(&[0.0, 1.0, 1.0, 0.0]), 2.0 * SAFETY);
-        assert_eq!(column(&[0.0, 1.0, 0.01]), 2.0 * SAFETY * 10.0);
-        assert_eq!(column(&[1.0; 99]), 99.0 * SAFETY);
-        assert_eq!(column(&[1.0; 1000]), 300.0);
-        assert_eq!(column(&[0.0]), 1.0);
     }
 }

@@ -65,7 +65,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),

@@ -44,7 +44,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::BAUMGARTE],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "to the convex relaxation, which is another law"),

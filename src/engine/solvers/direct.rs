@@ -85,7 +85,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::NoAllocation, "matrices are as large as the scene"),

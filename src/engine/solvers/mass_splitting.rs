@@ -42,7 +42,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),

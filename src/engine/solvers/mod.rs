@@ -135,9 +135,8 @@ pub struct Variant {
     /// Contacts are grouped by their level in the contact graph, see
     /// [`crate::engine::constraints::SweepOrder::Level`].
     pub by_levels: bool,
-    /// It is told how stiff contacts have to be so that no column buckles, see
-    /// [`crate::engine::constraints::Passes::critical_frequency`].
-    pub columns: bool,
+    /// It is told what piles ask of soft contacts, see [`crate::engine::constraints::Passes::pile_modes`].
+    pub piles: bool,
     /// What it keeps from step to step beside impulses.
     pub kept: KeptSize,
     /// What it cannot promise, and why.

@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::BAUMGARTE],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
     step,

@@ -50,7 +50,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::BAUMGARTE],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     step,

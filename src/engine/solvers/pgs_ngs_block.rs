@@ -31,7 +31,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CORRECTION],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),

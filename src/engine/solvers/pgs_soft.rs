@@ -29,7 +29,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::push_speed(2.0)],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
     step,

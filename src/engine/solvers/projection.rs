@@ -31,7 +31,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "no friction and no warm starting")],
     step,

@@ -23,7 +23,7 @@ use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
 use crate::engine::constraints::rules::{Bearing, Rigid, Soft};
 use crate::engine::params::{Budget, Parameter};
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::TAU;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -45,11 +45,11 @@ pub static SOLVER: Variant = Variant {
         Parameter::DAMPING_RATIO,
         Parameter::PUSH_SPEED,
         Parameter {
-            name: "height",
+            name: "patience",
             unit: "",
-            default: 300.0,
-            range: [1.0, 1e6],
-            meaning: "bodies in the highest column that preload may not make swing, if the scene has so many",
+            default: 4.0,
+            range: [1e-3, 1e6],
+            meaning: "time in which preload follows the load, over what the slowest mode of the pile needs",
             trials: &[],
         },
         Parameter {
@@ -71,7 +71,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: None,
     by_levels: false,
-    columns: true,
+    piles: true,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     step,
@@ -79,17 +79,16 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let [stiffness, damping_ratio, push_speed, height, share, most] =
+    let [stiffness, damping_ratio, push_speed, patience, share, most] =
         [0, 1, 2, 3, 4, 5].map(|i| passes.parameter(i));
-    let usual = TAU * stiffness / h;
-    let added = added_sweeps(passes.critical_frequency() / usual, budget, most);
+    let (usual, piles) = (TAU * stiffness / h, passes.pile_modes());
+    let added = added_sweeps(piles.critical_frequency / usual, budget, most);
     let sweeps = (budget.velocity_iterations + budget.relax_iterations).max(1) as f32;
     let omega = usual * (1.0 + added as f32 / sweeps).sqrt();
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
     let rigid = Rigid::new(h);
-    let tallest = passes.longest_column(height);
-    let (dt, slowest) = (h * budget.substeps as f32, FRAC_PI_2 / tallest);
-    let time = 1.0 / (2.0 * damping_ratio * omega * slowest * slowest);
+    let dt = h * budget.substeps as f32;
+    let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
     passes.preload(springs, share, dt / (dt + time));
     for substep in 0..budget.substeps {
         if substep == 0 {

@@ -37,7 +37,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::BAUMGARTE],
     softness: None,
     by_levels: true,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Momentum, "in the last sweep bodies below do not answer"),

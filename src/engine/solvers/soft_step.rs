@@ -36,7 +36,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::DAMPING_RATIO, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[],
     step,

@@ -41,7 +41,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: None,
     by_levels: false,
-    columns: false,
+    piles: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Cone, "friction of positions and of velocities have a cone each"),

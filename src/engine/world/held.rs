@@ -18,6 +18,7 @@
 //!   be brought back by a reset, so that they remain those of a simulation.
 
 use super::World;
+use super::piles::Found;
 use super::recycle::Recycled;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
@@ -49,7 +50,7 @@ struct Saved {
     counts: StepCounts,
     kept: Kept,
     recycled: Recycled,
-    critical: (f32, bool),
+    found: Found,
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -84,7 +85,7 @@ impl World {
             counts: self.counts,
             kept: self.work.kept.clone(),
             recycled: self.narrow.recycled.clone(),
-            critical: (self.critical.frequency, self.critical.is_stale),
+            found: self.found,
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -97,12 +98,12 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, critical, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, recycled, found, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.narrow.recycled.clone_from(recycled);
-        (self.critical.frequency, self.critical.is_stale) = *critical;
+        self.found = *found;
     }
 
     /// `phase` alone; with `counted`, one lane counts its operations.

@@ -96,7 +96,7 @@ impl World {
             component("rows", &[arrays![w.rows][0], arrays![w.sums][0], opaque(w.motion.held_bytes())]),
         ];
         // Most solvers keep nothing of their own.
-        let own = w.own_bytes() + self.critical.held_bytes();
+        let own = w.own_bytes() + self.piles.held_bytes();
         if own > 0 {
             components.push(component("solver", &[opaque(own)]));
         }

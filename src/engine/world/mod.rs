@@ -10,6 +10,7 @@ use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::assign::Assignment;
 use crate::engine::constraints::motion::{self, MotionInput};
 use crate::engine::constraints::observe::ObservedRule;
+use crate::engine::constraints::piles::Piles;
 use crate::engine::constraints::types::{ConstraintType, Joined};
 use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
@@ -18,18 +19,18 @@ use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
 use collide::Narrow;
-use columns::Critical;
 use glam::Vec2;
+use piles::Found;
 use traits::Traits;
 
 mod candidates;
 mod collide;
-mod columns;
 mod counts;
 mod held;
 mod lanes;
 mod memory;
 mod pairs;
+mod piles;
 mod recycle;
 mod settings;
 mod traits;
@@ -82,7 +83,8 @@ pub struct World {
     assignment: Assignment,
     /// What the present lanes were assigned for.
     lanes_are_for: Option<([LaneWidth; 2], Order, bool, Features)>,
-    critical: Critical,
+    piles: Piles,
+    found: Found,
     work: Workspace,
 }
 
@@ -109,7 +111,8 @@ impl World {
             narrow: Narrow::default(),
             assignment: Assignment::default(),
             lanes_are_for: None,
-            critical: Critical::default(),
+            piles: Piles::default(),
+            found: Found::default(),
             work: Workspace::default(),
         }
     }
@@ -210,7 +213,7 @@ impl World {
         clock.lap(Phase::Pairs);
         self.update_contacts();
         clock.lap(Phase::Collide);
-        self.find_columns();
+        self.find_piles();
         self.assign_lanes(&self.kernel_features());
         clock.lap(Phase::Color);
         self.load_rows();
@@ -243,7 +246,7 @@ impl World {
             phases,
             record_impulses: s.record_impulses,
             points: self.counts.points,
-            critical_frequency: self.critical.frequency,
+            pile_modes: self.found.modes,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());

@@ -11,6 +11,7 @@ use crate::engine::constraints::assign::{Assignment, Sides};
 use crate::engine::constraints::graph::Graph;
 use crate::engine::constraints::kept::Kept;
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
+use crate::engine::constraints::piles::PileModes;
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
@@ -132,18 +133,10 @@ impl<'a> Replay<'a> {
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         let phases = PhaseFilter::ALL;
-        // No column buckles in one step.
-        let (record_impulses, critical_frequency) = (false, 0.0);
-        let input = StepInput {
-            features,
-            budget,
-            h,
-            parameters,
-            phases,
-            record_impulses,
-            points,
-            critical_frequency,
-        };
+        // Nothing buckles or swings in one step.
+        let (record_impulses, pile_modes) = (false, PileModes::default());
+        let input =
+            StepInput { features, budget, h, parameters, phases, record_impulses, points, pile_modes };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],

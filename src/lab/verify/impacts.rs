@@ -1,6 +1,6 @@
 //! A5–A7 and A17–A19: bounces.
 
-use super::Required::Yes;
+use super::Required::{No, Yes};
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -100,7 +100,7 @@ pub(super) static CASES: &[Case] = &[
         "m/s",
         "1 % of 4 m/s: three sweeps of rate k_nt²/(k_nn k_tt) = 0.19",
         plastic,
-        Yes("the first substep sweeps three times"),
+        No("the second substep repeats what the first gave, and takes it back in two sweeps"),
     ),
 ];
 

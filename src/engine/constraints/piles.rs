@@ -1,0 +1,388 @@
+//! What piles ask of soft contacts: stiffness, so that no column buckles, and patience with their slowest mode.
+//!
+//! Contacts are springs here, of the stiffness m_p ω² at a point of effective mass m_p. A pile is cut into joints: the
+//! levels of the contact graph count contacts between a body and the ground, and from the top downwards the bodies
+//! of a level join the parts that they touch; what joins a part to the level below is a joint.
+//!
+//! # Buckling
+//!
+//! Joint j resists rotation by K_j = ω² Σ m_p (x_p − x̄)², with x the place of a point along it. Were all others
+//! rigid, it would buckle if K_j < g Σ m_i (z_i − z_j), the moment of the weight above for one radian. With all joints
+//! soft, Southwell's theorem bounds the critical load from below by the harmonic sum of those of one soft
+//! joint each, so that a column stands if
+//!
+//! ```text
+//! ω² ≥ ω_c² = Σ_j g Σ_i m_i (z_i − z_j) / Σ_p m_p (x_p − x̄)²
+//! ```
+//!
+//! along each path from the ground to a top. For N equal boxes that has N³/6 in place of Greenhill's N³/7.837
+//! (`papers/shim.md`): on the safe side by 14 % of ω.
+//!
+//! # The slowest mode
+//!
+//! A column of bodies, each of which one contact of k_j = ω² Σ m_p (n·d)² bears along d, has a slowest mode ω₁ that
+//! Dunkerley's formula bounds, with M_j the mass of the column from body j upwards:
+//!
+//! ```text
+//! 1/κ = ω²/ω₁² ≤ Σ_j M_j ω²/k_j
+//! ```
+//!
+//! That is N² for N equal discs, and 5/4 N² for boxes. A pile is taken to be as slow as the slowest column in it: from
+//! the top downwards, each body carries the heaviest and the slowest column that touches it from above, and is
+//! borne by the stiffest of its contacts with the level below. Both the vertical and the horizontal are searched, each
+//! through the contacts whose normal is within 60° of it: boxes in a row along the ground that are pressed against
+//! a wall swing as a column of as many does. Parts that nothing fixed bears along d, and that loads hold together (cards
+//! that lean on each other), count as a column of all their bodies that is held in its middle.
+
+use super::graph::{Graph, UNSUPPORTED};
+use crate::engine::bodies::{Bodies, BodyKind};
+use crate::engine::contacts::{Contact, ManifoldPoint};
+use crate::engine::lanes::held;
+use glam::{DVec2, Vec2};
+use std::ops::Range;
+
+/// What the piles of a scene ask for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PileModes {
+    /// Angular frequency ω_c of springs on which no column buckles (rad/s); 0 if there is none to buckle.
+    pub critical_frequency: f32,
+    /// Bound on 1/κ, the square of the frequency of springs over that of the slowest mode (1).
+    pub slowness: f32,
+}
+
+/// Least width of a joint (m, rms) over the radius of gyration of the body that stands on it: what stands on less
+/// is about to fall, not to buckle.
+const NARROWEST: f64 = 0.1;
+
+/// Least cosine between a direction and the normals of the contacts that bear along it.
+const BEARING: f32 = 0.5;
+
+/// A connected part of a pile, down to a level.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    /// kg
+    mass: f64,
+    /// Σ m (x, z), z along the direction (kg·m).
+    moment: DVec2,
+    /// Its bodies, and the least of their masses (kg).
+    bodies: u32,
+    lightest: f64,
+    /// Greatest sum of what makes joints buckle, on a path to a top (s⁻²).
+    buckling: f64,
+    /// Its joint to the level below.
+    joint: Joint,
+}
+
+/// The heaviest and the slowest column down to a body.
+#[derive(Clone, Copy, Debug, Default)]
+struct Column {
+    /// kg
+    mass: f64,
+    /// Σ M_j ω²/k_j (1)
+    slowness: f64,
+}
+
+/// All contacts between a part and the level below it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Joint {
+    /// Σ m_p (kg)
+    mass: f64,
+    /// Σ m_p (x, z) (kg·m)
+    moment: DVec2,
+    /// Σ m_p x² (kg·m²)
+    second: f64,
+    /// Least and greatest x of its points (m).
+    range: [f64; 2],
+    /// A body moves on what bears it.
+    moves: bool,
+}
+
+impl Joint {
+    /// Adds a point at x, z (m).
+    fn add(&mut self, mass: f64, at: DVec2, moves: bool) {
+        let [least, greatest] = if self.mass > 0.0 { self.range } else { [at.x; 2] };
+        self.range = [least.min(at.x), greatest.max(at.x)];
+        self.mass += mass;
+        self.moment += mass * at;
+        self.second += mass * at.x * at.x;
+        self.moves |= moves;
+    }
+
+    /// Moment of the weight above it over the resistance of its springs at 1 rad/s (s⁻²), for gravity g (m/s²) and
+    /// bodies of the radius of gyration √`gyration` (m²); 0 where the part does not stand on it.
+    fn buckling(&self, above: &Part, gyration: f64, g: f64) -> f64 {
+        let middle = self.moment / self.mass;
+        let resistance = self.second - self.mass * middle.x * middle.x;
+        let lever = above.moment / above.mass;
+        let stands = (self.range[0]..=self.range[1]).contains(&lever.x) && lever.y > middle.y;
+        if stands && !self.moves && resistance > NARROWEST * NARROWEST * gyration * self.mass {
+            g * above.mass * (lever.y - middle.y) / resistance
+        } else {
+            0.0
+        }
+    }
+}
+
+/// One direction to search.
+#[derive(Clone, Copy)]
+struct Search<'w> {
+    bodies: &'w Bodies,
+    contacts: &'w [Contact],
+    /// The direction, a unit vector.
+    up: Vec2,
+    /// Gravity against it (m/s²).
+    g: f64,
+    /// Speed (m/s) above which a body moves on what bears it.
+    still: f32,
+}
+
+impl Search<'_> {
+    /// (x, z) of a place (m).
+    fn upright(&self, at: DVec2) -> DVec2 {
+        let up = self.up.as_dvec2();
+        DVec2::new(up.perp().dot(at), up.dot(at))
+    }
+
+    /// A body alone.
+    fn part(&self, body: usize) -> Part {
+        let mass = 1.0 / f64::from(self.bodies.inv_mass[body]);
+        let moment = mass * self.upright(center(self.bodies, body));
+        Part { mass, moment, bodies: 1, lightest: mass, ..Part::default() }
+    }
+
+    /// Of a contact along the direction, over ω² (kg).
+    fn stiffness(&self, contact: &Contact) -> f64 {
+        let along = f64::from(contact.manifold.normal.dot(self.up));
+        let points = contact.manifold.points().iter();
+        along * along * points.map(|point| effective_mass(self.bodies, contact, point)).sum::<f64>()
+    }
+
+    /// It is one of those that bear along the direction.
+    fn bears(&self, contact: &Contact) -> bool {
+        contact.manifold.normal.dot(self.up).abs() >= BEARING
+    }
+}
+
+/// Finds the modes of piles; keeps its memory from call to call.
+#[derive(Clone, Debug, Default)]
+pub struct Piles {
+    graph: Graph,
+    /// Contacts that bear along the direction, the edges of `graph`.
+    bearing: Vec<u32>,
+    /// Union–find: a body that its body is in one part with.
+    parent: Vec<u32>,
+    /// Of each body that stands for its part.
+    parts: Vec<Part>,
+    /// Of each body.
+    columns: Vec<Column>,
+}
+
+impl Piles {
+    /// The modes under `gravity` (m/s²); without any there is no vertical, and x and y are searched. Joints that move
+    /// by more than `still` (m/s) do not buckle.
+    pub fn modes(&mut self, bodies: &Bodies, contacts: &[Contact], gravity: Vec2, still: f32) -> PileModes {
+        let up = -gravity.try_normalize().unwrap_or(Vec2::NEG_Y);
+        let g = f64::from(gravity.length());
+        let search = Search { bodies, contacts, up, g, still };
+        self.build(&search);
+        let buckling = if g > 0.0 { self.buckling(&search) } else { 0.0 };
+        let vertical = self.slowness(&search);
+        let search = Search { up: up.perp(), ..search };
+        self.build(&search);
+        let horizontal = self.slowness(&search);
+        PileModes { critical_frequency: buckling.sqrt() as f32, slowness: vertical.max(horizontal) as f32 }
+    }
+
+    /// Builds the graph of the contacts that bear along a direction.
+    fn build(&mut self, search: &Search<'_>) {
+        let Search { bodies, contacts, .. } = *search;
+        self.bearing.clear();
+        self.bearing.extend((0..contacts.len() as u32).filter(|&c| search.bears(&contacts[c as usize])));
+        let ends = self.bearing.iter().map(|&c| [contacts[c as usize].body_a, contacts[c as usize].body_b]);
+        self.graph.build(bodies.len(), ends, |body| bodies.kind[body as usize] == BodyKind::Dynamic);
+        self.parent.clear();
+        self.parent.extend(0..bodies.len() as u32);
+        self.parts.clear();
+        self.parts.extend((0..bodies.len()).map(|body| search.part(body)));
+    }
+
+    /// The greatest Σ_j of what makes joints buckle (s⁻²).
+    fn buckling(&mut self, search: &Search<'_>) -> f64 {
+        let mut greatest = 0.0;
+        let mut end = self.graph.upwards().len();
+        while end > 0 {
+            let level = self.level_of(self.graph.upwards()[end - 1]);
+            let below = self.graph.upwards()[..end].iter().rposition(|&body| self.level_of(body) < level);
+            let begin = below.map_or(0, |last| last + 1);
+            self.join_level(begin..end);
+            self.add_joints(begin..end, search);
+            greatest = f64::max(greatest, self.bear(begin..end, search));
+            end = begin;
+        }
+        greatest
+    }
+
+    /// Joins the bodies of a level with what they touch on it and above.
+    fn join_level(&mut self, range: Range<usize>) {
+        for i in range {
+            let body = self.graph.upwards()[i];
+            for e in 0..self.graph.edges_of(body as usize).len() {
+                let (other, _) = self.other(body, e);
+                if self.level_of(other) >= self.level_of(body) {
+                    self.join(body, other);
+                }
+            }
+        }
+    }
+
+    /// Adds the points of a level's contacts with the level below to the joints of its parts.
+    fn add_joints(&mut self, range: Range<usize>, search: &Search<'_>) {
+        let Search { bodies, contacts, still, .. } = *search;
+        for i in range {
+            let body = self.graph.upwards()[i];
+            let root = self.root(body) as usize;
+            for e in 0..self.graph.edges_of(body as usize).len() {
+                let (other, contact) = self.other(body, e);
+                if self.level_of(other) >= self.level_of(body) {
+                    continue;
+                }
+                let contact = &contacts[contact as usize];
+                for point in contact.manifold.points() {
+                    let at = center(bodies, contact.body_b as usize) + point.anchor_b.as_dvec2();
+                    let moves = speed(bodies, contact, point) > still;
+                    let joint = &mut self.parts[root].joint;
+                    joint.add(effective_mass(bodies, contact, point), search.upright(at), moves);
+                }
+            }
+        }
+    }
+
+    /// Lets the joints of a level bear what is above them.
+    fn bear(&mut self, range: Range<usize>, search: &Search<'_>) -> f64 {
+        let mut greatest = 0.0;
+        for i in range {
+            let body = self.graph.upwards()[i] as usize;
+            let root = self.root(body as u32) as usize;
+            let part = &mut self.parts[root];
+            // Empty if another body of the part has been here.
+            let joint = std::mem::take(&mut part.joint);
+            if joint.mass > 0.0 {
+                let gyration = f64::from(search.bodies.inv_mass[body] / search.bodies.inv_inertia[body]);
+                part.buckling += joint.buckling(part, gyration, search.g);
+            }
+            greatest = f64::max(greatest, part.buckling);
+        }
+        greatest
+    }
+
+    /// The slowness of the slowest column (1).
+    fn slowness(&mut self, search: &Search<'_>) -> f64 {
+        self.columns.clear();
+        self.columns.resize(search.bodies.len(), Column::default());
+        let mut greatest = 0.0;
+        for &body in self.graph.upwards().iter().rev() {
+            let (mut above, mut stiffness) = (Column::default(), 0.0);
+            for e in 0..self.graph.edges_of(body as usize).len() {
+                let (other, contact) = self.other(body, e);
+                if self.level_of(other) > self.level_of(body) {
+                    let column = self.columns[other as usize];
+                    above.mass = f64::max(above.mass, column.mass);
+                    above.slowness = f64::max(above.slowness, column.slowness);
+                } else if self.level_of(other) < self.level_of(body) {
+                    stiffness = f64::max(stiffness, search.stiffness(&search.contacts[contact as usize]));
+                }
+            }
+            let mass = above.mass + 1.0 / f64::from(search.bodies.inv_mass[body as usize]);
+            let slowness = above.slowness + mass / stiffness;
+            self.columns[body as usize] = Column { mass, slowness };
+            greatest = f64::max(greatest, slowness);
+        }
+        f64::max(greatest, self.unsupported(search))
+    }
+
+    /// The greatest slowness of parts that nothing bears: n bodies of the mass M in a chain that is held in the
+    /// middle have Σ_j M_j/m_p ≤ (n/2) (M/2)/2 at each end, over 2/5 of the least mass (two points of a box).
+    fn unsupported(&mut self, search: &Search<'_>) -> f64 {
+        let mut greatest = 0.0f64;
+        for edge in 0..self.bearing.len() {
+            let contact = &search.contacts[self.bearing[edge] as usize];
+            let (a, b) = (contact.body_a, contact.body_b);
+            let free = [a, b].iter().all(|&body| self.level_of(body) == UNSUPPORTED);
+            if free && contact.manifold.points().iter().any(|p| p.normal_impulse > 0.0) {
+                self.join(a, b);
+                let root = self.root(a) as usize;
+                let part = &self.parts[root];
+                greatest = greatest.max(f64::from(part.bodies) * part.mass / (8.0 * 0.4 * part.lightest));
+            }
+        }
+        greatest
+    }
+
+    fn level_of(&self, body: u32) -> u32 {
+        self.graph.levels().get(body as usize).copied().unwrap_or(0)
+    }
+
+    /// The body at the other end of the edge `e` of `body`, and its contact.
+    fn other(&self, body: u32, e: usize) -> (u32, u32) {
+        let edge = self.graph.edges_of(body as usize)[e] as usize;
+        let [a, b] = self.graph.ends(edge);
+        (if a == body { b } else { a }, self.bearing[edge])
+    }
+
+    /// The body that stands for the part of `body`; paths are halved on the way.
+    fn root(&mut self, mut body: u32) -> u32 {
+        while self.parent[body as usize] != body {
+            let above = self.parent[body as usize];
+            self.parent[body as usize] = self.parent[above as usize];
+            body = above;
+        }
+        body
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a == b {
+            return;
+        }
+        let other = self.parts[b as usize];
+        let part = &mut self.parts[a as usize];
+        part.mass += other.mass;
+        part.moment += other.moment;
+        part.bodies += other.bodies;
+        part.lightest = part.lightest.min(other.lightest);
+        part.buckling = part.buckling.max(other.buckling);
+        self.parent[b as usize] = a;
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        self.graph.held_bytes()
+            + held(&self.bearing)
+            + held(&self.parent)
+            + held(&self.parts)
+            + held(&self.columns)
+    }
+}
+
+/// Centre of mass of a body (m).
+fn center(bodies: &Bodies, body: usize) -> DVec2 {
+    DVec2::new(f64::from(bodies.position_x[body]), f64::from(bodies.position_y[body]))
+}
+
+/// Effective mass of a point along the normal (kg).
+fn effective_mass(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint) -> f64 {
+    let side = |body: u32, anchor: Vec2| {
+        let arm = anchor.perp_dot(contact.manifold.normal);
+        bodies.inv_mass[body as usize] + bodies.inv_inertia[body as usize] * arm * arm
+    };
+    let inverse = side(contact.body_a, point.anchor_a) + side(contact.body_b, point.anchor_b);
+    1.0 / f64::from(inverse)
+}
+
+/// Speed of body b at a point relative to body a (m/s).
+fn speed(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint) -> f32 {
+    let side = |body: u32, anchor: Vec2| {
+        bodies.velocity(body as usize) + bodies.angular_velocity[body as usize] * anchor.perp()
+    };
+    (side(contact.body_b, point.anchor_b) - side(contact.body_a, point.anchor_a)).length()
+}
