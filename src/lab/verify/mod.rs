@@ -27,6 +27,8 @@
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
 //! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step |
 //! | discs roll without lifting off | their contact points do not turn with them |
+//! | on a held body friction acts at the own surface, however deep | contact points lie there, and midway between two bodies that move |
+//! | scale does not matter | stiffness follows from the substep, no length enters |
 //!
 //! It does not promise:
 //!
@@ -41,6 +43,10 @@
 //!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
 //!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
 //!   that exceeds tan θ by little takes long to stop that.
+//! - **What is only passed.** Contacts look ahead by 2 cm along the normal of the step's beginning: a disc that passes
+//!   another closely is deflected (A20.miss), and seams of a tiled floor are felt (A24.tiles, A24.seams). Curved or swept
+//!   gaps would be a matter of the narrow phase.
+//! - **Plastic impacts through rows.** A substep sweeps twice, and its impulses are where the next one starts.
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
