@@ -412,6 +412,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
+        pile_modes: Default::default(),
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };

@@ -36,6 +36,22 @@ pub(super) static CASES: &[Case] = &[
         ),
     ),
     Case::new(
+        "A23.shake",
+        "gap or overlap under a box on a platform that shakes at g/2, all steps",
+        "m",
+        "what the platform moves beside its parabola in a step, a dt²/2",
+        shake,
+        Yes("one body: its rows converge within a step"),
+    ),
+    Case::new(
+        "A23.carried",
+        "slip of a stack of five boxes that a platform carries at 30 m/s for 5 s",
+        "m",
+        "A1.stick: 1e-4 m",
+        carried_stack,
+        Yes("contacts see differences of velocities"),
+    ),
+    Case::new(
         "A23.paddle",
         "speed of an elastic disc off a paddle that comes towards it",
         "m/s",
@@ -154,6 +170,41 @@ fn train(lab: &Lab) -> Result<Finding, Failure> {
         },
     )?;
     Ok(Finding::new(worst, 0.0, 0.01 * f64::from(count) * a))
+}
+
+/// A23. A platform that swings with a greatest acceleration of g/2 does not lose its box.
+fn shake(lab: &Lab) -> Result<Finding, Failure> {
+    let (a, omega) = (0.5 * G, 20.0);
+    let body = SceneBody::dynamic([0.0, 0.5], SceneShape::rectangle(0.5, 0.5));
+    let scene = Scene::new("shake", vec![platform_of(0.6), body]);
+    let dt = scene.dt;
+    let mut worst = 0.0;
+    carry(
+        lab,
+        scene,
+        5.0,
+        |t| [0.0, a / omega * (omega * t).sin()],
+        |world| {
+            worst = largest([worst, (center(world, 1)[1] - center(world, 0)[1] - 1.0).abs()]);
+        },
+    )?;
+    Ok(Finding::new(worst, 0.0, 0.5 * a * dt * dt))
+}
+
+/// A23. A stack does not know how fast it is.
+fn carried_stack(lab: &Lab) -> Result<Finding, Failure> {
+    let mut bodies = vec![platform_of(0.6).moving([30.0, 0.0], 0.0)];
+    for i in 0..5 {
+        let square = SceneBody::dynamic([0.0, f64::from(i) + 0.5], SceneShape::rectangle(0.5, 0.5));
+        bodies.push(square.moving([30.0, 0.0], 0.0));
+    }
+    let mut worst = 0.0;
+    lab.run(Scene::new("carried", bodies), 5.0, |world| {
+        for i in 1..6 {
+            worst = largest([worst, (center(world, i)[0] - center(world, 0)[0]).abs()]);
+        }
+    })?;
+    Ok(Finding::new(worst, 0.0, 1e-4))
 }
 
 /// A23. A disc that comes down at 4 m/s and a paddle that goes up at 2 m/s: off at 2 · 2 + 4.

@@ -23,6 +23,14 @@ pub(super) static CASES: &[Case] = &[
         Yes("the rebound keeps the discrete energy of flight"),
     ),
     Case::new(
+        "A6.flat",
+        "apexes of five elastic bounces of a box that falls flat from 1 m, and its turn at its corner, worst",
+        "m",
+        "list: 0.5 %",
+        flat_bounces,
+        Yes("both corners bounce at once"),
+    ),
+    Case::new(
         "A7.oblique",
         "speeds after an oblique elastic collision, worse of two",
         "m/s",
@@ -113,6 +121,28 @@ fn bounce(lab: &Lab) -> Result<Finding, Failure> {
 /// A6. Worst apex of twenty elastic bounces from 1 m.
 fn elastic(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce_elastic", 0.005)
+}
+
+/// A6. A box has the apexes of a disc, and does not turn.
+fn flat_bounces(lab: &Lab) -> Result<Finding, Failure> {
+    let shape = SceneShape::rectangle(0.5, 0.25).friction(0.0).restitution(1.0);
+    let scene = Scene::new("flat", vec![ground(5.0, 0.0), SceneBody::dynamic([0.0, 1.25], shape)]);
+    let (mut worst, mut apexes, mut rising) = (0.0, 0, false);
+    lab.run(scene, 4.6, |world| {
+        let ([_, y], [_, v]) = (center(world, 1), velocity(world, 1));
+        if rising && v <= 0.0 {
+            let h = f64::from(world.settings.dt) / lab.substeps();
+            let apex = y - 0.25 + v * v / (2.0 * G) - 0.5 * v * h;
+            worst = largest([worst, (apex - 1.0).abs()]);
+            apexes += 1;
+        }
+        rising = v > 0.0;
+        worst = largest([worst, 0.5 * f64::from(world.bodies.rotation_sin[1]).abs()]);
+    })?;
+    if apexes < 5 {
+        return Err(Failure::Unmeasured(format!("{apexes} bounces of five")));
+    }
+    Ok(Finding::new(worst, 0.0, 0.005))
 }
 
 /// A7. The worse of two outgoing speeds, at 2 m/s.

@@ -112,6 +112,14 @@ pub(super) static CASES: &[Case] = &[
         Yes("against a body that does not move, arms end at the own surface"),
     ),
     Case::new(
+        "A4.dropped",
+        "speed of a disc that spins, falls, bounces and comes to roll, r w0/3",
+        "m/s",
+        "arm shorter by half a slop: 7/9 δ/r of r w0",
+        dropped_spin,
+        Yes("whatever friction gives at its radius keeps angular momentum about the line of contact"),
+    ),
+    Case::new(
         "A8.conveyor",
         "slip of a box on a moving belt until it is as fast",
         "m",
@@ -280,6 +288,16 @@ fn deep_roll(lab: &Lab) -> Result<Finding, Failure> {
     let bodies = vec![ground(100.0, friction), disc.moving([START, 0.0], 0.0)];
     let world = lab.run(Scene::new("deep", bodies), 2.0 * START / (friction * G), |_| ())?;
     Ok(Finding::new(velocity(&world, 1)[0], 2.0 / 3.0 * START, 1e-4))
+}
+
+/// A4. Every impulse goes through the line of contact: I w0 = (I + m r²) w, however it bounces before it rolls.
+fn dropped_spin(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, spin) = (0.5, 20.0);
+    let shape = SceneShape::disc(radius).friction(0.3).restitution(0.5);
+    let disc = SceneBody::dynamic([0.0, 1.5], shape).moving([0.0, 0.0], -spin);
+    let world = lab.run(Scene::new("dropped", vec![ground(100.0, 0.3), disc]), 5.0, |_| ())?;
+    let truth = radius * spin / 3.0;
+    Ok(Finding::new(velocity(&world, 1)[0], truth, 7.0 / 9.0 * ARM * radius * spin))
 }
 
 /// Speed at 2 v0/(µ g), twice as late as sliding could last.
