@@ -60,9 +60,12 @@ pub struct Contact {
     pub step_impulse: [[f32; 2]; 2],
     /// By how much the contact's springs are shortened (m), for solvers that do; zero when it comes.
     pub preload: f32,
+    /// What the contact bears in statics (N), until the solver has made use of it; see
+    /// [`crate::engine::constraints::piles`].
+    pub weight: f32,
     /// Fills the last quad.
     #[doc(hidden)]
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -79,7 +82,7 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
-    /// `[of the step's impulses, preload, padding]`.
+    /// `[of the step's impulses, preload, weight, padding]`.
     pub const PRELOAD: usize = 7;
 }
 

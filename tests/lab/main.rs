@@ -8,6 +8,7 @@ mod converge;
 mod features;
 mod impulses;
 mod metrics;
+mod piles;
 mod profile;
 mod recycling;
 mod rest;

@@ -39,6 +39,7 @@ pub mod prepare;
 pub mod restitution;
 pub mod rules;
 pub mod segment;
+mod statics;
 mod sticky;
 pub mod sweep;
 pub mod system;

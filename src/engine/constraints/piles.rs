@@ -35,9 +35,11 @@
 //! that lean on each other), count as a column of all their bodies that is held in its middle.
 
 use super::graph::{Graph, UNSUPPORTED};
+use super::statics::{self, Support};
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::lanes::held;
+use crate::engine::params::LINEAR_SLOP;
 use glam::{DVec2, Vec2};
 use std::ops::Range;
 
@@ -175,19 +177,34 @@ pub struct Piles {
     parts: Vec<Part>,
     /// Of each body.
     columns: Vec<Column>,
+    /// What each body bears: force (N) and torque about its centre of mass (N·m).
+    forces: Vec<(DVec2, f64)>,
+    /// Of one body.
+    supports: Vec<Support>,
 }
 
 impl Piles {
     /// The modes under `gravity` (m/s²); without any there is no vertical, and x and y are searched. Joints that move
     /// by more than `still` (m/s) do not buckle.
-    pub fn modes(&mut self, bodies: &Bodies, contacts: &[Contact], gravity: Vec2, still: f32) -> PileModes {
+    /// Writes [`Contact::weight`], and impulses per substep of `h` (s) where there have been none.
+    pub fn modes(
+        &mut self,
+        bodies: &Bodies,
+        contacts: &mut [Contact],
+        gravity: Vec2,
+        [still, h]: [f32; 2],
+    ) -> PileModes {
+        contacts.iter_mut().for_each(|contact| contact.weight = 0.0);
         let up = -gravity.try_normalize().unwrap_or(Vec2::NEG_Y);
         let g = f64::from(gravity.length());
         let search = Search { bodies, contacts, up, g, still };
         self.build(&search);
         let buckling = if g > 0.0 { self.buckling(&search) } else { 0.0 };
         let vertical = self.slowness(&search);
-        let search = Search { up: up.perp(), ..search };
+        if g > 0.0 {
+            self.weigh(bodies, contacts, gravity.as_dvec2(), still, h);
+        }
+        let search = Search { bodies, contacts, up: up.perp(), g, still };
         self.build(&search);
         let horizontal = self.slowness(&search);
         PileModes { critical_frequency: buckling.sqrt() as f32, slowness: vertical.max(horizontal) as f32 }
@@ -300,6 +317,44 @@ impl Piles {
         f64::max(greatest, self.unsupported(search))
     }
 
+    /// Writes what contacts bear at rest, from the top downwards: each body stands, with what it bears, on its
+    /// contacts with the level below. Contacts that have borne nothing yet get their impulses per substep of `h` (s).
+    fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
+        self.forces.clear();
+        self.forces.resize(bodies.len(), (DVec2::ZERO, 0.0));
+        for &body in self.graph.upwards().iter().rev() {
+            let b = body as usize;
+            let (borne, torque) = self.forces[b];
+            let weight = gravity * f64::from(bodies.gravity_scale[b]) / f64::from(bodies.inv_mass[b]);
+            self.supports.clear();
+            for e in 0..self.graph.edges_of(b).len() {
+                let (other, contact) = self.other(body, e);
+                if self.level_of(other) < self.level_of(body) {
+                    self.supports.extend(supports(bodies, contacts, contact, body, still));
+                }
+            }
+            let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
+            statics::load(&mut self.supports, borne + weight, torque, gyration);
+            for support in &self.supports {
+                let contact = &mut contacts[support.contact as usize];
+                contact.weight += support.load[0] as f32;
+                let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
+                let arm = center(bodies, b) + support.arm - center(bodies, other);
+                self.forces[other].0 -= support.force();
+                self.forces[other].1 -= arm.perp_dot(support.force());
+            }
+            for support in &self.supports {
+                let contact = &mut contacts[support.contact as usize];
+                let is_new = contact.preload == 0.0;
+                let point = &mut contact.manifold.points[support.point];
+                if is_new && point.normal_impulse == 0.0 {
+                    let impulse = support.load.map(|load| load as f32 * h);
+                    [point.normal_impulse, point.tangent_impulse] = impulse;
+                }
+            }
+        }
+    }
+
     /// The greatest slowness of parts that nothing bears: n bodies of the mass M in a chain that is held in the
     /// middle have Σ_j M_j/m_p ≤ (n/2) (M/2)/2 at each end, over 2/5 of the least mass (two points of a box).
     fn unsupported(&mut self, search: &Search<'_>) -> f64 {
@@ -361,7 +416,34 @@ impl Piles {
             + held(&self.parent)
             + held(&self.parts)
             + held(&self.columns)
+            + held(&self.forces)
+            + held(&self.supports)
     }
+}
+
+/// The points of the contact `index` on which `body` rests: those that touch and move by no more than `still` (m/s).
+fn supports<'c>(
+    bodies: &'c Bodies,
+    contacts: &'c [Contact],
+    index: u32,
+    body: u32,
+    still: f32,
+) -> impl Iterator<Item = Support> + 'c {
+    let contact = &contacts[index as usize];
+    let is_b = contact.body_b == body;
+    let normal = contact.manifold.normal.as_dvec2();
+    let rests =
+        move |p: &ManifoldPoint| p.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, p) <= still;
+    contact.manifold.points().iter().enumerate().filter(move |(_, p)| rests(p)).map(move |(point, p)| {
+        Support {
+            contact: index,
+            point,
+            normal: if is_b { normal } else { -normal },
+            arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
+            friction: f64::from(contact.friction),
+            load: [0.0; 2],
+        }
+    })
 }
 
 /// Centre of mass of a body (m).

@@ -28,6 +28,11 @@
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
 //!
+//! # Where it begins
+//!
+//! What statics says of the load ([`Contact::weight`], from time to time) follows no motion, so that a preload taken
+//! from it makes nothing swing: a contact that bears as much at least has its sag at once.
+//!
 //! # How slowly
 //!
 //! The rate has to be that of the slowest mode (`papers/shim.md`), of which [`super::piles`] has a bound. Loads do
@@ -63,10 +68,15 @@ pub(super) struct Preload {
     pub share: f32,
     /// Share of the way to the sag per step (1).
     pub rate: f32,
+    /// Substep (s).
+    pub h: f32,
 }
 
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
+
+/// Part by which an impulse may be short of another by rounding (1).
+const ROUNDED: f32 = 1e-5;
 
 impl Pass for Preload {
     fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
@@ -90,22 +100,23 @@ impl Pass for Preload {
                 &segment,
                 &layout,
                 on.contacts,
-                [compliance, self.rate, deepest],
+                [compliance, self.rate, deepest, self.h],
             );
         }
     }
 }
 
-/// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m).
+/// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m), substep
+/// (s).
 #[inline(never)]
 fn preload_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
     layout: &Layout,
     contacts: &mut [Contact],
-    factors: [f32; 3],
+    factors: [f32; 4],
 ) {
-    let [compliance, rate, deepest] = factors.map(L::splat);
+    let [compliance, rate, deepest, h] = factors.map(L::splat);
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
@@ -116,10 +127,16 @@ fn preload_segment<L: Lanes>(
             mass = mass + record[layout.at(p, layout.normal_mass)];
         }
         // A lane without a contact has no mass.
-        let sag = (compliance * impulse / mass.select_positive(mass, L::splat(1.0)))
-            .min(L::splat(SPECULATIVE_DISTANCE));
-        let [_, last, ..] =
+        let mass = mass.select_positive(mass, L::splat(1.0));
+        let [_, mut last, weight, _] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
+        if weight.any_positive() {
+            let borne = h * weight;
+            let is_borne = L::splat(ROUNDED).mul_add(borne, impulse) - borne;
+            last = last.max(is_borne.select_positive(compliance * borne / mass, L::zero()));
+            filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
+        }
+        let sag = (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE));
         let preload = rate.mul_add(sag - last, last).min(sag);
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);

@@ -32,7 +32,8 @@ impl World {
             let gravity = Vec2::from(self.settings.gravity);
             // What gravity does in a step.
             let still = gravity.length() * self.settings.dt;
-            let modes = self.piles.modes(&self.bodies, &self.contacts, gravity, still);
+            let modes =
+                self.piles.modes(&self.bodies, &mut self.contacts, gravity, [still, self.settings.h()]);
             *found = Found { modes, contacts: self.contacts.len(), is_stale: false };
         }
     }

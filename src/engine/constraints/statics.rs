@@ -1,0 +1,79 @@
+//! What the points under a body bear at rest.
+//!
+//! The loads F of the points balance a force f and a torque τ as well as their laws allow: with the columns
+//! (u, r × u/ρ) of the unit normals and tangents u in A, and ρ the radius of gyration,
+//!
+//! ```text
+//! least |A F + (f, τ/ρ)|,   F_n ≥ 0,   |F_t| ≤ µ F_n
+//! ```
+//!
+//! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
+//! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = Aᵀ (A Aᵀ + ε)⁻¹ b. Points that would
+//! pull are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times.
+
+use glam::{DMat3, DVec2, DVec3};
+
+/// Solutions per body, each for what the last one has left out.
+const ROUNDS: usize = 4;
+
+/// What is added to the diagonal of A Aᵀ, which has numbers of the order of 1.
+const RIDGE: f64 = 1e-9;
+
+/// A point on which a body stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Support {
+    /// Index of its contact.
+    pub contact: u32,
+    /// Which of its points it is.
+    pub point: usize,
+    /// Unit normal towards the body.
+    pub normal: DVec2,
+    /// From the body's centre of mass (m).
+    pub arm: DVec2,
+    /// Coulomb coefficient (1).
+    pub friction: f64,
+    /// Along the normal and along (n_y, −n_x) of it (N).
+    pub load: [f64; 2],
+}
+
+impl Support {
+    /// (n_y, −n_x) of the normal.
+    fn tangent(&self) -> DVec2 {
+        -self.normal.perp()
+    }
+
+    /// What it pushes the body with (N).
+    pub fn force(&self) -> DVec2 {
+        self.load[0] * self.normal + self.load[1] * self.tangent()
+    }
+}
+
+/// Loads `supports` with a force (N) and a torque (N·m) on a body of this radius of gyration (m).
+pub(super) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration: f64) {
+    let column = |s: &Support, u: DVec2| {
+        DVec3::new(u.x, u.y, if gyration > 0.0 { s.arm.perp_dot(u) / gyration } else { 0.0 })
+    };
+    let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
+    let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
+    supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
+    for round in 0..ROUNDS {
+        let (mut matrix, mut rest) = (DMat3::from_diagonal(DVec3::splat(RIDGE)), all);
+        for support in supports.iter().filter(|s| s.load[0] > 0.0) {
+            matrix += outer(column(support, support.normal));
+            let tangent = column(support, support.tangent());
+            if round == 0 {
+                matrix += outer(tangent);
+            } else {
+                rest -= support.load[1] * tangent;
+            }
+        }
+        let solution = matrix.inverse() * rest;
+        for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
+            let normal = column(support, support.normal).dot(solution).max(0.0);
+            let tangent =
+                if round == 0 { column(support, support.tangent()).dot(solution) } else { support.load[1] };
+            let bound = support.friction * normal;
+            support.load = [normal, tangent.clamp(-bound, bound)];
+        }
+    }
+}

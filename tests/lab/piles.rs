@@ -1,0 +1,124 @@
+//! What piles ask of soft contacts, against sums worked out by hand.
+
+use super::common;
+use glam::Vec2;
+use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
+use simpulse::engine::constraints::piles::{PileModes, Piles};
+use simpulse::engine::shapes::Shape;
+use simpulse::engine::solvers;
+use simpulse::engine::world::{Settings, World};
+
+const GRAVITY: Vec2 = Vec2::new(0.0, -10.0);
+
+fn modes(world: &mut World) -> PileModes {
+    world.find_contacts();
+    Piles::default().modes(&world.bodies, &mut world.contacts, Vec2::from(world.settings.gravity), [1.0, 1.0])
+}
+
+fn scene(name: &str) -> World {
+    common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
+}
+
+/// Unit boxes at these places on a ground whose surface is y = 0, with a wall whose surface is x = 0 if there is
+/// one, under `gravity`.
+fn boxes(places: &[[f64; 2]], with_wall: bool, gravity: Vec2) -> World {
+    let settings = Settings { gravity: gravity.into(), ..Settings::new(solvers::find("shim").unwrap()) };
+    let mut world = World::new(settings);
+    let block = |half: [f32; 2]| {
+        let shape = Shape::rectangle("box", Vec2::from(half), Vec2::ZERO, 0.0, 0.0).unwrap();
+        vec![ShapeDef::new(shape)]
+    };
+    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], block([300.0, 1.0])));
+    if with_wall {
+        world.add_body(&BodyDef::new(BodyKind::Static, [-1.0, 10.0], block([1.0, 20.0])));
+    }
+    for &place in places {
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, place, block([0.5, 0.5])));
+    }
+    world
+}
+
+/// Bodies of 1 kg, two equal masses at a joint and one on the ground: Σ j/(1/2) up to N − 1, and N.
+#[test]
+fn a_column_of_discs_is_slow_by_the_square_of_its_length_and_has_hinges() {
+    for count in [1u32, 2, 10, 100] {
+        let PileModes { critical_frequency, slowness } = modes(&mut scene(&format!("disc_column:{count}")));
+        let expected = f64::from(count).powi(2);
+        assert!((f64::from(slowness) - expected).abs() <= 1e-5 * expected, "{count}: {slowness}");
+        assert_eq!(critical_frequency, 0.0, "{count}");
+    }
+}
+
+/// A corner of a unit box has x = 1/2, so that m_p = m/(2 (1 + 6/4)) = m/5 between boxes and 2m/5 on the ground, and
+/// Σ m_p x² is a half of it. Joint j from the top carries the moment g m j²/2.
+#[test]
+fn boxes_buckle_on_springs_below_southwells_bound() {
+    for count in [2u32, 10, 60] {
+        let places: Vec<_> = (0..count).map(|i| [0.0, 0.5 + f64::from(i)]).collect();
+        let found = f64::from(modes(&mut boxes(&places, false, GRAVITY)).critical_frequency);
+        let moment = |j: u32| 10.0 * f64::from(j * j) / 2.0;
+        let squared = (1..count).map(|j| moment(j) / 0.1).sum::<f64>() + moment(count) / 0.2;
+        assert!((found * found - squared).abs() <= 1e-3 * squared, "{count}: {found} for {}", squared.sqrt());
+    }
+}
+
+#[test]
+fn a_bounce_in_the_air_or_without_gravity_asks_for_nothing() {
+    assert_eq!(modes(&mut boxes(&[[0.0, 3.0]], false, GRAVITY)), PileModes::default());
+    let column = [[0.0, 0.5], [0.0, 1.5]];
+    assert_eq!(modes(&mut boxes(&column, false, Vec2::ZERO)).critical_frequency, 0.0);
+}
+
+/// Boxes along the ground that their weight presses against a wall are a column that lies down, and each of them stands
+/// on the ground.
+#[test]
+fn a_row_against_a_wall_is_as_slow_as_a_column() {
+    let row: Vec<_> = (0..30).map(|i| [0.5 + f64::from(i), 0.5]).collect();
+    let column: Vec<_> = (0..30).map(|i| [0.0, 0.5 + f64::from(i)]).collect();
+    let lying = modes(&mut boxes(&row, true, Vec2::new(-1.0, -10.0)));
+    let standing = modes(&mut boxes(&column, false, GRAVITY));
+    assert!((lying.slowness / standing.slowness - 1.0).abs() < 0.02, "{lying:?} {standing:?}");
+    // A box tilts on 2 m_p = 4/5 kg at x = 1/2: (10.05 · 1/2)/(1/5).
+    assert!(lying.critical_frequency < 6.0, "{lying:?}");
+}
+
+/// Boxes beside a column hang on it by a corner, and make it hardly stiffer and no shorter.
+#[test]
+fn what_leans_on_a_column_does_not_hide_it() {
+    let mut places: Vec<_> = (0..40).map(|i| [0.0, 0.5 + f64::from(i)]).collect();
+    let alone = modes(&mut boxes(&places, false, GRAVITY));
+    places.push([1.0, 20.5]);
+    places.push([1.0, 0.5]);
+    let leaning = modes(&mut boxes(&places, false, GRAVITY));
+    assert!(leaning.critical_frequency >= 0.95 * alone.critical_frequency, "{leaning:?} {alone:?}");
+    assert!(leaning.slowness >= alone.slowness, "{leaning:?} {alone:?}");
+}
+
+/// The base of a pyramid is as wide as it is high.
+#[test]
+fn a_pyramid_is_slow_and_does_not_buckle() {
+    let pyramid = modes(&mut scene("pyramid:30"));
+    let column: Vec<_> = (0..30).map(|i| [0.0, 0.5 + f64::from(i)]).collect();
+    let column = modes(&mut boxes(&column, false, GRAVITY));
+    assert!(pyramid.critical_frequency < 0.2 * column.critical_frequency, "{pyramid:?} {column:?}");
+    let ratio = pyramid.slowness / column.slowness;
+    assert!((0.5..2.0).contains(&ratio), "{pyramid:?} {column:?}");
+}
+
+/// Sweeps that a step of `shim` makes.
+fn sweeps(name: &str) -> usize {
+    let mut world = scene(name);
+    world.step().unwrap();
+    world.counts.sweeps
+}
+
+#[test]
+fn only_a_column_that_would_buckle_pays_for_it() {
+    let usual = sweeps("disc_column:60");
+    assert_eq!([sweeps("stack:30"), sweeps("pyramid:30"), sweeps("card_house")], [usual; 3]);
+    // Springs of the square root of the added sweeps, and so 32 at most.
+    let [sixty, thousand] = ["stack:60", "stack:1000"].map(sweeps);
+    assert!(usual < sixty && sixty < thousand, "{usual} {sixty} {thousand}");
+    let substeps = solvers::find("shim").unwrap().budget.substeps as usize;
+    assert_eq!(thousand, usual + 32 * substeps);
+}
