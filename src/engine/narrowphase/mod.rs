@@ -65,10 +65,12 @@ pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_d
         Kind::Hulls => {
             Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]).collide(&poses, speculative_distance)
         }
-        Kind::HullCircle => HullCircle::new(HullRow::new(a), row_b).collide(&poses, speculative_distance),
-        Kind::CircleHull => {
-            HullCircle::new(HullRow::new(b), row_a).collide(&poses.swapped(), speculative_distance).swapped()
+        Kind::HullCircle => {
+            HullCircle::new(HullRow::new(a), row_b).collide(&poses, [0.0; 2], speculative_distance)
         }
+        Kind::CircleHull => HullCircle::new(HullRow::new(b), row_a)
+            .collide(&poses.swapped(), [0.0; 2], speculative_distance)
+            .swapped(),
     };
     touch.manifold()
 }
