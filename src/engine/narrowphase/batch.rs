@@ -133,7 +133,8 @@ impl Jobs {
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
-    /// What bodies move and turn by in the coming step if nothing hinders them, `[x, y, θ, 0]` (m, rad), by body.
+    /// What bodies move and turn by in the coming step, and a little longer, if nothing hinders them: `[x, y, θ, 0]`
+    /// (m, rad), by body.
     pub ways: &'a [Quad],
     /// Shapes by number.
     pub shapes: &'a Shapes,

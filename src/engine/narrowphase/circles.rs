@@ -2,8 +2,8 @@
 //!
 //! # Circles that pass
 //!
-//! A step sees a gap along the normal n of its beginning. Two circles that pass each other on the way Δ of one step are
-//! farther apart than that says: with the distance ℓ of their centres and Δ = (Δ_n, Δ_t), at the end
+//! A step sees a gap along the normal n of its beginning. Two circles that pass each other on the way Δ of one step, and
+//! of the substep that a sweep at its end looks ahead, are farther apart than that says: with the distance ℓ of their centres and Δ = (Δ_n, Δ_t), at the end
 //!
 //! ```text
 //! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)

@@ -35,6 +35,9 @@ pub(super) struct Narrow {
     count: usize,
 }
 
+/// Steps that ways are made of (1): a sweep that relaxes at the end of a step looks a substep ahead.
+const AHEAD: f32 = 1.25;
+
 /// `Candidate::contact` of a pair that has just begun to touch: this bit and its place in `fresh`.
 const FRESH: u32 = 1 << 31;
 
@@ -71,7 +74,7 @@ impl World {
             ],
         }));
         narrow.ways.clear();
-        let dt = self.settings.dt;
+        let dt = AHEAD * self.settings.dt;
         narrow.ways.extend((0..bodies.len()).map(|i| {
             Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
         }));

@@ -81,7 +81,7 @@ pub(super) static CASES: &[Case] = &[
         "m/s, m",
         "1e-3",
         seams,
-        No("contacts look ahead by 2 cm, and see the corner of the next tile along a slanted normal"),
+        Yes("gaps of circles are those at the end of their way"),
     ),
 ];
 
