@@ -177,8 +177,8 @@ pub struct Piles {
     parts: Vec<Part>,
     /// Of each body.
     columns: Vec<Column>,
-    /// What each body bears: force (N) and torque about its centre of mass (N·m).
-    forces: Vec<(DVec2, f64)>,
+    /// What each body bears: weight (N), and its torque about the centre of mass (N·m).
+    forces: Vec<[f64; 2]>,
     /// Of one body.
     supports: Vec<Support>,
 }
@@ -320,12 +320,11 @@ impl Piles {
     /// Writes what contacts bear at rest, from the top downwards: each body stands, with what it bears, on its
     /// contacts with the level below. Contacts that have borne nothing yet get their impulses per substep of `h` (s).
     fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
+        let up = -gravity.normalize();
         self.forces.clear();
-        self.forces.resize(bodies.len(), (DVec2::ZERO, 0.0));
+        self.forces.resize(bodies.len(), [0.0; 2]);
         for &body in self.graph.upwards().iter().rev() {
             let b = body as usize;
-            let (borne, torque) = self.forces[b];
-            let weight = gravity * f64::from(bodies.gravity_scale[b]) / f64::from(bodies.inv_mass[b]);
             self.supports.clear();
             for e in 0..self.graph.edges_of(b).len() {
                 let (other, contact) = self.other(body, e);
@@ -333,15 +332,24 @@ impl Piles {
                     self.supports.extend(supports(bodies, contacts, contact, body, still));
                 }
             }
+            let [borne, torque] = self.forces[b];
+            let own = gravity.length() * f64::from(bodies.gravity_scale[b]) / f64::from(bodies.inv_mass[b]);
             let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
-            statics::load(&mut self.supports, borne + weight, torque, gyration);
+            let weight = borne + own;
+            statics::load(&mut self.supports, -weight * up, torque, gyration);
+            // Weight goes down the pile, no more and no less; pushes to the sides end here.
+            let carried = |support: &Support| support.force().dot(up).max(0.0);
+            let part = weight / self.supports.iter().map(carried).sum::<f64>();
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];
                 contact.weight += support.load[0] as f32;
                 let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
                 let arm = center(bodies, b) + support.arm - center(bodies, other);
-                self.forces[other].0 -= support.force();
-                self.forces[other].1 -= arm.perp_dot(support.force());
+                if part.is_finite() {
+                    let carried = part * carried(support);
+                    self.forces[other][0] += carried;
+                    self.forces[other][1] -= carried * arm.perp_dot(up);
+                }
             }
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];

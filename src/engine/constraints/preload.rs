@@ -20,11 +20,11 @@
 //! At the start of each step
 //!
 //! ```text
-//! d ← min(d + (φ sag − d) · rate, φ sag)
+//! d ← min(d + (goal − d) · rate, goal),    goal = sag − min((1 − φ) sag, 20 µm)
 //! ```
 //!
 //! slowly upwards, and down at once: a preload that the load does not call for would push bodies apart. The
-//! part φ < 1 leaves some overlap, so that points at rest stay points.
+//! part φ < 1 leaves some overlap, 20 µm at most, so that points at rest stay points.
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
 //!
@@ -75,6 +75,9 @@ pub(super) struct Preload {
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
 
+/// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
+const LEFT: f32 = 2e-5;
+
 /// Part by which an impulse may be short of another by rounding (1).
 const ROUNDED: f32 = 1e-5;
 
@@ -92,7 +95,7 @@ impl Pass for Preload {
                 OppositeKind::Dynamic => self.springs.dynamic,
                 _ => self.springs.against_static,
             };
-            let compliance = self.share * impulse_scale / (mass_scale * bias_rate);
+            let compliance = impulse_scale / (mass_scale * bias_rate);
             let deepest = self.springs.push_speed / (mass_scale * bias_rate);
             let layout = F::layout(segment.opposite);
             preload_segment::<L>(
@@ -100,23 +103,25 @@ impl Pass for Preload {
                 &segment,
                 &layout,
                 on.contacts,
-                [compliance, self.rate, deepest, self.h],
+                [compliance, self.rate, deepest, self.h, 1.0 - self.share],
             );
         }
     }
 }
 
 /// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m), substep
-/// (s).
+/// (s), part of the sag that is left.
 #[inline(never)]
 fn preload_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
     layout: &Layout,
     contacts: &mut [Contact],
-    factors: [f32; 4],
+    factors: [f32; 5],
 ) {
-    let [compliance, rate, deepest, h] = factors.map(L::splat);
+    // Without preload, all of the sag is left.
+    let most_left = L::splat(if factors[4] < 1.0 { LEFT } else { f32::INFINITY });
+    let [compliance, rate, deepest, h, left] = factors.map(L::splat);
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
@@ -128,16 +133,20 @@ fn preload_segment<L: Lanes>(
         }
         // A lane without a contact has no mass.
         let mass = mass.select_positive(mass, L::splat(1.0));
+        let goal = |impulse: L| {
+            let sag = (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE));
+            sag - (left * sag).min(most_left)
+        };
         let [_, mut last, weight, _] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
         if weight.any_positive() {
             let borne = h * weight;
             let is_borne = L::splat(ROUNDED).mul_add(borne, impulse) - borne;
-            last = last.max(is_borne.select_positive(compliance * borne / mass, L::zero()));
+            last = last.max(is_borne.select_positive(goal(borne), L::zero()));
             filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
         }
-        let sag = (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE));
-        let preload = rate.mul_add(sag - last, last).min(sag);
+        let most = goal(impulse);
+        let preload = rate.mul_add(most - last, last).min(most);
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);
             let depth = L::splat(EARNED).mul_add(preload, deepest);

@@ -9,15 +9,19 @@
 //!
 //! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
 //! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = Aᵀ (A Aᵀ + ε)⁻¹ b. Points that would
-//! pull are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times.
+//! pull are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times. No point gets
+//! more than [`GREATEST`] times the force, as wedges would ask for.
 
 use glam::{DMat3, DVec2, DVec3};
 
 /// Solutions per body, each for what the last one has left out.
 const ROUNDS: usize = 4;
 
+/// Greatest load of a point over the force on the body (1).
+const GREATEST: f64 = 2.0;
+
 /// What is added to the diagonal of A Aᵀ, which has numbers of the order of 1.
-const RIDGE: f64 = 1e-9;
+const RIDGE: f64 = 1e-6;
 
 /// A point on which a body stands.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +60,7 @@ pub(super) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
     let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
     let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
+    let greatest = GREATEST * force.length();
     for round in 0..ROUNDS {
         let (mut matrix, mut rest) = (DMat3::from_diagonal(DVec3::splat(RIDGE)), all);
         for support in supports.iter().filter(|s| s.load[0] > 0.0) {
@@ -69,7 +74,7 @@ pub(super) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
         }
         let solution = matrix.inverse() * rest;
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
-            let normal = column(support, support.normal).dot(solution).max(0.0);
+            let normal = column(support, support.normal).dot(solution).clamp(0.0, greatest);
             let tangent =
                 if round == 0 { column(support, support.tangent()).dot(solution) } else { support.load[1] };
             let bound = support.friction * normal;
