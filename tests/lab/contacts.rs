@@ -1,10 +1,9 @@
 //! Law: contacts that are kept and updated in place are those that a fresh look finds.
 
-use glam::Vec2;
 use simpulse::engine::broadphase::{Proxy, all_pairs};
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::narrowphase::collide;
+use simpulse::engine::narrowphase::collide_in_step;
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
@@ -33,17 +32,16 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
         let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
         let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);
         let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes[shape as usize]);
-        let mut manifold = collide(shape_a, &pose_a, shape_b, &pose_b, SPECULATIVE_DISTANCE);
+        // What bodies do in the coming step and a quarter.
+        let ways = [body_a, body_b].map(|body| {
+            let (v, dt) = (bodies.velocity(body as usize), 1.25 * world.settings.dt);
+            [dt * v.x, dt * v.y, dt * bodies.angular_velocity[body as usize], 0.0]
+        });
+        let held = !proxies[a as usize].dynamic;
+        let poses = [&pose_a, &pose_b];
+        let mut manifold = collide_in_step([shape_a, shape_b], poses, ways, held, SPECULATIVE_DISTANCE);
         if manifold.count == 0 {
             continue;
-        }
-        if !proxies[a as usize].dynamic {
-            // On the surface of b instead of midway.
-            for point in &mut manifold.points {
-                let (n, s) = (manifold.normal, 0.5 * point.separation);
-                let moved = |r: Vec2| Vec2::new(s.mul_add(n.x, r.x), s.mul_add(n.y, r.y));
-                (point.anchor_a, point.anchor_b) = (moved(point.anchor_a), moved(point.anchor_b));
-            }
         }
         if let Some(old) = last.iter().find(|c| (c.shape_a, c.shape_b) == (a, b)) {
             for point in &mut manifold.points[..manifold.count as usize] {

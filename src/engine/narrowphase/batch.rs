@@ -3,7 +3,7 @@
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
-use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch, rotate};
+use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{
@@ -215,16 +215,9 @@ fn run<L: Lanes>(
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
             let (touch, distance) = circles::with_distance(&pair, speculative);
-            let touch = touch.on_held(poses.held[0]);
             let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-            // Of the circles' centres, which turn with their bodies.
-            let of = |k: usize| {
-                let [x, y] = rotate(poses.rotation[k], [pair.place[k][0], pair.place[k][1]]);
-                let [dx, dy, turn, _] = ways[k];
-                [turn.neg_mul_add(y, dx), turn.mul_add(x, dy)]
-            };
-            let ([ax, ay], [bx, by]) = (of(0), of(1));
-            circles::passing(touch, distance, [bx - ax, by - ay])
+            let gap = circles::passing(&touch, distance, pair.way(ways));
+            touch.on_held(poses.held[0]).with_gap(gap)
         }),
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
@@ -239,8 +232,9 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
-                let way = way_of_circle(ways, bodies, &poses, pair.center(&poses));
-                pair.collide(&poses, way, speculative).on_held(poses.held[0])
+                let way = pair.way(&poses, bodies.map(|body| L::gather_quads::<1, 0>(ways, body)));
+                let (touch, gap) = pair.collide(&poses, way, speculative);
+                touch.on_held(poses.held[0]).with_gap(gap)
             })
         }
         Kind::CircleHull => {
@@ -248,26 +242,13 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
-                let way = way_of_circle(ways, [bodies[1], bodies[0]], &poses, pair.center(&poses));
-                pair.collide(&poses, way, speculative).swapped().on_held(poses.held[1])
+                let way =
+                    pair.way(&poses, [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body)));
+                let (touch, gap) = pair.collide(&poses, way, speculative);
+                touch.swapped().on_held(poses.held[1]).with_gap(gap)
             })
         }
     }
-}
-
-/// How a circle at `center` from its body's centre moves in the frame of the other body, which comes first (m).
-#[inline(always)]
-fn way_of_circle<L: Lanes>(
-    ways: &[Quad],
-    bodies: [LaneIndex<L::Index>; 2],
-    poses: &Poses<L>,
-    center: [L; 2],
-) -> [L; 2] {
-    let [a, b] = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-    let from_a = [poses.centers[0] + center[0], poses.centers[1] + center[1]];
-    let of = |way: [L; 4], r: [L; 2]| [way[2].neg_mul_add(r[1], way[0]), way[2].mul_add(r[0], way[1])];
-    let ([ax, ay], [bx, by]) = (of(a, from_a), of(b, center));
-    [bx - ax, by - ay]
 }
 
 /// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,

@@ -20,10 +20,10 @@ use crate::engine::params::LINEAR_SLOP;
 /// Shares of the slop: from which term on circles pass, and what gap they then have at the end (1).
 pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
 
-/// `touch` of two circles whose centres are `distance` apart, with gaps as they are for circles that move by `way`
-/// against each other in the coming step (m); see the [module](self).
+/// The gap (m) of two circles whose centres are `distance` apart (m) and that move by `way` against each other in the
+/// coming step (m); see the [module](self).
 #[inline(always)]
-pub fn passing<L: Lanes>(touch: Touch<L>, distance: L, way: [L; 2]) -> Touch<L> {
+pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
     let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(LINEAR_SLOP));
     let gap = touch.separation[0];
     let [nx, ny] = touch.normal;
@@ -43,8 +43,7 @@ pub fn passing<L: Lanes>(touch: Touch<L>, distance: L, way: [L; 2]) -> Touch<L> 
     let free = L::splat(PASSING[1] * LINEAR_SLOP) - along;
     let has_passed = (one - part).min(bend - slop * L::splat(PASSING[0]));
     let raised = has_passed.select_positive(raised.max(free), raised);
-    let gap = gap.min(closest + slop).select_positive(raised, gap);
-    Touch { separation: [gap; 2], ..touch }
+    gap.min(closest + slop).select_positive(raised, gap)
 }
 
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.

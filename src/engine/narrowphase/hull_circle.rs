@@ -7,7 +7,7 @@
 
 use super::circles::PASSING;
 use super::hull::{Hull, HullRow};
-use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate};
+use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 use crate::engine::params::LINEAR_SLOP;
 
@@ -35,19 +35,21 @@ impl<L: Lanes> HullCircle<L> {
         self.circle = ([place[0], place[1]], size[2]);
     }
 
-    /// The circle's centre from that of its body, along world axes (m).
+    /// How the circle's centre moves in the frame of the hull where bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
-    pub fn center(&self, poses: &Poses<L>) -> [L; 2] {
-        rotate(poses.rotation[1], self.circle.0)
+    pub fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
+        let center = rotate(poses.rotation[1], self.circle.0);
+        way_between(ways, [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center])
     }
 
-    /// Their contacts; those farther apart than `speculative` (m) are left out. Gaps at a corner that the circle
-    /// passes are as for two circles ([`super::circles`]), where it moves by `way` against the hull in the coming step (m).
+    /// Their contacts; those farther apart than `speculative` (m) are left out. And their gaps where the circle moves
+    /// by `way` against the hull in the coming step (m), at a corner that it passes as for two circles
+    /// ([`super::circles`]).
     #[inline(always)]
-    pub fn collide(&self, poses: &Poses<L>, way: [L; 2], speculative: f32) -> Touch<L> {
+    pub fn collide(&self, poses: &Poses<L>, way: [L; 2], speculative: f32) -> (Touch<L>, L) {
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
         let rotation_a = poses.rotation[0];
-        let (center, radius) = (self.center(poses), self.circle.1);
+        let (center, radius) = (rotate(poses.rotation[1], self.circle.0), self.circle.1);
         let c = unrotate(rotation_a, [poses.centers[0] + center[0], poses.centers[1] + center[1]]);
         let corners = &self.hull.corners[..self.count];
         let mut height = L::splat(f32::NEG_INFINITY);
@@ -103,14 +105,15 @@ impl<L: Lanes> HullCircle<L> {
         let arm = half.mul_add(separation, radius);
         let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
         let anchor_a = [anchor_b[0] + poses.centers[0], anchor_b[1] + poses.centers[1]];
-        Touch {
+        let touch = Touch {
             normal,
             count: (separation - L::splat(speculative)).select_positive(zero, one),
             anchor_a: [anchor_a; 2],
             anchor_b: [anchor_b; 2],
-            separation: [gap; 2],
+            separation: [separation; 2],
             feature: [zero; 2],
-        }
+        };
+        (touch, gap)
     }
 }
 

@@ -160,6 +160,24 @@ impl<L: Lanes> ShapePair<L> {
     }
 }
 
+impl<L: Lanes> ShapePair<L> {
+    /// How the shapes' centres move against each other where bodies move by `[x, y, θ, 0]` (m, rad).
+    #[inline(always)]
+    pub fn way(&self, ways: [[L; 4]; 2]) -> [L; 2] {
+        let center = |k: usize| rotate(self.poses.rotation[k], [self.place[k][0], self.place[k][1]]);
+        way_between(ways, [center(0), center(1)])
+    }
+}
+
+/// How the point at `r[1]` from the centre of b moves against that at `r[0]` from a's, along world axes (m).
+#[inline(always)]
+pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
+    let of =
+        |k: usize| [ways[k][2].neg_mul_add(r[k][1], ways[k][0]), ways[k][2].mul_add(r[k][0], ways[k][1])];
+    let ([ax, ay], [bx, by]) = (of(0), of(1));
+    [bx - ax, by - ay]
+}
+
 /// Manifolds without impulses, in lanes. Points from `count` on mean nothing.
 pub struct Touch<L> {
     /// Unit normal from a to b.
@@ -202,6 +220,14 @@ impl<L: Lanes> Touch<L> {
             })
         };
         Touch { anchor_a: moved(self.anchor_a), anchor_b: moved(self.anchor_b), ..self }
+    }
+}
+
+impl<L: Lanes> Touch<L> {
+    /// The same contact of one point with another gap (m).
+    #[inline(always)]
+    pub fn with_gap(self, gap: L) -> Self {
+        Touch { separation: [gap; 2], ..self }
     }
 }
 
