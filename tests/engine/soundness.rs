@@ -4,6 +4,7 @@
 
 use simpulse::engine::clock::{Clock, PhaseFilter};
 use simpulse::engine::constraints::bounces::Bounces;
+use simpulse::engine::constraints::piles::PileModes;
 use simpulse::engine::constraints::position::position_sweep;
 use simpulse::engine::constraints::restitution;
 use simpulse::engine::constraints::rules::Rigid;
@@ -412,7 +413,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
-        pile_modes: Default::default(),
+        pile_modes: PileModes::default(),
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };

@@ -364,3 +364,36 @@ fn growth_writes_a_row_per_size() {
         assert_eq!(entries(&folder.path().join("g")), ["growth.csv", "growth.svg"]);
     }
 }
+
+/// Each solver's file says what the sweeps of a step request at its standard budget, warm start included: bytes per
+/// contact of a pyramid of ten, contacts of two points with friction, at one lane (no padding).
+#[test]
+fn files_of_solvers_say_how_many_bytes_a_step_requests() {
+    let mut wrong = String::new();
+    for variant in VARIANTS {
+        let mut world = settled("pyramid:10", with_width(find("soft_step").unwrap(), LaneWidth::W1), 30);
+        world.settings.solver = variant;
+        world.settings.parameters = variant.defaults();
+        world.settings.budget = variant.budget;
+        let contacts = world.counts.contacts as f64;
+        let mut frozen = world.hold();
+        let sweeps = [Phase::WarmStart, Phase::Solve, Phase::Relax, Phase::Position];
+        let probes = frozen.probes();
+        let of_sweeps = probes.iter().filter(|p| sweeps.contains(&p.phase));
+        let bytes: f64 = of_sweeps.map(|p| f64::from(p.passes) * traffic::of(&frozen, p).total()).sum();
+        let path = format!("src/engine/solvers/{}.rs", variant.name);
+        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
+        let header: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//!")).collect();
+        let header = header.join(" ");
+        let words: Vec<&str> = header.split_whitespace().collect();
+        let unit = ["B", "per", "contact."];
+        let at = words.windows(3).position(|w| w == unit);
+        let said = at.and_then(|at| words.get(at.wrapping_sub(1))).and_then(|word| word.parse::<f64>().ok());
+        let measured = bytes / contacts;
+        // How many steps of a gradient are taken again is decided by rounding, which differs from CPU to CPU.
+        if said.is_none_or(|said| (said / measured - 1.0).abs() > 0.02) {
+            wrong += &format!("{}: {measured:.0} B per contact, its file says {said:?}\n", variant.name);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}

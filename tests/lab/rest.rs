@@ -1,6 +1,11 @@
 //! The law of rest: piles of a few boxes stay where they are at the standard budget.
 
-use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
+use simpulse::engine::clock::Phase;
+use simpulse::engine::constraints::Passes;
+use simpulse::engine::constraints::rules::{Frictionless, NormalRule, Soft, angular_frequencies};
+use simpulse::engine::lanes::Lanes;
+use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION};
+use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::Scene;
 
@@ -81,5 +86,136 @@ fn lemke_and_newton_agree_on_a_stack() {
     for (i, (newton, lemke)) in heights[0].iter().zip(&heights[1]).enumerate() {
         let truth = i as f32 + 0.5;
         assert!((newton - truth).abs() < 1e-6 && (lemke - truth).abs() < 1e-6, "{i}: {newton} {lemke}");
+    }
+}
+
+/// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s), with `after` called after each step;
+/// each substep of the standard budget is `parts` steps of one substep if there are any.
+fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
+    residual_speed_of(scene, find(solver).unwrap(), parts, after)
+}
+
+fn residual_speed_of(
+    scene: &Scene,
+    solver: &'static Variant,
+    parts: Option<u32>,
+    after: impl Fn(&mut World),
+) -> f64 {
+    let mut settings = crate::common::settings(solver);
+    let parts = parts.map_or(1, |parts| parts * std::mem::replace(&mut settings.budget.substeps, 1));
+    settings.dt /= parts as f32;
+    let mut world = scene.build(settings).unwrap();
+    let mut squares = 0.0;
+    for step in 0..180 * parts {
+        world.step().unwrap();
+        after(&mut world);
+        if step >= 120 * parts {
+            let b = &world.bodies;
+            let moving = (0..b.len()).filter(|&i| b.is_dynamic(i));
+            let (mut energy, mut mass) = (0.0, 0.0);
+            for i in moving {
+                let [m, inertia] = [b.inv_mass[i], b.inv_inertia[i]].map(|inverse| 1.0 / f64::from(inverse));
+                let v = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+                energy += m * (v[0] * v[0] + v[1] * v[1]) + inertia * v[2] * v[2];
+                mass += m;
+            }
+            squares += energy / mass / f64::from(60 * parts);
+        }
+    }
+    1e3 * squares.sqrt()
+}
+
+/// Springs that see separations rounded as points of the world are 200 m away from the origin.
+#[derive(Clone, Copy, Debug)]
+struct Grainy<R>(R);
+
+impl<R: NormalRule> NormalRule for Grainy<R> {
+    const FRICTION: bool = R::FRICTION;
+
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        let far = L::splat(200.0);
+        self.0.line(against_static, (separation + far) - far, mass, old)
+    }
+}
+
+/// `rapier` with such springs.
+static GRAINY: Variant = Variant { name: "grainy", step: grainy_step, ..rapier::SOLVER };
+
+fn grainy_step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+    let omega = angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h);
+    let soft = Grainy(Frictionless(Soft::new(omega, CONTACT_DAMPING_RATIO, push_speed, h)));
+    let rigid = Grainy(Soft::without_springs(h));
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.block_sweep(Phase::Solve, soft);
+        }
+        passes.integrate_positions();
+        for _ in 0..budget.relax_iterations {
+            passes.block_sweep_normal_first(Phase::Relax, rigid);
+        }
+        passes.end_substep(substep);
+    }
+}
+
+#[test]
+#[ignore = "prints a figure of papers/peers.md"]
+fn speeds_at_rest_with_rounded_separations() {
+    let scene = crate::common::scene("many_pyramids");
+    let speed = |parts, after: fn(&mut World)| residual_speed_of(&scene, &GRAINY, parts, after);
+    let figures = [
+        speed(None, |_| ()),
+        speed(None, round_positions),
+        speed(Some(1), |_| ()),
+        speed(Some(1), round_positions),
+    ];
+    println!("separations in f32: {figures:.5?} mm/s");
+}
+
+/// Forgets what positions have beyond `f32`, as engines that keep positions in one `f32` do.
+fn round_positions(world: &mut World) {
+    world.bodies.position_x_lo.fill(0.0);
+    world.bodies.position_y_lo.fill(0.0);
+}
+
+/// What is left of speed at rest is what positions are rounded to: with one `f32` each it grows with the distance from the
+/// origin, as in engines that keep them so.
+#[test]
+fn speeds_at_rest_grow_with_what_positions_are_rounded_to() {
+    let speeds = ["many_pyramids:5", "many_pyramids:10"].map(|name| {
+        let scene = crate::common::scene(name);
+        [
+            residual_speed(&scene, "box2d", None, |_| ()),
+            residual_speed(&scene, "box2d", None, round_positions),
+        ]
+    });
+    let [[low, low_rounded], [high, high_rounded]] = speeds;
+    assert!(low_rounded > 20.0 * low && high_rounded > 20.0 * high, "{speeds:?}");
+    // Twice as high; places of floats double their spacing at powers of two.
+    assert!((1.5..3.0).contains(&(high_rounded / low_rounded)) && high < 1.5 * low, "{speeds:?}");
+}
+
+#[test]
+#[ignore = "a minute; prints figures of papers/peers.md"]
+fn speeds_at_rest_with_positions_in_f32() {
+    for name in ["many_pyramids:5", "many_pyramids:10", "many_pyramids", "stack:14"] {
+        let scene = crate::common::scene(name);
+        for solver in ["box2d", "rapier", "soft_step"] {
+            let whole = residual_speed(&scene, solver, None, |_| ());
+            let [steps, substeps] =
+                [None, Some(1)].map(|parts| residual_speed(&scene, solver, parts, round_positions));
+            let finer = residual_speed(&scene, solver, Some(1), |_| ());
+            println!(
+                "{name} {solver}: {whole:.5} mm/s, rounded every step {steps:.5}; a step for each substep {finer:.5}, \
+                 rounded {substeps:.5}"
+            );
+        }
     }
 }

@@ -4,8 +4,8 @@
 //! greedily in the order of the bodies; within a colour bodies with as many contacts stand together. A batch of
 //! bodies goes through their contacts by rank: first the first contact of each, then the second, and
 //! a body that has no more gets an empty one. What becomes of a body does not depend on the batch in
-//! which it is, only on its colour: the result has the same bits at every width. In natural order there are no
-//! colours, and bodies come one by one.
+//! which it is, only on its colour: the result has the same bits at every width. Where contacts come one after the
+//! other there are no colours, and bodies come one by one as those contacts name them first.
 
 use super::graph::Graph;
 use crate::engine::contacts::Contact;
@@ -82,7 +82,8 @@ impl BodyLanes {
         lists + held(&self.batches) + held(&self.order) + held(&self.colors) + held(&self.seen_by)
     }
 
-    /// Gives lanes to the bodies that have contacts and are dynamic, by colours or `one_by_one`; `inert` is the number of bodies.
+    /// Gives lanes to the bodies that have contacts and are dynamic, by colours, or one by one in the `sequence` of
+    /// contacts; `inert` is the number of bodies.
     pub fn assign(
         &mut self,
         width: LaneWidth,
@@ -90,14 +91,26 @@ impl BodyLanes {
         contacts: &[Contact],
         inert: u32,
         is_dynamic: impl Fn(u32) -> bool,
-        one_by_one: bool,
+        sequence: Option<&[u32]>,
     ) {
         self.width = width;
         let width = width.lanes();
         self.order.clear();
-        self.order.extend((0..inert).filter(|&b| is_dynamic(b) && !graph.edges_of(b as usize).is_empty()));
-        self.color(graph, inert);
-        if !one_by_one {
+        self.colors.clear();
+        self.colors.resize(inert as usize, NONE);
+        if let Some(sequence) = sequence {
+            for body in sequence.iter().flat_map(|&contact| graph.ends(contact as usize)) {
+                if let Some(color @ &mut NONE) = self.colors.get_mut(body as usize)
+                    && is_dynamic(body)
+                {
+                    *color = 0;
+                    self.order.push(body);
+                }
+            }
+        } else {
+            self.order
+                .extend((0..inert).filter(|&b| is_dynamic(b) && !graph.edges_of(b as usize).is_empty()));
+            self.color(graph);
             let (colors, degree) = (&self.colors, |b: u32| graph.edges_of(b as usize).len());
             self.order.sort_unstable_by_key(|&b| (colors[b as usize], std::cmp::Reverse(degree(b)), b));
         }
@@ -106,7 +119,7 @@ impl BodyLanes {
         self.ends.clear();
         let row = |body: u32| body.min(inert);
         let is_together =
-            |a: &u32, b: &u32| !one_by_one && self.colors[*a as usize] == self.colors[*b as usize];
+            |a: &u32, b: &u32| sequence.is_none() && self.colors[*a as usize] == self.colors[*b as usize];
         for batch in self.order.chunk_by(is_together).flat_map(|color| color.chunks(width)) {
             let ranks = batch.iter().map(|&b| graph.edges_of(b as usize).len()).max().unwrap_or(0);
             self.batches.push(BodyBatch { ranks, first: self.ends.contact.len() / width });
@@ -138,9 +151,7 @@ impl BodyLanes {
     }
 
     /// The smallest colour that no neighbour has, body by body.
-    fn color(&mut self, graph: &Graph, bodies: u32) {
-        self.colors.clear();
-        self.colors.resize(bodies as usize, NONE);
+    fn color(&mut self, graph: &Graph) {
         self.seen_by.clear();
         for &body in &self.order {
             for &edge in graph.edges_of(body as usize) {

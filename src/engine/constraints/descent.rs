@@ -72,19 +72,19 @@ impl Descent {
         self.lanes.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
-    /// Gives bodies their lanes, by colours or one by one.
+    /// Gives bodies their lanes, by colours or one by one in the `sequence` of contacts.
     pub(super) fn assign(
         &mut self,
         rows: &[BodyRow],
         contacts: &[Contact],
         graph: &Graph,
         width: LaneWidth,
-        one_by_one: bool,
+        sequence: Option<&[u32]>,
     ) {
         let inert = rows.len() as u32 - 1;
         let is_dynamic = |body: u32| rows[body as usize].velocity[3] > 0.0;
-        let width = if one_by_one { LaneWidth::W1 } else { width };
-        self.lanes.assign(width, graph, contacts, inert, is_dynamic, one_by_one);
+        let width = if sequence.is_some() { LaneWidth::W1 } else { width };
+        self.lanes.assign(width, graph, contacts, inert, is_dynamic, sequence);
         let BodyLanes { batches, ends, contacts, .. } = &self.lanes;
         for (records, vectors) in [
             (&mut self.bodies, BODY * batches.len()),
@@ -233,14 +233,14 @@ fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], al
 
 /// The numbers kept at both points of contacts.
 #[inline(always)]
-fn kept_of<L: Lanes>(quads: &[Quad], contact: LaneIndex<L::Index>) -> [[L; 4]; 2] {
-    [L::gather_quads::<2, 0>(quads, contact), L::gather_quads::<2, 1>(quads, contact)]
+fn kept_of<L: Lanes>([first, second]: [&[Quad]; 2], contact: LaneIndex<L::Index>) -> [[L; 4]; 2] {
+    [L::gather_quads::<1, 0>(first, contact), L::gather_quads::<1, 0>(second, contact)]
 }
 
 #[inline(never)]
 fn descend<L: Lanes>(lanes: &BodyLanes, [bodies, ends]: [&[Block]; 2], on: &mut Bodies<'_>, alpha: f32) {
     let (bodies, ends): (&[L], &[L]) = (bytemuck::cast_slice(bodies), bytemuck::cast_slice(ends));
-    let kept: &[Quad] = bytemuck::cast_slice(on.kept.points());
+    let kept = on.kept.by_point().map(|points| bytemuck::cast_slice(points));
     let (contact, other) = (lanes.ends.contact.list(), lanes.ends.other.list());
     let (alpha, zero) = (L::splat(alpha), L::zero());
     let each = lanes.batches.iter().zip(bodies.chunks_exact(BODY)).zip(lanes.bodies.list().batches());
@@ -302,13 +302,13 @@ fn solve<L: Lanes>([xx, xy, xw, yy, yw, ww]: [L; 6], [fx, fy, fw]: [L; 3]) -> [L
 #[inline(never)]
 fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f32, beta: f32) {
     let records: &[L] = bytemuck::cast_slice(records);
-    let kept: &mut [Quad] = bytemuck::cast_slice_mut(on.kept.points());
+    let [first, second] = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
     let (alpha, beta, most) = (L::splat(alpha), L::splat(beta), L::splat(PENALTY[1]));
     let bodies = ends.own.list().batches().zip(ends.other.list().batches());
     let batches = ends.contact.list().batches().zip(bodies);
     for (record, (contact, (own, other))) in records.chunks_exact(RECORD).zip(batches) {
         let (x, o) = (moved::<L>(on.rows, own), moved::<L>(on.rows, other));
-        let new = kept_of::<L>(kept, contact);
+        let new = kept_of::<L>([first, second], contact);
         let new: [[L; 4]; 2] = std::array::from_fn(|p| {
             let [.., normal_penalty, tangent_penalty] = new[p];
             let Rows { error, force: [normal, tangent], bound, .. } = rows(record, p, x, o, new[p], alpha);
@@ -321,8 +321,8 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f
                 slack.select_positive(grown(tangent_penalty, error[1]), tangent_penalty),
             ]
         });
-        L::scatter_quads::<2, 0>(kept, contact, new[0]);
-        L::scatter_quads::<2, 1>(kept, contact, new[1]);
+        L::scatter_quads::<1, 0>(first, contact, new[0]);
+        L::scatter_quads::<1, 0>(second, contact, new[1]);
     }
 }
 

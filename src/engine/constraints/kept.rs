@@ -22,7 +22,7 @@ pub struct Kept {
     size: KeptSize,
     /// Shape pair and feature ids of each contact that the numbers belong to.
     names: Vec<(u64, [u32; 2])>,
-    /// `[contacts × 2 × per_point]`
+    /// `[2 × contacts × per_point]`, first points of all contacts before second ones.
     points: LaneVec,
     /// `[bodies × per_body]`
     bodies: Vec<f32>,
@@ -46,7 +46,7 @@ impl Kept {
     pub fn point(&mut self, contact: usize, point: usize) -> &mut [f32] {
         assert!(point < 2, "a contact has points 0 and 1, not {point}");
         let size = self.size.per_point;
-        &mut self.points[(2 * contact + point) * size..][..size]
+        &mut self.points[(point * self.names.len() + contact) * size..][..size]
     }
 
     /// What is kept of body `body`.
@@ -58,9 +58,15 @@ impl Kept {
         &mut self.bodies[body * size..][..size]
     }
 
-    /// All numbers of contact points, `[contacts × 2 × per_point]`, for gathers by contact.
+    /// All numbers of contact points, `[2 × contacts × per_point]`, first points of all contacts before second ones.
     pub fn points(&mut self) -> &mut [f32] {
         &mut self.points
+    }
+
+    /// The numbers of all first and of all second points, `[contacts × per_point]` each, for gathers by contact.
+    pub fn by_point(&mut self) -> [&mut [f32]; 2] {
+        let seconds = self.points.len() / 2;
+        self.points.split_at_mut(seconds).into()
     }
 
     /// Bytes held.
@@ -94,7 +100,8 @@ impl Kept {
             let Some((j, (_, old_ids))) = last.next_if(|(_, (k, _))| *k == key) else { continue };
             for (p, id) in ids.into_iter().enumerate().filter(|&(_, id)| id != UNUSED) {
                 if let Some(q) = old_ids.iter().position(|&old| old == id) {
-                    let (to, from) = ((2 * i + p) * size.per_point, (2 * j + q) * size.per_point);
+                    let to = (p * contacts.len() + i) * size.per_point;
+                    let from = (q * self.last_names.len() + j) * size.per_point;
                     self.points[to..][..size.per_point]
                         .copy_from_slice(&self.last_points[from..][..size.per_point]);
                 }
@@ -127,7 +134,7 @@ mod tests {
         kept.body(2).copy_from_slice(&[7.0, 8.0]);
         // A new pair in front; the points of 0-2 exchanged; 1-2 gone and 1-3 come.
         kept.follow(size, &[contact([0, 1], &[0]), contact([0, 2], &[9, 5]), contact([1, 3], &[0])], 4);
-        assert_eq!(kept.points(), [0.0, 0.0, 9.0, 5.0, 0.0, 0.0]);
+        assert_eq!(kept.points(), [0.0, 9.0, 0.0, 0.0, 5.0, 0.0]);
         assert_eq!([kept.body(2), &mut [0.0, 0.0]], [&[7.0, 8.0], &[0.0, 0.0]]);
         // Another feature of the same pair is another point.
         kept.follow(size, &[contact([0, 2], &[9, 6])], 4);

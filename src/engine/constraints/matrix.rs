@@ -1,7 +1,8 @@
-//! Dense matrices, and the factorisation that Lemke's method solves its bases with.
+//! Dense matrices in `f64`, and the one elimination of the engine.
 //!
 //! Plain Gaussian elimination P A = L U, where P brings the largest entry of what is left of a
-//! column to the diagonal. A·X = R is solved for `STRIP` columns of R at a time, so that a row of
+//! column to the diagonal. [`solve_in_place`] solves one small system where it is. For the bases of Lemke's
+//! method [`Lu`] keeps the factors: A·X = R is solved for `STRIP` columns of R at a time, so that a row of
 //! the unknowns stays in registers while the rows that it depends on pass by; then once more for what
 //! R − A X leaves, which takes the error of every column to rounding of its own residual.
 //!
@@ -67,6 +68,51 @@ impl IndexMut<(usize, usize)> for Matrix {
     }
 }
 
+/// Replaces a square matrix of `n` columns, by rows, by its factors: U on and above the diagonal, L below. Tells
+/// `exchange` which rows P exchanges, in turn. False if a column leaves no pivot above `floor` that is finite.
+fn factorise(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(usize, usize)) -> bool {
+    for k in 0..n {
+        let size = |i: usize| cells[i * n + k].abs();
+        let pivot = (k..n).max_by(|&i, &j| size(i).total_cmp(&size(j))).filter(|&i| size(i) > floor);
+        let Some(pivot) = pivot else { return false };
+        if pivot != k {
+            exchange(k, pivot);
+            let (above, below) = cells.split_at_mut(pivot * n);
+            above[k * n..][..n].swap_with_slice(&mut below[..n]);
+        }
+        let (above, below) = cells.split_at_mut((k + 1) * n);
+        let pivot_row = &above[k * n + k..];
+        let inverse = 1.0 / pivot_row[0];
+        if !inverse.is_finite() || inverse == 0.0 {
+            return false;
+        }
+        for row in below.chunks_exact_mut(n).filter(|row| row[k] != 0.0) {
+            let factor = row[k] * inverse;
+            row[k] = factor;
+            row[k + 1..].iter_mut().zip(&pivot_row[1..]).for_each(|(x, p)| *x -= factor * p);
+        }
+    }
+    true
+}
+
+/// Solves A x = b, allocating nothing: A is `b.len()` squared, by rows, and is overwritten, b becomes x. False if a
+/// pivot is not above `least` times the largest entry of A; then b means nothing.
+pub fn solve_in_place(a: &mut [f64], b: &mut [f64], least: f64) -> bool {
+    let n = b.len();
+    let floor = least * a.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    if !factorise(a, n, floor, |k, pivot| b.swap(k, pivot)) {
+        return false;
+    }
+    for i in 1..n {
+        b[i] -= (0..i).map(|j| a[i * n + j] * b[j]).sum::<f64>();
+    }
+    for i in (0..n).rev() {
+        let known: f64 = (i + 1..n).map(|j| a[i * n + j] * b[j]).sum();
+        b[i] = (b[i] - known) / a[i * n + i];
+    }
+    true
+}
+
 /// A square matrix A and its factors, P A = L U.
 pub struct Lu {
     matrix: Matrix,
@@ -82,26 +128,8 @@ impl Lu {
         let n = matrix.columns;
         let mut factors = matrix.clone();
         let mut order: Vec<usize> = (0..n).collect();
-        for k in 0..n {
-            let pivot = (k..n).max_by(|&i, &j| factors[(i, k)].abs().total_cmp(&factors[(j, k)].abs()))?;
-            if pivot != k {
-                order.swap(k, pivot);
-                let (above, below) = factors.cells.split_at_mut(pivot * n);
-                above[k * n..][..n].swap_with_slice(&mut below[..n]);
-            }
-            let (above, below) = factors.cells.split_at_mut((k + 1) * n);
-            let pivot_row = &above[k * n + k..];
-            let inverse = 1.0 / pivot_row[0];
-            if !inverse.is_finite() || inverse == 0.0 {
-                return None;
-            }
-            for row in below.chunks_exact_mut(n).filter(|row| row[k] != 0.0) {
-                let factor = row[k] * inverse;
-                row[k] = factor;
-                row[k + 1..].iter_mut().zip(&pivot_row[1..]).for_each(|(x, p)| *x -= factor * p);
-            }
-        }
-        Some(Lu { matrix, factors, order })
+        let is_regular = factorise(&mut factors.cells, n, 0.0, |k, pivot| order.swap(k, pivot));
+        is_regular.then_some(Lu { matrix, factors, order })
     }
 
     /// X of A X = `right`, with one step of refinement.
@@ -168,6 +196,16 @@ mod tests {
         let right = Matrix::from_fn(2, 3, |i, j| [[4.0, 1.0, 0.0], [5.0, 0.0, 1.0]][i][j]);
         let x = Lu::new(a).unwrap().solve(&right);
         assert_eq!((x.row(0), x.row(1)), (&[3.0, -0.5, 1.0][..], &[2.0, 0.5, 0.0][..]));
+    }
+
+    #[test]
+    fn in_place_rows_are_exchanged_and_singular_ones_refused() {
+        let mut b = [5.0, 3.0, 6.0];
+        assert!(solve_in_place(&mut [0.0, 2.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0], &mut b, 1e-14));
+        // 2y + z = 5, x + z = 3, x + y + z = 6.
+        assert_eq!(b, [4.0, 3.0, -1.0]);
+        assert!(!solve_in_place(&mut [1.0, 2.0, 2.0, 4.0], &mut [1.0, 1.0], 1e-14));
+        assert!(solve_in_place(&mut [], &mut [], 0.0));
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub mod block;
 mod body_lanes;
 pub mod bounces;
 pub mod cone;
-pub mod dense;
+pub mod coulomb_lcp;
 pub mod descent;
 pub mod features;
 pub mod graph;

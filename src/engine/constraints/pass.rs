@@ -9,7 +9,7 @@ use super::bounces::Bounces;
 use super::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
 use super::kept::Kept;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
+use crate::engine::lanes::{Block, BodyRow, LaneWidth, Lanes};
 
 /// What a pass runs on: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -25,6 +25,9 @@ pub struct PassInput<'a> {
     pub contacts: &'a mut [Contact],
     /// Numbers that the solver keeps per contact point and per body.
     pub kept: &'a mut Kept,
+    /// What the points of these batches keep within a step, as [`super::point_vector`] orders it; empty unless
+    /// the solver has asked for it.
+    pub points: &'a mut [Block],
     /// Changes of velocity in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
 }

@@ -22,7 +22,7 @@ use super::preload::Preload;
 use super::prepare::{Prepare, Store};
 use super::restitution;
 use super::rules::{NormalRule, Rule, Soft};
-use super::sticky::{BookDrift, StickySweep};
+use super::sticky::{BookDrift, LoadDrift, StickySweep};
 use super::sweep::{Sweep, VelocitySweep, WarmStart};
 use super::system::{Pair, System};
 use super::types::{Joined, TypeInput, TypeRows};
@@ -60,6 +60,8 @@ pub struct Workspace {
     pub watch: Option<Watch>,
     /// What block descent works with.
     pub descent: Descent,
+    /// What contact points keep within a step, in the order of the lanes; see [`PassInput::points`].
+    pub points: PointVector,
     /// Vectors that solvers have given back.
     pub vectors: Vec<PointVector>,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
@@ -89,6 +91,7 @@ impl Workspace {
         self.kept.held_bytes()
             + self.graph.held_bytes()
             + self.descent.held_bytes()
+            + self.points.held_bytes()
             + vectors
             + held(&self.masses)
     }
@@ -161,6 +164,7 @@ impl<'a> Passes<'a> {
         passes.set_order(SweepOrder::Forward);
         // A phase that is repeated finds the records, and the check, of the step before it.
         if passes.input.phases.runs(Phase::Prepare) {
+            passes.work.points.clear();
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
                 batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
             }
@@ -229,17 +233,9 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(Phase::Prepare) {
             return;
         }
-        for batches in [&mut self.work.lanes, &mut self.work.serial] {
-            let width = batches.width();
-            batches.for_each_lane(&self.input.features, |_, layout, record, lane| {
-                for p in 0..layout.points {
-                    record[layout.at(p, layout.normal_impulse) * width + lane] = 0.0;
-                    if layout.has_friction {
-                        record[layout.at(p, layout.tangent_impulse) * width + lane] = 0.0;
-                    }
-                }
-            });
-        }
+        let mut zero = self.vector();
+        self.system().set_lane_impulses(&mut zero);
+        self.give_back([zero]);
         self.clock.lap(Phase::Prepare);
     }
 
@@ -375,6 +371,16 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// Constraint pass: brings the drifts of points into the order of the lanes, once a step and before all
+    /// sticky sweeps.
+    pub fn load_drift(&mut self) {
+        if self.input.features.friction && self.input.phases.runs(Phase::Prepare) {
+            let Workspace { points, lanes, serial, .. } = &mut *self.work;
+            points.reset([lanes, serial]);
+            self.run(Phase::Prepare, &LoadDrift);
+        }
+    }
+
     /// Constraint pass: a sweep whose friction holds places, see `sticky.rs`: removes `fraction` of an
     /// overlap and `stick` of a drift per substep, overlap at `push_speed` (m/s) at most, drift of points
     /// within `reach` (m).
@@ -403,8 +409,9 @@ impl<'a> Passes<'a> {
             return;
         }
         self.build_graph();
-        let Workspace { rows, graph, descent, lanes, .. } = &mut *self.work;
-        descent.assign(rows, self.contacts, graph, self.width, lanes.segments().is_empty());
+        let Workspace { rows, graph, descent, lanes, serial, .. } = &mut *self.work;
+        let sequence = lanes.segments().is_empty().then(|| serial.contact());
+        descent.assign(rows, self.contacts, graph, self.width, sequence);
     }
 
     /// Begins a substep of block descent: bodies go to their inertial place; of multipliers and of penalties
@@ -751,11 +758,14 @@ impl<'a> Passes<'a> {
 
     fn over_part(&mut self, part: Part, pass: &dyn AnyPass) {
         let width = self.width_of(part);
-        let Workspace { rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, .. } =
-            &mut *self.work;
-        let (batches, bounces) = match part {
-            Part::Lanes => (lanes, lane_bounces),
-            Part::Serial => (serial, serial_bounces),
+        let Workspace {
+            rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, points, ..
+        } = &mut *self.work;
+        let [lane_points, serial_points] =
+            if points.is_empty() { [&mut [][..], &mut []] } else { points.parts([lanes, serial]) };
+        let (batches, bounces, points) = match part {
+            Part::Lanes => (lanes, lane_bounces, lane_points),
+            Part::Serial => (serial, serial_bounces, serial_points),
         };
         if self.input.phases.counted {
             for segment in batches.visits() {
@@ -774,6 +784,7 @@ impl<'a> Passes<'a> {
             contacts: self.contacts,
             increments: motion.velocity_increments(),
             kept,
+            points,
         };
         pass.run_at(width, &self.input.features, on);
     }

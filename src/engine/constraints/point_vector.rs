@@ -52,6 +52,16 @@ impl PointVector {
         self.blocks.split_at_mut(SHARED * lanes).into()
     }
 
+    /// Removes all entries.
+    pub(super) fn clear(&mut self) {
+        self.blocks.clear();
+    }
+
+    /// Whether it has no entries.
+    pub(super) fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
     /// All entries.
     pub fn entries(&self) -> &[Entry] {
         bytemuck::cast_slice(&self.blocks)

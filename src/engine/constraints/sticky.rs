@@ -14,17 +14,22 @@
 //!
 //! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. What it drifted before is kept per point.
 //!
+//! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in the order of the lanes, as a
+//! [`super::point_vector::PointVector`] is, whose tangential entries they take: a sweep reads and writes them
+//! without gathering.
+//!
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
 
 use super::batches::{Batches, Segment, SegmentRecords};
-use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
+use super::features::{KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::kept::Kept;
 use super::pass::{Pass, PassInput, PerLane};
+use super::point_vector::places;
 use super::sweep::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_segments, spin, to_frame,
     turn, with_arms,
 };
-use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
 
 /// One sweep; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +46,10 @@ pub(super) struct StickySweep {
     pub reach: f32,
 }
 
+/// Brings drifts from [`Kept`] into the order of the lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoadDrift;
+
 /// Books the drift of the step that ends; see the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BookDrift {
@@ -51,9 +60,8 @@ pub(super) struct BookDrift {
 impl Pass for StickySweep {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let sweep = PerLane::of_sweep(layout, true, opposite);
-        // The drift of each point, and the index that it is found by.
         PerLane {
-            floats_read: sweep.floats_read + 1 + layout.points,
+            floats_read: sweep.floats_read + layout.points,
             floats_written: sweep.floats_written + layout.points,
             ..sweep
         }
@@ -61,40 +69,53 @@ impl Pass for StickySweep {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_segments!(sweep, L, F; on.rows, on.batches, on.kept, *self);
+        over_segments!(sweep, L, F; on.rows, on.batches, on.points, *self);
+    }
+}
+
+impl Pass for LoadDrift {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        PerLane { floats_read: 1 + layout.points, floats_written: layout.points, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        load::<L>(on.batches, on.kept, on.points, F::layout);
     }
 }
 
 impl Pass for BookDrift {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let read = 2 + layout.points * (layout.arms() + 3);
+        // Beside the record, the drifts and the index by which they are found.
+        let read = 3 + layout.points * (layout.arms() + 2);
         PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
     }
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        over_segments!(book, L, F; on.rows, on.batches, on.kept, self.reach);
+        over_segments!(book, L, F; on.rows, on.batches, on.kept, on.points, self.reach);
     }
 }
 
-/// A number of one point in all lanes, from what is kept.
-#[inline(always)]
-fn load<L: Lanes>(kept: &[f32], contacts: &[u32], p: usize) -> L {
-    let mut value = L::zero();
-    let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
-    for (float, &contact) in floats.iter_mut().zip(contacts) {
-        *float = kept[2 * contact as usize + p];
+#[inline(never)]
+fn load<L: Lanes>(batches: &mut Batches, kept: &mut Kept, drifts: &mut [Block], layout: LayoutOf) {
+    let (kept, drifts): (_, &mut [L]) = (kept.by_point(), bytemuck::cast_slice_mut(drifts));
+    for i in 0..batches.segments().len() {
+        let segment = batches.segments()[i];
+        let layout = layout(segment.opposite);
+        let SegmentRecords { contact, .. } = batches.records_of::<L>(&segment, &layout);
+        for (batch, contact) in contact.batches().enumerate() {
+            for (p, kept) in kept.iter().enumerate().take(layout.points) {
+                drifts[drift_at::<L>(&segment, batch, p)] = L::load_at(kept, contact);
+            }
+        }
     }
-    value
 }
 
-/// The other way round, in the first lanes, as many as `contacts`.
+/// Where the drifts of point `p` of a batch are.
 #[inline(always)]
-fn save<L: Lanes>(kept: &mut [f32], contacts: &[u32], p: usize, value: L) {
-    let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
-    for (float, &contact) in floats.iter().zip(contacts) {
-        kept[2 * contact as usize + p] = *float;
-    }
+fn drift_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
+    let [_, tangential] = places::<L>(segment.first_slot + batch * L::WIDTH, p);
+    tangential
 }
 
 /// Separations and drifts within the step of a batch's points.
@@ -125,20 +146,19 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
-    kept: &mut Kept,
+    drifts: &mut [Block],
     StickySweep { h, fraction, push_speed, stick, reach }: StickySweep,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let [inv_h, rate, stick] = [1.0, fraction, stick].map(|x| L::splat(x / h));
     let (deepest, reach, zero) = (L::splat(-push_speed), L::splat(reach), L::zero());
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let drifts: &mut [L] = bytemuck::cast_slice_mut(drifts);
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
     rows.assert_rows(row_b);
     rows.assert_rows(row_a);
-    let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
-    for (batch, (record, (contact, (row_a, row_b)))) in
-        records.chunks_exact_mut(layout.stride).zip(indices).enumerate()
+    let indices = row_a.batches().zip(row_b.batches());
+    for (batch, (record, (row_a, row_b))) in records.chunks_exact_mut(layout.stride).zip(indices).enumerate()
     {
-        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -169,7 +189,8 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
             let bound = record[layout.friction] * total / points.max(L::splat(1.0));
             for p in 0..N::POINTS {
                 let [separation, drift] = motion[p];
-                let drifted = load::<L>(kept.points(), contacts, p) + drift;
+                let before = drift_at::<L>(segment, batch, p);
+                let drifted = drifts[before] + drift;
                 let is_near = |yes: L, no: L| (reach - separation).select_positive(yes, no);
                 let mass = record[layout.at(p, layout.tangent_mass)];
                 let arm = arms::<L, N, O>(record, &layout, p, 1);
@@ -181,7 +202,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 record[at] = new;
                 // A point that slides begins to stick anew where it is now.
                 let over = wanted.max(-wanted) - bound;
-                save::<L>(kept.points(), contacts, p, over.select_positive(-drift, drifted - drift));
+                drifts[before] = over.select_positive(-drift, drifted - drift);
                 let delta = new - old;
                 sum[1] = sum[1] + delta;
                 along_t = mass_sum.mul_add(delta, along_t);
@@ -199,9 +220,11 @@ fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
     batches: &mut Batches,
     segment: &Segment,
     kept: &mut Kept,
+    drifts: &[Block],
     reach: f32,
 ) {
     let layout = const { Layout::of::<N, O>() };
+    let (kept, drifts): (_, &[L]) = (kept.by_point(), bytemuck::cast_slice(drifts));
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
     rows.assert_rows(row_b);
     rows.assert_rows(row_a);
@@ -209,13 +232,17 @@ fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
     for (batch, (record, (contact, (row_a, row_b)))) in
         records.chunks_exact(layout.stride).zip(indices).enumerate()
     {
-        let contacts = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+        let filled = segment.filled(batch, L::WIDTH);
         let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let motion = motion::<L, N, O>(record, &layout, &a, &b);
         for (p, [separation, drift]) in motion.into_iter().enumerate().take(N::POINTS) {
-            let drifted = load::<L>(kept.points(), contacts, p) + drift;
-            let near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
-            save::<L>(kept.points(), contacts, p, near);
+            let drifted = drifts[drift_at::<L>(segment, batch, p)] + drift;
+            let mut near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
+            // Empty lanes name the contact of the first one, and so write what it does.
+            let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut near));
+            let first = lanes[0];
+            lanes[filled..].fill(first);
+            L::store_at(kept[p], contact, near);
         }
     }
 }

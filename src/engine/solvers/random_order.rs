@@ -10,7 +10,8 @@
 //! give the same bits.
 //!
 //! **Cost.** That of [`super::pgs`], and a sort of colours (in natural order: of contacts) per sweep;
-//! in natural order records are visited out of the order of memory.
+//! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
+//! contact.
 //!
 //! **Fails when** [`super::pgs`] does: news travel no further.
 

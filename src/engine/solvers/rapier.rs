@@ -11,7 +11,8 @@
 //! this crate's. The order is that of this crate's colours.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft block sweeps
-//! without friction and `relax_iterations` rigid block sweeps with it.
+//! without friction and `relax_iterations` rigid block sweeps with it. Sweeps of a step request 1638 B per
+//! contact.
 //!
 //! **Fails when** [`super::soft_step`] does: the block couples two points, not two contacts.
 

@@ -11,7 +11,8 @@
 //! pushing bodies apart has made from their spins ([`crate::engine::constraints::Passes::parting_sweep`]).
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that shortens springs and 1 rigid block sweep; per substep 2 body
-//! passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones.
+//! passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request
+//! 5935 B per contact.
 //!
 //! **Fails when** a column is so tall that it buckles on its springs: preload has no moment, so that
 //! rocking is held by the springs alone. N unit boxes need 30 Hz (N/14)^1.5, which the standard budget has

@@ -11,7 +11,7 @@
 //! twice as stiff, as in the source.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations`
-//! soft sweeps and `relax_iterations` rigid ones.
+//! soft sweeps and `relax_iterations` rigid ones. Sweeps of a step request 1750 B per contact.
 //!
 //! **Fails when** the load is large against the stiffness: at rest a contact sinks by
 //! F/(m_eff ω²), whatever the number of iterations, so tall stacks and heavy bodies on

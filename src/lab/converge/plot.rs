@@ -5,6 +5,7 @@
 //! time.
 
 use super::replay::{Sequence, Start};
+use super::warm::WarmStart;
 use super::{Curve, Point, Reached, Report};
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
@@ -88,7 +89,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
 fn rows(report: &Report) -> Vec<Row> {
     let mut rows = Vec::new();
     for start in [Start::Cold, Start::Warm] {
-        if start == Start::Warm && !report.has_warm_start {
+        if start == Start::Warm && report.warm_start == WarmStart::None {
             continue;
         }
         rows.push(Row {

@@ -6,10 +6,11 @@
 //! solved differ from the frozen ones by a few roundings, as everything in `f32` does.
 
 use super::setup;
+use super::warm::STEPS;
 use crate::engine::clock::{Clock, PhaseFilter};
 use crate::engine::constraints::assign::{Assignment, Sides};
 use crate::engine::constraints::graph::Graph;
-use crate::engine::constraints::kept::Kept;
+use crate::engine::constraints::kept::{Kept, KeptSize};
 use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::piles::PileModes;
 use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
@@ -63,7 +64,7 @@ impl Sequence {
 pub enum Start {
     /// Without impulses.
     Cold,
-    /// With the problem's warm-start impulses.
+    /// With the problem's warm-start impulses, and what the solver itself keeps.
     Warm,
 }
 
@@ -103,6 +104,9 @@ pub struct Replay<'a> {
     problem: &'a ContactProblem,
     work: Workspace,
     rows: Vec<BodyRow>,
+    /// Rows of the step before, and what the solver of this name has kept since.
+    rows_before: Vec<BodyRow>,
+    kept: Option<(&'static str, Kept)>,
     contacts: Vec<Contact>,
     /// Contact and point within it that each contact of the problem became.
     places: Vec<(usize, usize)>,
@@ -149,15 +153,39 @@ impl<'a> Replay<'a> {
         let mut rows = Vec::new();
         work.motion.load(&bodies, &mut rows, &motion);
         setup::check_range(h, &rows, &contacts)?;
-        let (scratch, by_levels) = (Vec::new(), false);
-        let mut replay =
-            Replay { problem, work, rows, contacts, places, scratch, input, width, sequence, by_levels };
+        let (scratch, by_levels, kept) = (Vec::new(), false, None);
+        let rows_before = rows.clone();
+        let mut replay = Replay {
+            problem,
+            work,
+            rows,
+            rows_before,
+            kept,
+            contacts,
+            places,
+            scratch,
+            input,
+            width,
+            sequence,
+            by_levels,
+        };
         replay.assign_lanes();
         Ok(replay)
     }
 
+    /// Warm starts of solvers that keep numbers of their own come from steps on this problem, which differs in its
+    /// velocities alone; without this call, from steps on the problem itself. Errors: numbers beyond `f32`.
+    pub fn follow(&mut self, before: &ContactProblem) -> Result<(), Error> {
+        for (row, body) in self.rows_before.iter_mut().zip(&before.bodies) {
+            let [x, y, turn] = body.free_velocity.map(|v| v as f32);
+            row.velocity[..3].copy_from_slice(&[x, y, turn]);
+        }
+        self.kept = None;
+        setup::check_range(self.input.h, &self.rows_before, &self.contacts)
+    }
+
     /// One step of `variant` with `budget`, from the problem's start.
-    pub fn run(&mut self, variant: &Variant, budget: Budget, start: Start) -> Outcome {
+    pub fn run(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Outcome {
         self.reset(variant, start);
         self.work.observe = true;
         self.work.last_rule = None;
@@ -175,7 +203,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Time of one such step, its preparation included.
-    pub fn time(&mut self, variant: &Variant, budget: Budget, start: Start) -> Duration {
+    pub fn time(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Duration {
         self.reset(variant, start);
         self.work.observe = false;
         let input = StepInput { budget, ..self.input };
@@ -185,19 +213,42 @@ impl<'a> Replay<'a> {
         begin.elapsed()
     }
 
-    fn reset(&mut self, variant: &Variant, start: Start) {
+    fn reset(&mut self, variant: &'static Variant, start: Start) {
         if self.by_levels != variant.by_levels {
             self.by_levels = variant.by_levels;
             self.assign_lanes();
         }
-        self.work.rows.clone_from(&self.rows);
         self.work.kept = Kept::default();
         self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
+        if start == Start::Warm && variant.kept != KeptSize::default() {
+            self.keep(variant);
+        }
+        self.work.rows.clone_from(&self.rows);
         self.scratch.clone_from(&self.contacts);
         if start == Start::Cold {
             for point in self.scratch.iter_mut().flat_map(|c| &mut c.manifold.points) {
                 (point.normal_impulse, point.tangent_impulse) = (0.0, 0.0);
             }
+        }
+    }
+
+    /// Lets a solver keep what it does after [`STEPS`] steps on the problem of the step before.
+    fn keep(&mut self, variant: &'static Variant) {
+        if self.kept.as_ref().is_none_or(|(name, _)| *name != variant.name) {
+            let watch = self.work.watch.take();
+            let input = StepInput { budget: Budget { substeps: 1, ..variant.budget }, ..self.input };
+            self.scratch.clone_from(&self.contacts);
+            for _ in 0..STEPS {
+                self.work.rows.clone_from(&self.rows_before);
+                self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
+                variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
+            }
+            self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
+            self.kept = Some((variant.name, self.work.kept.clone()));
+            self.work.watch = watch;
+        }
+        if let Some((_, kept)) = &self.kept {
+            self.work.kept.clone_from(kept);
         }
     }
 

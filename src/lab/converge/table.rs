@@ -1,5 +1,6 @@
 //! A [`Report`] as tables, CSV and JSON.
 
+use super::warm::{OFF, WarmStart};
 use super::{Curve, Point, Reached, Report, TOLERANCES};
 use crate::lab::error::Error;
 use comfy_table::{CellAlignment, Table, presets};
@@ -18,9 +19,7 @@ pub fn text(report: &Report) -> String {
         report.impulse_unit,
         reference_line(report)
     );
-    if !report.has_warm_start {
-        out += "No warm-start impulses in the problem: every start is cold.\n";
-    }
+    out += &starts(report);
     out += "\nIterations to a residual (iterations/sweeps where they differ), by law:\n";
     let mut table = table(&["rate", "smallest", "v error"]);
     let each = || report.curves.iter().flat_map(laws);
@@ -50,6 +49,42 @@ pub fn text(report: &Report) -> String {
         out += &format!("{table}\n");
     }
     out
+}
+
+/// Where warm starts come from, and which curves there are not.
+fn starts(report: &Report) -> String {
+    let mut text = match report.warm_start {
+        WarmStart::Captured => {
+            "Warm starts: the impulses of the step before, which the problem has.\n".into()
+        }
+        WarmStart::Drawn => format!(
+            "Warm starts: the problem has no impulses of a step before; they are those of the reference, each off by \
+             up to {:.0} %.\n",
+            100.0 * OFF
+        ),
+        WarmStart::None => {
+            "No warm starts: the problem has neither impulses of a step before nor a certified \
+                            reference to draw them around.\n"
+                .into()
+        }
+    };
+    if !report.forgetful.is_empty() {
+        text += &format!("No warm curve, as every step begins from zero: {}.\n", report.forgetful.join(", "));
+    }
+    let mut unobserved: Vec<&str> = Vec::new();
+    for curve in &report.curves {
+        let is_new = !unobserved.contains(&curve.solver.as_str());
+        if is_new && curve.points.iter().all(|p| p.own.is_none()) {
+            unobserved.push(&curve.solver);
+        }
+    }
+    if !unobserved.is_empty() {
+        text += &format!(
+            "No curve under a law of its own, as no bias and compliance of normal rows say what is solved: {}.\n",
+            unobserved.join(", ")
+        );
+    }
+    text
 }
 
 fn reference_line(report: &Report) -> String {

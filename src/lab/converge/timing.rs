@@ -11,24 +11,15 @@ const TIMED_NS: f64 = 50_000.0;
 /// The difference between two steps of few and many iterations, over the difference of their
 /// numbers, so that set-up is not counted. Every round times every case once, so that a disturbance
 /// of the machine meets all of them.
+///
+/// A solver that has found its answer may have nothing left to do, and iterations beyond it cost nothing. So where
+/// more iterations change no bit, those up to the answer are timed, again and again.
 pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<f64> {
-    const FEW: u32 = 4;
-    let difference = |schedule: &Schedule, replay: &mut Replay, more: u32| {
-        let mut run = |k| replay.time(schedule.variant, schedule.budget(k), Start::Cold).as_nanos() as f64;
-        let few = run(FEW);
-        (run(FEW + more) - few) / f64::from(more)
-    };
-    let more: Vec<u32> = cases
-        .iter_mut()
-        .map(|(schedule, replay)| {
-            let estimate = difference(schedule, replay, 64).max(1.0);
-            (TIMED_NS / estimate).clamp(8.0, 4096.0) as u32
-        })
-        .collect();
+    let ranges: Vec<Range> = cases.iter_mut().map(|(schedule, replay)| Range::of(schedule, replay)).collect();
     let mut samples = vec![Vec::new(); cases.len()];
     for _ in 0..rounds {
-        for (((schedule, replay), &more), samples) in cases.iter_mut().zip(&more).zip(&mut samples) {
-            samples.push(difference(schedule, replay, more));
+        for (((schedule, replay), range), samples) in cases.iter_mut().zip(&ranges).zip(&mut samples) {
+            samples.push(range.time(schedule, replay));
         }
     }
     samples
@@ -38,4 +29,42 @@ pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<f
             s[s.len() / 2]
         })
         .collect()
+}
+
+/// Iterations that are timed.
+struct Range {
+    few: u32,
+    more: u32,
+    /// How often.
+    times: u32,
+}
+
+impl Range {
+    fn of(schedule: &Schedule, replay: &mut Replay) -> Range {
+        const FEW: u32 = 4;
+        const MOST: f64 = 4096.0;
+        let mut outcome = |k: u32| {
+            let outcome = replay.run(schedule.variant, schedule.budget(k), Start::Cold);
+            (outcome.velocities, outcome.impulses)
+        };
+        let answer = outcome(FEW);
+        let mut range = Range { few: FEW, more: 64, times: 1 };
+        if answer == outcome(FEW + range.more) {
+            let last = (0..FEW).find(|&k| outcome(k) == answer).unwrap_or(FEW);
+            range = Range { few: 0, more: last.max(1), times: 64 };
+            let estimate = range.time(schedule, replay).max(1.0);
+            range.times = (TIMED_NS / (estimate * f64::from(range.more))).clamp(1.0, MOST) as u32;
+        } else {
+            let estimate = range.time(schedule, replay).max(1.0);
+            range.more = (TIMED_NS / estimate).clamp(8.0, MOST) as u32;
+        }
+        range
+    }
+
+    /// Time of an iteration (ns).
+    fn time(&self, schedule: &Schedule, replay: &mut Replay) -> f64 {
+        let mut run = |k| replay.time(schedule.variant, schedule.budget(k), Start::Cold).as_nanos() as f64;
+        let sum: f64 = (0..self.times).map(|_| run(self.few + self.more) - run(self.few)).sum();
+        sum / f64::from(self.times) / f64::from(self.more)
+    }
 }

@@ -1,31 +1,16 @@
 //! Exact solution of small contact problems: in the plane Coulomb friction *is* an LCP.
 //!
-//! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997 (solvability, copositive A). In 3D
-//! their friction cone is a pyramid, an approximation; in 2D it has just the two edges ±t, so
-//! nothing is lost.
+//! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997.
 //!
-//! Split λt = β⁺ − β⁻ with β ≥ 0 and let σ be the slip speed. With un = Jn v⁺ + b, ut = Jt v⁺:
-//!
-//! ```text
-//! 0 ≤ λn ⊥ un                   ≥ 0
-//! 0 ≤ β⁺ ⊥  ut + σ              ≥ 0
-//! 0 ≤ β⁻ ⊥ −ut + σ              ≥ 0
-//! 0 ≤ σ  ⊥ µ λn − β⁺ − β⁻       ≥ 0
-//! ```
-//!
-//! Sliding with ut > 0 makes the second row positive, so β⁺ = 0, then σ = ut > 0 by the third, and
-//! λt = −µ λn by the fourth. Sticking has ut = σ = 0. Substituting v⁺ = v* + M⁻¹ Jᵀ λ gives
-//! w = A z + q; a frictionless contact has only its first row.
-//!
-//! A is scaled by S = 1/√G_ii on both sides of impulse rows and by the inverse on σ: G gets a unit
-//! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn).
+//! The matrices are those of [`crate::engine::constraints::coulomb_lcp`], with the compliance of a target on
+//! the diagonal.
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
 
 use super::problem::{ContactProblem, Pair};
 use super::residual::{Target, natural_map};
-use crate::engine::constraints::lemke::{Outcome, lemke};
-use crate::engine::constraints::matrix::Matrix;
+use crate::engine::constraints::coulomb_lcp::CoulombLcp;
+use crate::engine::constraints::lemke::Outcome;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
@@ -40,65 +25,18 @@ const EXACT: f64 = 1e-13;
 /// one of Lemke's paths on a spurious ray or at an inaccurate basis; then other covering vectors are
 /// tried and the answer with the least residual returned.
 pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<Pair>, Outcome> {
-    let contacts = &problem.contacts;
-    let rubbing: Vec<usize> = (0..contacts.len()).filter(|&i| contacts[i].friction > 0.0).collect();
-    let (nc, nf) = (contacts.len(), rubbing.len());
-    let n = nc + 3 * nf;
-    let scale: Vec<Pair> = problem.delassus_diagonal().iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
+    let rows: Vec<_> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
+    let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; rows.len()]));
+    let free: Vec<Pair> = free.iter().zip(&rows).map(|(u, row)| [u[0] + row.bias, u[1]]).collect();
+    let friction: Vec<f64> = problem.contacts.iter().map(|c| c.friction).collect();
     let g = problem.delassus();
-    let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; nc]));
-
-    // Row i < nc is normal i; then β⁺ and β⁻ of each rubbing contact; then σ.
-    // An impulse row is a (contact, direction, sign); a σ row has none.
-    let impulse_row = |row: usize| {
-        if row < nc {
-            Some((row, 0, 1.0))
-        } else if row < nc + 2 * nf {
-            let k = row - nc;
-            Some((rubbing[k / 2], 1, if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
-        } else {
-            None
-        }
-    };
-    let slip = |k: usize| nc + 2 * nf + k;
-    let mut a = Matrix::from_fn(n, n, |row, column| match (impulse_row(row), impulse_row(column)) {
-        (Some((i, di, si)), Some((j, dj, sj))) => {
-            let compliance = if row == column && di == 0 { target.row(problem, i).compliance } else { 0.0 };
-            si * sj * (g[(2 * i + di, 2 * j + dj)] + compliance) * scale[i][di] * scale[j][dj]
-        }
-        _ => 0.0,
+    let lcp = CoulombLcp::new(&friction, &problem.delassus_diagonal(), &free, |i, j| {
+        g[(i, j)] + if i == j && i % 2 == 0 { rows[i / 2].compliance } else { 0.0 }
     });
-    let mut q = vec![0.0; n];
-    for (row, q) in q.iter_mut().enumerate().take(nc + 2 * nf) {
-        if let Some((i, direction, sign)) = impulse_row(row) {
-            let bias = if direction == 0 { target.row(problem, i).bias } else { 0.0 };
-            *q = sign * scale[i][direction] * (free[i][direction] + bias);
-        }
-    }
-    for (k, &i) in rubbing.iter().enumerate() {
-        for beta in [nc + 2 * k, nc + 2 * k + 1] {
-            a[(beta, slip(k))] = 1.0;
-            a[(slip(k), beta)] = -1.0;
-        }
-        a[(slip(k), i)] = contacts[i].friction * scale[i][0] / scale[i][1];
-    }
-    // The LCP is homogeneous in (z, q): a largest |q| of 1 gives tolerances a meaning.
-    let unit = q.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    if unit > 0.0 {
-        q.iter_mut().for_each(|x| *x /= unit);
-    }
-    let impulses = |z: &[f64]| -> Vec<Pair> {
-        let mut impulses: Vec<Pair> = (0..nc).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
-        for (k, &i) in rubbing.iter().enumerate() {
-            impulses[i][1] = unit * scale[i][1] * (z[nc + 2 * k] - z[nc + 2 * k + 1]);
-        }
-        impulses
-    };
     let mut best: Result<(f64, Vec<Pair>), Outcome> = Err(Outcome::Ray);
     for path in 0..PATHS {
-        match lemke(&a, &q, &covering_vector(n, path), PIVOTS_PER_ROW * n + 100).outcome {
-            Outcome::Solution(z) => {
-                let l = impulses(&z);
+        match lcp.solve(&covering_vector(lcp.rows(), path), PIVOTS_PER_ROW * lcp.rows() + 100) {
+            Ok(l) => {
                 let residual =
                     natural_map(problem, target, &problem.velocities(&l), &l) / problem.impulse_unit();
                 if best.as_ref().map_or(true, |(least, _)| residual < *least) {
@@ -108,7 +46,7 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<P
                     break;
                 }
             }
-            other => best = best.or(Err(other)),
+            Err(other) => best = best.or(Err(other)),
         }
     }
     best.map(|(_, impulses)| impulses)

@@ -137,7 +137,7 @@ pub static CONVERGE: Sheet = Sheet {
         column("solver", "", "name of the solver, with its stage where that is not all of it"),
         column("arithmetic", "", "f32 for the simulation's code, f64 for methods to compare with"),
         column("order", "", "natural, colored or shuffled"),
-        column("start", "", "impulses at the start: cold (zero) or warm"),
+        column("start", "", "impulses at the start: cold (zero) or warm (those of the step before)"),
         column("iterations", "", "iterations of the solver"),
         column("sweeps", "", "sweeps over the constraints"),
         column("time_ns", "ns", "time of these iterations, set-up excluded"),

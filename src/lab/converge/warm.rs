@@ -1,0 +1,111 @@
+//! What warm starts begin with: the step before.
+//!
+//! A problem that was captured from a scene has the impulses of the step before. One that has none may have a
+//! certified reference λ. Then the step before is taken to be the same problem under loads that differ by up to
+//! [`OFF`], and its solution needs no solving: with factors drawn per contact point,
+//!
+//! ```text
+//! λ′ = (1 + OFF u) λ, −1 ≤ u ≤ 1        v*′ = v* − M⁻¹ Jᵀ (λ′ − λ)
+//! ```
+//!
+//! the velocities are those of the reference, impulses are in their cones, and what was open, stuck or slipping still
+//! is. Warm starts are λ′: exact for the step before, off by up to a tenth for this one.
+//!
+//! Solvers with numbers of their own ([`crate::engine::solvers::Variant::kept`]: multipliers, penalties, drifts)
+//! have made [`STEPS`] steps on the step before, at their standard budget without substeps.
+
+use crate::lab::reference::certify::Reference;
+use crate::lab::reference::{ContactProblem, Pair};
+use rand::{RngExt, SeedableRng};
+use serde::Serialize;
+
+/// Greatest relative difference of an impulse from that of the step before (1).
+pub const OFF: f64 = 0.1;
+/// Steps that solvers with numbers of their own have made before: a second.
+pub const STEPS: u32 = 60;
+
+/// Where the impulses of warm starts come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WarmStart {
+    /// The problem has them.
+    Captured,
+    /// Drawn around the reference, see the [module](self).
+    Drawn,
+    /// There are none.
+    None,
+}
+
+/// The problem with impulses for warm starts, and the step before it.
+pub(super) struct Warmed {
+    pub origin: WarmStart,
+    /// The problem, with warm impulses if there are any.
+    pub problem: ContactProblem,
+    /// The problem of the step before, with the same contacts.
+    pub before: ContactProblem,
+}
+
+/// Finds impulses to start from.
+pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) -> Warmed {
+    let (mut warm, mut before) = (problem.clone(), problem.clone());
+    let has = |c: &ContactProblem| c.contacts.iter().any(|c| c.warm_impulse != [0.0; 2]);
+    let origin = match reference {
+        _ if has(problem) => WarmStart::Captured,
+        Some(reference) => {
+            // The same whatever the seed of the shuffled order is.
+            let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+            let changes: Vec<Pair> = reference
+                .impulses
+                .iter()
+                .map(|impulse| {
+                    let off = OFF * random.random_range(-1.0..=1.0);
+                    impulse.map(|l| off * l)
+                })
+                .collect();
+            let apart = changes.iter().map(|change| change.map(|x| -x)).collect::<Vec<_>>();
+            for (body, velocity) in before.bodies.iter_mut().zip(problem.velocities(&apart)) {
+                body.free_velocity = velocity;
+            }
+            for (i, (impulse, change)) in reference.impulses.iter().zip(&changes).enumerate() {
+                let start = [impulse[0] + change[0], impulse[1] + change[1]];
+                (warm.contacts[i].warm_impulse, before.contacts[i].warm_impulse) = (start, start);
+            }
+            if has(&warm) { WarmStart::Drawn } else { WarmStart::None }
+        }
+        None => WarmStart::None,
+    };
+    Warmed { origin, problem: warm, before }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::certify::reference;
+    use crate::lab::reference::gallery::{box_pyramid, sliding_box};
+    use crate::lab::reference::residual::{Target, natural_map};
+
+    #[test]
+    fn drawn_impulses_solve_the_step_before_and_not_this_one() {
+        for problem in [sliding_box(), box_pyramid(3, 0.6)] {
+            let Warmed { origin, problem: warm, before } =
+                warmed(&problem, Some(&reference(&problem).unwrap()));
+            assert_eq!(origin, WarmStart::Drawn);
+            let start: Vec<Pair> = warm.contacts.iter().map(|c| c.warm_impulse).collect();
+            let residual = |p: &ContactProblem| {
+                natural_map(p, Target::Rigid, &p.velocities(&start), &start) / p.impulse_unit()
+            };
+            assert!(residual(&before) < 1e-12, "{}: {:e}", problem.name, residual(&before));
+            let off = residual(&warm);
+            assert!(off > 1e-3 && off < 1.0, "{}: {off:e}", problem.name);
+        }
+    }
+
+    #[test]
+    fn captured_impulses_are_left_as_they_are() {
+        let mut problem = sliding_box();
+        assert_eq!(warmed(&problem, None).origin, WarmStart::None);
+        problem.contacts[1].warm_impulse = [0.25, 0.0];
+        let Warmed { origin, problem: warm, before } = warmed(&problem, Some(&reference(&problem).unwrap()));
+        assert_eq!((origin, &warm, &before), (WarmStart::Captured, &problem, &problem));
+    }
+}
