@@ -7,7 +7,8 @@ use glam::Vec2;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ManifoldPoint {
-    /// From the centre of mass of body a to the contact point, world axes (m).
+    /// From the centre of mass of body a to the contact point, world axes (m): midway between both surfaces, or
+    /// on that of b if a is static or kinematic.
     pub anchor_a: Vec2,
     /// From the centre of mass of body b to the same point, world axes (m).
     pub anchor_b: Vec2,

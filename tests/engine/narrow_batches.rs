@@ -5,7 +5,7 @@ use glam::Vec2;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::{Contact, Manifold};
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::{LaneWidth, Quad};
 use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
 use simpulse::engine::narrowphase::collide;
 use simpulse::engine::narrowphase::lanes::Class;
@@ -46,7 +46,8 @@ impl Scene {
             let (a, b) = (2 * i as usize, 2 * i as usize + 1);
             (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
         });
-        let input = Input { poses: &poses, shapes: &self.rows, speculative: SPECULATIVE };
+        let ways = vec![Quad::default(); poses.len()];
+        let input = Input { poses: &poses, ways: &ways, shapes: &self.rows, speculative: SPECULATIVE };
         let (mut changed, mut fresh) = (vec![], vec![]);
         let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
             changed.push(name);

@@ -3,10 +3,11 @@
 use simpulse::engine::broadphase::{Proxy, all_pairs};
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::narrowphase::collide;
+use simpulse::engine::narrowphase::collide_in_step;
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
+use simpulse::lab::scenes::Scene;
 
 /// The contacts of the coming step from nothing: every pair of shapes, collided one by one, with
 /// the impulses of `last` by feature.
@@ -31,7 +32,14 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
         let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
         let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);
         let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes[shape as usize]);
-        let mut manifold = collide(shape_a, &pose_a, shape_b, &pose_b, SPECULATIVE_DISTANCE);
+        // What bodies do in the coming step and a quarter.
+        let ways = [body_a, body_b].map(|body| {
+            let (v, dt) = (bodies.velocity(body as usize), 1.25 * world.settings.dt);
+            [dt * v.x, dt * v.y, dt * bodies.angular_velocity[body as usize], 0.0]
+        });
+        let held = !proxies[a as usize].dynamic;
+        let poses = [&pose_a, &pose_b];
+        let mut manifold = collide_in_step([shape_a, shape_b], poses, ways, held, SPECULATIVE_DISTANCE);
         if manifold.count == 0 {
             continue;
         }
@@ -98,4 +106,33 @@ fn a_list_that_somebody_else_cut_is_found_anew() {
     assert_eq!(world.contacts.len(), count);
     assert!(world.contacts.iter().all(|c| c.manifold.points().iter().all(|p| p.normal_impulse == 0.0)));
     world.step().unwrap();
+}
+
+/// Arms (m) of the single contact between a body of `kind` and a dynamic one, 0.2 m deep in each other.
+fn arms(kind: &str, shapes: [&str; 2]) -> [f32; 2] {
+    let text = format!(
+        r#"{{"name":"pair","gravity":[0,0],"bodies":[
+            {{"type":"{kind}","position":[0,0],"shapes":[{{{}}}]}},
+            {{"type":"dynamic","position":[0,0.8],"shapes":[{{{}}}]}}]}}"#,
+        shapes[0], shapes[1]
+    );
+    let scene = Scene::from_json(&text, "pair.json".as_ref()).unwrap();
+    let mut world = scene.build(crate::common::settings(find("shim").unwrap())).unwrap();
+    world.find_contacts();
+    let [contact] = &world.contacts[..] else { panic!("{} contacts", world.contacts.len()) };
+    let [first, ..] = contact.manifold.points;
+    assert!((first.separation + 0.2).abs() < 1e-6, "{first:?}");
+    [first.anchor_a.y, first.anchor_b.y]
+}
+
+#[test]
+fn arms_meet_midway_between_moving_bodies_and_at_the_surface_of_one_on_a_held_body() {
+    let (disc, square) = (r#""circle":{"radius":0.5}"#, r#""box":{"half":[0.5,0.5]}"#);
+    for shapes in [[disc, disc], [square, disc], [disc, square], [square, square]] {
+        for (kind, truth) in [("dynamic", [0.4, -0.4]), ("static", [0.3, -0.5]), ("kinematic", [0.3, -0.5])] {
+            let found = arms(kind, shapes);
+            let near = found.iter().zip(truth).all(|(found, truth)| (found - truth).abs() < 1e-6);
+            assert!(near, "{kind} {shapes:?}: {found:?}");
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Which contact is in which lane: batches, segments, and the buffer that holds records.
 
-use super::features::{Features, Layout, OppositeKind};
+use super::features::{Features, Layout, LayoutOf, OppositeKind};
 use super::order::SweepOrder;
 pub use super::segment::Segment;
 use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
@@ -68,6 +68,19 @@ impl Batches {
     /// What a pass runs over, in order: all segments unless [`Self::arrange`] said otherwise.
     pub fn visits(&self) -> &[Segment] {
         &self.visits[self.focus.clone()]
+    }
+
+    /// Calls `visit` with each segment that a pass runs over, in order, and with the layout of its records.
+    #[inline(always)]
+    pub(super) fn each_segment(
+        &mut self,
+        layout_of: LayoutOf,
+        mut visit: impl FnMut(&mut Self, &Segment, &Layout),
+    ) {
+        for i in 0..self.visits().len() {
+            let segment = self.visits()[i];
+            visit(self, &segment, &layout_of(segment.opposite));
+        }
     }
 
     /// Brings what passes run over into an order.

@@ -74,11 +74,9 @@ impl Pass for Load {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.bounces.reserve(on.batches.lanes(), F::POINTS);
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let layout = F::layout(segment.opposite);
-            load::<L>(on.batches, &segment, &layout, on.bounces, on.contacts, on.increments, self);
-        }
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            load::<L>(batches, segment, layout, on.bounces, on.contacts, on.increments, self);
+        });
     }
 }
 
@@ -89,11 +87,9 @@ impl Pass for Wave {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let layout = F::layout(segment.opposite);
-            wave::<L>(on.rows, on.batches, &segment, &layout, on.bounces, self);
-        }
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            wave::<L>(on.rows, batches, segment, layout, on.bounces, self);
+        });
     }
 }
 
@@ -105,11 +101,9 @@ impl Pass for Solve {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let layout = F::layout(segment.opposite);
-            solve::<L>(on.rows, on.batches, &segment, &layout, on.bounces, &self.change);
-        }
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            solve::<L>(on.rows, batches, segment, layout, on.bounces, &self.change);
+        });
     }
 }
 
@@ -120,11 +114,9 @@ impl Pass for Book {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let layout = F::layout(segment.opposite);
-            let contact = on.batches.records_of::<L>(&segment, &layout).contact;
-            let sides = on.bounces.of::<L>(&segment, layout.points);
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let contact = batches.records_of::<L>(segment, layout).contact;
+            let sides = on.bounces.of::<L>(segment, layout.points);
             for (batch, (side, contact)) in sides.zip(contact.batches::<L::Index>()).enumerate() {
                 let floats: &[f32] = bytemuck::cast_slice(side);
                 let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
@@ -137,7 +129,7 @@ impl Pass for Book {
                     }
                 }
             }
-        }
+        });
     }
 }
 

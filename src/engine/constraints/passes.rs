@@ -1,7 +1,7 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
 use super::batches::Batches;
-use super::block::BlockSweep;
+use super::block::{BlockSweep, Parting};
 use super::bounces::Bounces;
 use super::descent::{Bodies, Descent};
 use super::features::{Features, Layout};
@@ -272,6 +272,15 @@ impl<'a> Passes<'a> {
     /// Constraint pass: as [`Self::block_sweep`], but friction rows come last, bounded by the new impulses.
     pub fn block_sweep_normal_first<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         if self.run(phase, &BlockSweep::<_, true>(rule)) {
+            self.solved(&Sweep(rule));
+        }
+    }
+
+    /// Constraint pass: as [`Self::block_sweep_normal_first`], in substep `substep`; what springs have pushed is taken
+    /// back without changing angular momentum.
+    pub fn parting_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R, substep: u32) {
+        let substeps = self.input.budget.substeps;
+        if self.run(phase, &Parting::new(rule, self.input.h, substeps, substeps - substep)) {
             self.solved(&Sweep(rule));
         }
     }

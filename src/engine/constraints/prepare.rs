@@ -146,10 +146,9 @@ impl Pass for Store {
 
 /// Writes the accumulated impulses of all segments back to their contacts.
 pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut [Contact]) {
-    for i in 0..batches.visits().len() {
-        let segment = batches.visits()[i];
-        store_segment::<L>(batches, &segment, &N::layout(segment.opposite), contacts);
-    }
+    batches.each_segment(N::layout, |batches, segment, layout| {
+        store_segment::<L>(batches, segment, layout, contacts);
+    });
 }
 
 /// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width

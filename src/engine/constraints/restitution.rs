@@ -123,12 +123,10 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
 ) -> f32 {
     bounces.reserve(batches.lanes(), N::POINTS);
     let mut most = 0.0_f32;
-    for i in 0..batches.visits().len() {
-        let segment = batches.visits()[i];
-        let layout = N::layout(segment.opposite);
-        let found = prepare_segment::<L>(rows, batches, &segment, &layout, bounces, contacts, increments, h);
+    batches.each_segment(N::layout, |batches, segment, layout| {
+        let found = prepare_segment::<L>(rows, batches, segment, layout, bounces, contacts, increments, h);
         most = most.max(found);
-    }
+    });
     most
 }
 
@@ -238,14 +236,12 @@ fn each_record<L: Lanes>(
     layout_of: LayoutOf,
     mut visit: impl FnMut(&mut [L], &mut [L], &Layout),
 ) {
-    for i in 0..batches.visits().len() {
-        let segment = batches.visits()[i];
-        let layout = layout_of(segment.opposite);
-        let records = batches.records_of::<L>(&segment, &layout).records.chunks_exact_mut(layout.stride);
-        for (record, bounce) in records.zip(bounces.of::<L>(&segment, layout.points)) {
-            visit(record, bounce, &layout);
+    batches.each_segment(layout_of, |batches, segment, layout| {
+        let records = batches.records_of::<L>(segment, layout).records.chunks_exact_mut(layout.stride);
+        for (record, bounce) in records.zip(bounces.of::<L>(segment, layout.points)) {
+            visit(record, bounce, layout);
         }
-    }
+    });
 }
 
 /// The bounce itself, contact after contact in sweep order.
@@ -255,10 +251,9 @@ pub fn apply<L: Lanes, N: KernelFeatures>(
     bounces: &mut Bounces,
     h: f32,
 ) {
-    for i in 0..batches.visits().len() {
-        let segment = batches.visits()[i];
-        apply_segment::<L>(rows, batches, &segment, &N::layout(segment.opposite), bounces, h);
-    }
+    batches.each_segment(N::layout, |batches, segment, layout| {
+        apply_segment::<L>(rows, batches, segment, layout, bounces, h);
+    });
 }
 
 #[inline(never)]

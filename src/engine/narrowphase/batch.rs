@@ -133,6 +133,9 @@ impl Jobs {
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
+    /// What bodies move and turn by in the coming step, and a little longer, if nothing hinders them: `[x, y, θ, 0]`
+    /// (m, rad), by body.
+    pub ways: &'a [Quad],
     /// Shapes by number.
     pub shapes: &'a Shapes,
     /// Points farther apart are left out (m).
@@ -164,6 +167,7 @@ pub fn update(
         list
     };
     let made = contacts.len();
+    assert!(input.ways.len() == input.poses.len(), "ways of as many bodies as poses");
     let indices = JobIndices {
         bodies: jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies")),
         shapes: jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes")),
@@ -200,22 +204,27 @@ fn run<L: Lanes>(
     made: usize,
     change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
-    let Input { poses, shapes: Shapes { rows, hulls }, speculative } = input;
+    let Input { poses, ways, shapes: Shapes { rows, hulls }, speculative } = input;
     match kind {
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
-            rectangles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+            let pair = ShapePair::gather(poses, rows, shapes);
+            rectangles::collide(&pair, speculative).on_held(poses.held[0])
         }),
         Kind::Circles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
-            circles::collide(&ShapePair::gather(poses, rows, shapes), speculative)
+            let pair = ShapePair::gather(poses, rows, shapes);
+            let (touch, distance) = circles::with_distance(&pair, speculative);
+            let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
+            let gap = circles::passing(&touch, distance, pair.way(ways));
+            touch.on_held(poses.held[0]).with_gap(gap)
         }),
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                pair.collide(&poses, speculative)
+                pair.collide(&poses, speculative).on_held(poses.held[0])
             })
         }
         Kind::HullCircle => {
@@ -223,7 +232,9 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
-                pair.collide(&poses, speculative)
+                let way = pair.way(&poses, bodies.map(|body| L::gather_quads::<1, 0>(ways, body)));
+                let (touch, gap) = pair.collide(&poses, way, speculative);
+                touch.on_held(poses.held[0]).with_gap(gap)
             })
         }
         Kind::CircleHull => {
@@ -231,7 +242,10 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
-                pair.collide(&poses, speculative).swapped()
+                let way =
+                    pair.way(&poses, [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body)));
+                let (touch, gap) = pair.collide(&poses, way, speculative);
+                touch.swapped().on_held(poses.held[1]).with_gap(gap)
             })
         }
     }

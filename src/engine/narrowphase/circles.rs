@@ -1,13 +1,62 @@
 //! Two circles, in lanes.
+//!
+//! # Circles that pass
+//!
+//! A step sees a gap along the normal n of its beginning. Two circles that pass each other on the way Δ of one step, and
+//! of the substep that a sweep at its end looks ahead, are farther apart than that says: with the distance ℓ of their centres and Δ = (Δ_n, Δ_t), at the end
+//!
+//! ```text
+//! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)
+//! ```
+//!
+//! A gap is told larger by the last term, if the circles come no closer than the slop on their way: then
+//! it is right at the end of the step, and those that do not touch are left alone. Those that graze each other less
+//! deep, and have passed by the end, may do so until the next step finds them.
 
 use super::lanes::{Poses, ShapePair, Touch, rotate};
 use crate::engine::lanes::Lanes;
+use crate::engine::params::LINEAR_SLOP;
+
+/// Shares of the slop: from which term on circles pass, and what gap they then have at the end (1).
+pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
+
+/// The gap (m) of two circles whose centres are `distance` apart (m) and that move by `way` against each other in the
+/// coming step (m); see the [module](self).
+#[inline(always)]
+pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
+    let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(LINEAR_SLOP));
+    let gap = touch.separation[0];
+    let [nx, ny] = touch.normal;
+    let along = nx.mul_add(way[0], ny * way[1]);
+    let across = nx.mul_add(way[1], -(ny * way[0]));
+    let length = |x: L, y: L| x.mul_add(x, y * y).sqrt();
+    let straight = distance + along;
+    let end = length(straight, across);
+    let sum = end + straight;
+    let bend = sum.select_positive(across * across / sum.select_positive(sum, one), zero);
+    // The part of the way on which they come closest.
+    let squared = along.mul_add(along, across * across);
+    let part = -(distance * along) / squared.select_positive(squared, one);
+    let until = part.max(zero).min(one);
+    let closest = length(until.mul_add(along, distance), until * across) - (distance - gap);
+    let raised = gap + bend;
+    let free = L::splat(PASSING[1] * LINEAR_SLOP) - along;
+    let has_passed = (one - part).min(bend - slop * L::splat(PASSING[0]));
+    let raised = has_passed.select_positive(raised.max(free), raised);
+    gap.min(closest + slop).select_positive(raised, gap)
+}
 
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
+    with_distance(pair, speculative).0
+}
+
+/// The same, and the distances of the centres (m).
+#[inline(always)]
+pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<L>, L) {
     let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
-    let Poses { centers, rotation } = pair.poses;
+    let Poses { centers, rotation, .. } = pair.poses;
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
     let center_a = rotate(rotation[0], [place_a[0], place_a[1]]);
     let center_b = rotate(rotation[1], [place_b[0], place_b[1]]);
@@ -22,12 +71,13 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let (r_a, r_b) = (half.mul_add(separation, size_a[2]), half.mul_add(separation, size_b[2]));
     let anchor_a = [r_a.mul_add(normal[0], center_a[0]), r_a.mul_add(normal[1], center_a[1])];
     let anchor_b = [r_b.neg_mul_add(normal[0], center_b[0]), r_b.neg_mul_add(normal[1], center_b[1])];
-    Touch {
+    let touch = Touch {
         normal,
         count: (separation - L::splat(speculative)).select_positive(zero, one),
         anchor_a: [anchor_a; 2],
         anchor_b: [anchor_b; 2],
         separation: [separation; 2],
         feature: [zero; 2],
-    }
+    };
+    (touch, distance)
 }

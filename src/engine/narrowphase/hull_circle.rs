@@ -5,9 +5,11 @@
 //! is past one of its ends, the centre is h n + o n⊥ from it: along n itself over the face, so
 //! that long segments round nothing, and inside the core.
 
+use super::circles::PASSING;
 use super::hull::{Hull, HullRow};
-use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate};
+use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
+use crate::engine::params::LINEAR_SLOP;
 
 /// Hulls as a, circles as b.
 pub struct HullCircle<L> {
@@ -33,12 +35,21 @@ impl<L: Lanes> HullCircle<L> {
         self.circle = ([place[0], place[1]], size[2]);
     }
 
-    /// Their contacts; those farther apart than `speculative` (m) are left out.
+    /// How the circle's centre moves in the frame of the hull where bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
-    pub fn collide(&self, poses: &Poses<L>, speculative: f32) -> Touch<L> {
+    pub fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
+        let center = rotate(poses.rotation[1], self.circle.0);
+        way_between(ways, [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center])
+    }
+
+    /// Their contacts; those farther apart than `speculative` (m) are left out. And their gaps where the circle moves
+    /// by `way` against the hull in the coming step (m), at a corner that it passes as for two circles
+    /// ([`super::circles`]).
+    #[inline(always)]
+    pub fn collide(&self, poses: &Poses<L>, way: [L; 2], speculative: f32) -> (Touch<L>, L) {
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
-        let [rotation_a, rotation_b] = poses.rotation;
-        let (center, radius) = (rotate(rotation_b, self.circle.0), self.circle.1);
+        let rotation_a = poses.rotation[0];
+        let (center, radius) = (rotate(poses.rotation[1], self.circle.0), self.circle.1);
         let c = unrotate(rotation_a, [poses.centers[0] + center[0], poses.centers[1] + center[1]]);
         let corners = &self.hull.corners[..self.count];
         let mut height = L::splat(f32::NEG_INFINITY);
@@ -66,19 +77,43 @@ impl<L: Lanes> HullCircle<L> {
         ];
         let normal = rotate(rotation_a, normal);
         let separation = distance - (self.hull.head[0] + radius);
+        let gap = {
+            let slop = L::splat(LINEAR_SLOP);
+            let way = unrotate(rotation_a, way);
+            let (up, aside) = (dot(n, way), dot(t, way));
+            let toward = height.mul_add(up, past * aside);
+            let length_of = |x: L, y: L| x.mul_add(x, y * y).sqrt();
+            // Where it is at the end: above the face, or past one of its ends.
+            let (over, along) = (height + up, along + aside);
+            let end = length_of(over, along - along.min(length).max(zero));
+            let straight = inverse.mul_add(toward, distance);
+            let bend = (end - straight).max(zero);
+            let squared = up.mul_add(up, aside * aside);
+            let part = -toward / squared.select_positive(squared, one);
+            let until = part.max(zero).min(one);
+            let reach = distance - separation;
+            let closest = length_of(until.mul_add(up, height), until.mul_add(aside, past)).min(end) - reach;
+            let raised = separation + bend;
+            let free = inverse.neg_mul_add(toward, slop * L::splat(PASSING[1]));
+            let has_passed = (one - part).min(bend - slop * L::splat(PASSING[0]));
+            let raised = has_passed.select_positive(raised.max(free), raised);
+            let passes = corner.min(separation).min(over).min(closest + slop);
+            passes.select_positive(raised, separation)
+        };
         // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
         // normal, and friction is all that turns it. a's follows from the centres of mass.
         let arm = half.mul_add(separation, radius);
         let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
         let anchor_a = [anchor_b[0] + poses.centers[0], anchor_b[1] + poses.centers[1]];
-        Touch {
+        let touch = Touch {
             normal,
             count: (separation - L::splat(speculative)).select_positive(zero, one),
             anchor_a: [anchor_a; 2],
             anchor_b: [anchor_b; 2],
             separation: [separation; 2],
             feature: [zero; 2],
-        }
+        };
+        (touch, gap)
     }
 }
 

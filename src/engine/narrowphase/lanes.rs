@@ -12,7 +12,7 @@ use glam::Vec2;
 pub struct PoseRow {
     /// Centre of mass and what it is short of: `[x, y, x rest, y rest]` (m).
     pub position: [f32; 4],
-    /// `[cos θ, sin θ, 0, 0]`
+    /// `[cos θ, sin θ, 1 if no impulse moves it, 0]`
     pub rotation: [f32; 4],
 }
 
@@ -105,6 +105,8 @@ pub struct Poses<L> {
     pub centers: [L; 2],
     /// Rotations of a and b, (cos, sin).
     pub rotation: [[L; 2]; 2],
+    /// Whether no impulse moves a and b: 1, else 0.
+    pub held: [L; 2],
 }
 
 impl<L: Lanes> Poses<L> {
@@ -118,21 +120,23 @@ impl<L: Lanes> Poses<L> {
             // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
             centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
             rotation: [[r[0], r[1]], [s[0], s[1]]],
+            held: [r[2], s[2]],
         }
     }
 
     /// The same poses with a and b exchanged.
     #[inline(always)]
     pub fn swapped(self) -> Self {
-        let [a, b] = self.rotation;
-        Poses { centers: self.centers.map(|x| -x), rotation: [b, a] }
+        let ([a, b], [held_a, held_b]) = (self.rotation, self.held);
+        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], held: [held_b, held_a] }
     }
 }
 
 impl Poses<f32> {
-    /// Two poses.
+    /// Two poses of bodies that impulses move.
     pub fn new(a: &Pose, b: &Pose) -> Self {
-        Poses { centers: (b.position - a.position).into(), rotation: [a.rotation.into(), b.rotation.into()] }
+        let rotation = [a.rotation.into(), b.rotation.into()];
+        Poses { centers: (b.position - a.position).into(), rotation, held: [0.0; 2] }
     }
 }
 
@@ -154,6 +158,24 @@ impl<L: Lanes> ShapePair<L> {
         let [place_b, size_b] = ShapeRow::gather(rows, b);
         ShapePair { poses, place: [place_a, place_b], size: [size_a, size_b] }
     }
+}
+
+impl<L: Lanes> ShapePair<L> {
+    /// How the shapes' centres move against each other where bodies move by `[x, y, θ, 0]` (m, rad).
+    #[inline(always)]
+    pub fn way(&self, ways: [[L; 4]; 2]) -> [L; 2] {
+        let center = |k: usize| rotate(self.poses.rotation[k], [self.place[k][0], self.place[k][1]]);
+        way_between(ways, [center(0), center(1)])
+    }
+}
+
+/// How the point at `r[1]` from the centre of b moves against that at `r[0]` from a's, along world axes (m).
+#[inline(always)]
+pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
+    let of =
+        |k: usize| [ways[k][2].neg_mul_add(r[k][1], ways[k][0]), ways[k][2].mul_add(r[k][0], ways[k][1])];
+    let ([ax, ay], [bx, by]) = (of(0), of(1));
+    [bx - ax, by - ay]
 }
 
 /// Manifolds without impulses, in lanes. Points from `count` on mean nothing.
@@ -178,6 +200,34 @@ impl<L: Lanes> Touch<L> {
     pub fn swapped(self) -> Self {
         let normal = self.normal.map(|x| -x);
         Touch { normal, anchor_a: self.anchor_b, anchor_b: self.anchor_a, ..self }
+    }
+
+    /// The same contacts with points on the surface of b where `held` is 1, midway between both surfaces
+    /// where it is 0.
+    ///
+    /// Points have to be the same for two bodies that move, or impulses would change their angular momentum.
+    /// A body on a held one has friction at its own surface: a disc that overlaps the ground by s and slides at v
+    /// rolls away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v with a = r, and 2/9 s/r v less
+    /// with a = r − s/2.
+    #[inline(always)]
+    pub fn on_held(self, held: L) -> Self {
+        let [nx, ny] = self.normal;
+        let half = L::splat(0.5) * held;
+        let moved = |anchors: [[L; 2]; 2]| {
+            std::array::from_fn(|p| {
+                let to_surface = half * self.separation[p];
+                [to_surface.mul_add(nx, anchors[p][0]), to_surface.mul_add(ny, anchors[p][1])]
+            })
+        };
+        Touch { anchor_a: moved(self.anchor_a), anchor_b: moved(self.anchor_b), ..self }
+    }
+}
+
+impl<L: Lanes> Touch<L> {
+    /// The same contact of one point with another gap (m).
+    #[inline(always)]
+    pub fn with_gap(self, gap: L) -> Self {
+        Touch { separation: [gap; 2], ..self }
     }
 }
 

@@ -52,22 +52,45 @@ use lanes::{Poses, ShapePair, ShapeRow};
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
+    collide_in_step([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, speculative_distance)
+}
+
+/// As [`collide`], for the coming step, in which bodies move by `ways` if nothing hinders them (`[x, y, θ, 0]`, m and
+/// rad), and whether no impulse moves that of `a`: then points lie on the surface of `b`.
+pub fn collide_in_step(
+    [a, b]: [&Shape; 2],
+    [pose_a, pose_b]: [&Pose; 2],
+    ways: [[f32; 4]; 2],
+    a_is_held: bool,
+    speculative_distance: f32,
+) -> Manifold {
     // What lanes do in a step is done here with one lane: the same bits.
     let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
     let Some(kind) = Kind::of(class_a, class_b) else { return Manifold::default() };
     let poses = Poses::<f32>::new(pose_a, pose_b);
+    let held = f32::from(u8::from(a_is_held));
+    let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
     let touch = match kind {
-        Kind::Rectangles | Kind::Circles => {
-            let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
-            let collide = if kind == Kind::Circles { circles::collide } else { rectangles::collide };
-            collide(&pair, speculative_distance)
+        Kind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
+        Kind::Circles => {
+            let (touch, distance) = circles::with_distance(&pair, speculative_distance);
+            let gap = circles::passing(&touch, distance, pair.way(ways));
+            touch.on_held(held).with_gap(gap)
         }
         Kind::Hulls => {
-            Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]).collide(&poses, speculative_distance)
+            let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
+            hulls.collide(&poses, speculative_distance).on_held(held)
         }
-        Kind::HullCircle => HullCircle::new(HullRow::new(a), row_b).collide(&poses, speculative_distance),
+        Kind::HullCircle => {
+            let pair = HullCircle::new(HullRow::new(a), row_b);
+            let (touch, gap) = pair.collide(&poses, pair.way(&poses, ways), speculative_distance);
+            touch.on_held(held).with_gap(gap)
+        }
         Kind::CircleHull => {
-            HullCircle::new(HullRow::new(b), row_a).collide(&poses.swapped(), speculative_distance).swapped()
+            let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
+            let way = pair.way(&poses, [ways[1], ways[0]]);
+            let (touch, gap) = pair.collide(&poses, way, speculative_distance);
+            touch.swapped().on_held(held).with_gap(gap)
         }
     };
     touch.manifold()

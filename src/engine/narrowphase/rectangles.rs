@@ -24,7 +24,7 @@ use crate::engine::lanes::Lanes;
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let (zero, one) = (L::zero(), L::splat(1.0));
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
-    let Poses { centers, rotation: [rotation_a, rotation_b] } = pair.poses;
+    let Poses { centers, rotation: [rotation_a, rotation_b], .. } = pair.poses;
     let u_a = rotate(rotation_a, [place_a[2], place_a[3]]);
     let u_b = rotate(rotation_b, [place_b[2], place_b[3]]);
     let offset_a = rotate(rotation_a, [place_a[0], place_a[1]]);

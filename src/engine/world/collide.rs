@@ -4,7 +4,7 @@ use super::World;
 use super::candidates::Candidate;
 use super::recycle::{Pairs, Recycled};
 use crate::engine::contacts::{Contact, pair_key};
-use crate::engine::lanes::held;
+use crate::engine::lanes::{Quad, held};
 use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
 use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::SPECULATIVE_DISTANCE;
@@ -26,6 +26,7 @@ pub(super) struct Narrow {
     /// Manifolds that are kept.
     pub recycled: Recycled,
     poses: Vec<PoseRow>,
+    ways: Vec<Quad>,
     jobs: [Jobs; Kind::ALL.len()],
     /// New contacts, in the order in which they were met.
     fresh: Vec<Contact>,
@@ -33,6 +34,9 @@ pub(super) struct Narrow {
     /// Contacts there were after the last update.
     count: usize,
 }
+
+/// Steps that ways are made of (1): a sweep that relaxes at the end of a step looks a substep ahead.
+const AHEAD: f32 = 1.25;
 
 /// `Candidate::contact` of a pair that has just begun to touch: this bit and its place in `fresh`.
 const FRESH: u32 = 1 << 31;
@@ -62,7 +66,17 @@ impl World {
                 bodies.position_x_lo[i],
                 bodies.position_y_lo[i],
             ],
-            rotation: [bodies.rotation_cos[i], bodies.rotation_sin[i], 0.0, 0.0],
+            rotation: [
+                bodies.rotation_cos[i],
+                bodies.rotation_sin[i],
+                f32::from(u8::from(!bodies.is_dynamic(i))),
+                0.0,
+            ],
+        }));
+        narrow.ways.clear();
+        let dt = AHEAD * self.settings.dt;
+        narrow.ways.extend((0..bodies.len()).map(|i| {
+            Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
         }));
         let distance = self.settings.solver.recycle_distance(&self.settings.parameters);
         let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
@@ -70,7 +84,7 @@ impl World {
         let mut points = recycled.update(&pairs, &mut self.contacts, distance);
         narrow.list_jobs(self.contacts.len());
 
-        let Narrow { candidates, jobs, fresh, is_changed, poses, shapes, .. } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, .. } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
@@ -82,7 +96,7 @@ impl World {
             };
             *is_changed = true;
         };
-        let input = Input { poses, shapes, speculative: SPECULATIVE_DISTANCE };
+        let input = Input { poses, ways, shapes, speculative: SPECULATIVE_DISTANCE };
         for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
@@ -105,7 +119,13 @@ impl Narrow {
         let lists: usize = self.of_kind.iter().map(held).sum();
         let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
         let recycled = self.recycled.held_bytes();
-        lists + jobs + held(&self.candidates) + held(&self.last_candidates) + held(&self.poses) + recycled
+        lists
+            + jobs
+            + held(&self.candidates)
+            + held(&self.last_candidates)
+            + held(&self.poses)
+            + held(&self.ways)
+            + recycled
     }
 
     /// Bytes held for contacts, besides the list itself.

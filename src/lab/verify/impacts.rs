@@ -1,6 +1,6 @@
 //! A5–A7 and A17–A19: bounces.
 
-use super::Required::Yes;
+use super::Required::{No, Yes};
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -21,6 +21,14 @@ pub(super) static CASES: &[Case] = &[
         "list: 0.5 %",
         elastic,
         Yes("the rebound keeps the discrete energy of flight"),
+    ),
+    Case::new(
+        "A6.flat",
+        "apexes of five elastic bounces of a box that falls flat from 1 m, and its turn at its corner, worst",
+        "m",
+        "list: 0.5 %",
+        flat_bounces,
+        Yes("both corners bounce at once"),
     ),
     Case::new(
         "A7.oblique",
@@ -78,6 +86,30 @@ pub(super) static CASES: &[Case] = &[
         rough_corner,
         Yes("normal and tangential impulse of an impact are found together"),
     ),
+    Case::new(
+        "A19.fallen",
+        "the same of a disc that comes from above, and meets the ground anywhere within a step",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        fallen_disc,
+        Yes("against a body that does not move, arms end at the own surface"),
+    ),
+    Case::new(
+        "A19.caught",
+        "the same of a corner",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        fallen_corner,
+        Yes("against a body that does not move, arms end at the own surface"),
+    ),
+    Case::new(
+        "A19.plastic",
+        "the same of a disc and of a corner without restitution, from touch",
+        "m/s",
+        "1 % of 4 m/s: three sweeps of rate k_nt²/(k_nn k_tt) = 0.19",
+        plastic,
+        No("the second substep repeats what the first gave, and takes it back in two sweeps"),
+    ),
 ];
 
 /// A5. Worst apex of four bounces from 10 m with e = ½. Rebounds keep the discrete energy of flight, so
@@ -89,6 +121,28 @@ fn bounce(lab: &Lab) -> Result<Finding, Failure> {
 /// A6. Worst apex of twenty elastic bounces from 1 m.
 fn elastic(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce_elastic", 0.005)
+}
+
+/// A6. A box has the apexes of a disc, and does not turn.
+fn flat_bounces(lab: &Lab) -> Result<Finding, Failure> {
+    let shape = SceneShape::rectangle(0.5, 0.25).friction(0.0).restitution(1.0);
+    let scene = Scene::new("flat", vec![ground(5.0, 0.0), SceneBody::dynamic([0.0, 1.25], shape)]);
+    let (mut worst, mut apexes, mut rising) = (0.0, 0, false);
+    lab.run(scene, 4.6, |world| {
+        let ([_, y], [_, v]) = (center(world, 1), velocity(world, 1));
+        if rising && v <= 0.0 {
+            let h = f64::from(world.settings.dt) / lab.substeps();
+            let apex = y - 0.25 + v * v / (2.0 * G) - 0.5 * v * h;
+            worst = largest([worst, (apex - 1.0).abs()]);
+            apexes += 1;
+        }
+        rising = v > 0.0;
+        worst = largest([worst, 0.5 * f64::from(world.bodies.rotation_sin[1]).abs()]);
+    })?;
+    if apexes < 5 {
+        return Err(Failure::Unmeasured(format!("{apexes} bounces of five")));
+    }
+    Ok(Finding::new(worst, 0.0, 0.005))
 }
 
 /// A7. The worse of two outgoing speeds, at 2 m/s.
@@ -207,59 +261,103 @@ fn after_impact(rough: &Rough, e: f64, mu: f64) -> [f64; 3] {
 /// The worst difference from [`after_impact`] over restitutions and frictions that slide and stick (m/s, and
 /// m/s at the arm of the spin).
 fn rough_impact(lab: &Lab, rough: impl Fn() -> Rough) -> Result<Finding, Failure> {
+    rough_impacts(lab, &[0.2, 0.5, 0.9], &[0.0], 1e-4, rough)
+}
+
+/// The same from `heights` above the ground (m).
+fn rough_impacts(
+    lab: &Lab,
+    restitutions: &[f64],
+    heights: &[f64],
+    tolerance: f64,
+    rough: impl Fn() -> Rough,
+) -> Result<Finding, Failure> {
     let (mut worst, mut of) = (0.0, String::new());
-    for e in [0.2, 0.5, 0.9] {
-        for mu in [0.05, 0.2, 0.5, 1.0] {
+    for &e in restitutions {
+        for (mu, &height) in
+            [0.05, 0.2, 0.5, 1.0].into_iter().flat_map(|mu| heights.iter().map(move |h| (mu, h)))
+        {
             let body = rough();
             let truth = after_impact(&body, e, mu);
             let arm = body.arm[0].hypot(body.arm[1]);
             let shape = body.shape.clone().friction(mu).restitution(e);
-            let mut falling = SceneBody::dynamic([-body.arm[0], -body.arm[1]], shape);
+            let mut falling = SceneBody::dynamic([-body.arm[0], height - body.arm[1]], shape);
             falling = falling.moving(body.velocity, body.spin);
             falling.angle = body.angle;
             let scene = Scene::new("rough", vec![ground(50.0, mu), falling]).weightless();
             let dt = scene.dt;
-            let world = lab.run(scene, 3.0 * dt, |_| ())?;
+            let world = lab.run(scene, (3.0 + (height / body.velocity[1].abs() / dt).ceil()) * dt, |_| ())?;
             let ([vx, vy], w) = (velocity(&world, 1), spin(&world, 1));
             let found = [vx - truth[0], vy - truth[1], arm * (w - truth[2])];
             let error = largest(found.map(f64::abs));
             if error > worst || error.is_nan() {
                 worst = error;
                 of = format!("worst with e = {e}, µ = {mu}");
+                if height > 0.0 {
+                    of += &format!(", from {height} m");
+                }
             }
         }
     }
-    Ok(Finding::new(worst, 0.0, 1e-4).note(of))
+    Ok(Finding::new(worst, 0.0, tolerance).note(of))
 }
+
+/// Heights that 4 m/s make up in parts of a step of 1/60 s, and in more than one (m).
+const HEIGHTS: &[f64] = &[0.004, 0.015, 0.03, 0.05, 0.1, 0.3];
 
 /// A19. A disc, at 3 m/s along the ground and with a spin that is not that of rolling.
 fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
+    rough_impact(lab, disc)
+}
+
+/// A19. The same disc from above: whether a step sees it before it arrives or after, its arm is its radius.
+fn fallen_disc(lab: &Lab) -> Result<Finding, Failure> {
+    rough_impacts(lab, &[0.2, 0.5, 0.9], HEIGHTS, 1e-4, disc)
+}
+
+/// A19. The same corner from above, without spin until it arrives.
+fn fallen_corner(lab: &Lab) -> Result<Finding, Failure> {
+    rough_impacts(lab, &[0.2, 0.5, 0.9], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })
+}
+
+/// A19. Without restitution impacts are solved with all other contacts.
+fn plastic(lab: &Lab) -> Result<Finding, Failure> {
+    let disc = rough_impacts(lab, &[0.0], &[0.0], 0.04, disc)?;
+    let corner = rough_impacts(lab, &[0.0], &[0.0], 0.04, corner)?;
+    Ok(if disc.measured > corner.measured { disc } else { corner })
+}
+
+fn disc() -> Rough {
     let radius = 0.5;
     let density = 1.0 / (std::f64::consts::PI * radius * radius);
-    rough_impact(lab, || Rough {
+    Rough {
         shape: SceneShape::disc(radius).density(density),
         angle: 0.0,
         arm: [0.0, -radius],
         inertia: 0.5 * radius * radius,
         velocity: [3.0, -4.0],
         spin: 2.0,
-    })
+    }
 }
 
 /// A19. A unit square on a corner, 20° to the left of below its centre.
 fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
+    rough_impact(lab, corner)
+}
+
+fn corner() -> Rough {
     let angle = 25f64.to_radians();
     // The corner (−½, −½) turned by the angle.
     let (sin, cos) = angle.sin_cos();
     let arm = [-0.5 * cos + 0.5 * sin, -0.5 * sin - 0.5 * cos];
-    rough_impact(lab, || Rough {
+    Rough {
         shape: SceneShape::rectangle(0.5, 0.5).density(1.0),
         angle,
         arm,
         inertia: 1.0 / 6.0,
         velocity: [1.0, -4.0],
         spin: 0.5,
-    })
+    }
 }
 
 #[cfg(test)]

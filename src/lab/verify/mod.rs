@@ -27,6 +27,9 @@
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
 //! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step |
 //! | discs roll without lifting off | their contact points do not turn with them |
+//! | on a held body friction acts at the own surface, however deep | contact points lie there, and midway between two bodies that move |
+//! | discs feel only what they touch | their gaps are those at the end of their way |
+//! | scale does not matter | stiffness follows from the substep, no length enters |
 //!
 //! It does not promise:
 //!
@@ -41,15 +44,21 @@
 //!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
 //!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
 //!   that exceeds tan θ by little takes long to stop that.
+//! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometre sees the
+//!   side of the next tile (A24.tiles).
+//! - **Plastic impacts through rows.** A substep sweeps twice, and its impulses are where the next one starts.
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
+mod balance;
+mod carried;
 mod columns;
 mod far;
 mod impacts;
 mod lab;
 mod motion;
 mod overlap;
+mod pairs;
 mod paradox;
 mod ratios;
 mod runner;

@@ -37,7 +37,9 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "f32: 1e-6 √sweeps",
         angular_momentum,
-        No("arms are those of the step's beginning; bodies slide past each other within it"),
+        No(
+            "arms are those of the step's beginning: what an impact within it adds as bodies slide past each other",
+        ),
     ),
     Case::new(
         "B14.large",

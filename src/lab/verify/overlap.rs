@@ -18,6 +18,14 @@ pub(super) static CASES: &[Case] = &[
     )
     .swept_once(),
     Case::new(
+        "B3.apart",
+        "speed that two boxes keep that begin a fifth in each other, without weight",
+        "m/s",
+        "f32, as A17: 1e-6 √sweeps of the push speed of 3 m/s",
+        apart,
+        Yes("what pushes is taken back: one contact, one block"),
+    ),
+    Case::new(
         "B3.pile",
         "ground load of a pile that started overlapping, last second of five",
         "N",
@@ -74,6 +82,17 @@ fn recovered(depth: f64, h: f64) -> f64 {
     let a = h * omega * damping;
     let push = (a / (1.0 + a) * omega / damping * depth).min(f64::from(MAX_PUSH_SPEED));
     depth - h * push + G * h * h / (1.0 + a)
+}
+
+/// B3. Overlap is no energy: bodies that were pushed apart rest.
+fn apart(lab: &Lab) -> Result<Finding, Failure> {
+    let square = |x: f64| SceneBody::dynamic([x, 0.0], SceneShape::rectangle(0.5, 0.5));
+    let scene = Scene::new("apart", vec![square(-0.4), square(0.4)]).weightless();
+    let mut sweeps = 0;
+    let world = lab.run(scene, 2.0, |world| sweeps += world.counts.sweeps)?;
+    let gap = center(&world, 1)[0] - center(&world, 0)[0] - 1.0;
+    let tolerance = 1e-6 * (sweeps as f64).sqrt() * f64::from(MAX_PUSH_SPEED);
+    Ok(Finding::new(rms_speed(&world), 0.0, tolerance).note(format!("gap {gap:.1e} m")))
 }
 
 /// B3. A pile of ten boxes that start a quarter deep in each other ends at rest on the ground, whose

@@ -104,6 +104,22 @@ pub(super) static CASES: &[Case] = &[
         Yes("the contact point of a disc does not turn with it"),
     ),
     Case::new(
+        "A4.deep",
+        "speed at which a disc rolls that starts to slide a tenth of its radius deep in the ground",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        deep_roll,
+        Yes("against a body that does not move, arms end at the own surface"),
+    ),
+    Case::new(
+        "A4.dropped",
+        "speed of a disc that spins, falls, bounces and comes to roll, r w0/3",
+        "m/s",
+        "arm shorter by half a slop: 7/9 δ/r of r w0",
+        dropped_spin,
+        Yes("whatever friction gives at its radius keeps angular momentum about the line of contact"),
+    ),
+    Case::new(
         "A8.conveyor",
         "slip of a box on a moving belt until it is as fast",
         "m",
@@ -263,6 +279,25 @@ const ARM: f64 = 0.5 * SLOP / 0.5;
 fn back_spin(lab: &Lab) -> Result<Finding, Failure> {
     let speed = rolling_speed(lab, 0.5, 3.0 * START / 0.5)?;
     Ok(Finding::new(speed, -START / 3.0, 7.0 / 9.0 * ARM * START))
+}
+
+/// A4. 2/3 v0, whatever pushes it out on the way: friction acts at the radius.
+fn deep_roll(lab: &Lab) -> Result<Finding, Failure> {
+    let friction = 0.2;
+    let disc = SceneBody::dynamic([0.0, 0.45], SceneShape::disc(0.5).friction(friction));
+    let bodies = vec![ground(100.0, friction), disc.moving([START, 0.0], 0.0)];
+    let world = lab.run(Scene::new("deep", bodies), 2.0 * START / (friction * G), |_| ())?;
+    Ok(Finding::new(velocity(&world, 1)[0], 2.0 / 3.0 * START, 1e-4))
+}
+
+/// A4. Every impulse goes through the line of contact: I w0 = (I + m r²) w, however it bounces before it rolls.
+fn dropped_spin(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, spin) = (0.5, 20.0);
+    let shape = SceneShape::disc(radius).friction(0.3).restitution(0.5);
+    let disc = SceneBody::dynamic([0.0, 1.5], shape).moving([0.0, 0.0], -spin);
+    let world = lab.run(Scene::new("dropped", vec![ground(100.0, 0.3), disc]), 5.0, |_| ())?;
+    let truth = radius * spin / 3.0;
+    Ok(Finding::new(velocity(&world, 1)[0], truth, 7.0 / 9.0 * ARM * radius * spin))
 }
 
 /// Speed at 2 v0/(µ g), twice as late as sliding could last.

@@ -1,6 +1,8 @@
 //! The list of cases.
 
-use super::{Case, columns, far, impacts, motion, overlap, paradox, ratios, sliding, stacks};
+use super::{
+    Case, balance, carried, columns, far, impacts, motion, overlap, pairs, paradox, ratios, sliding, stacks,
+};
 use std::sync::LazyLock;
 
 /// Cases of the list that need joints or springs, which the crate does not have: skipped, visibly.
@@ -18,11 +20,14 @@ pub static NEEDS_JOINTS: &[(&str, &str)] = &[
 /// Every case, by family. The rows of a group stand in its file.
 pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
+        balance::CASES,
+        carried::CASES,
         columns::CASES,
         far::CASES,
         impacts::CASES,
         motion::CASES,
         overlap::CASES,
+        pairs::CASES,
         paradox::CASES,
         ratios::CASES,
         sliding::CASES,
