@@ -161,7 +161,7 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     add(ours(LaneWidth::W4), widths);
     add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::HashGrid), &default);
     // Contact frequencies of `shim` are its own affair; the others are those engines' methods here.
-    add(Maker::Solver("shim"), &[(16, 30.0), (8, 30.0)]);
+    add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
     add(Maker::Solver("box2d"), &default);
     add(Maker::Solver("rapier"), &default);
     let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false };

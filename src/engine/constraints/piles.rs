@@ -394,12 +394,10 @@ impl Piles {
                 }
             }
             for support in &self.supports {
-                let contact = &mut contacts[support.contact as usize];
-                let is_new = contact.preload == 0.0;
-                let point = &mut contact.manifold.points[support.point];
-                if is_new && point.normal_impulse == 0.0 {
-                    let impulse = support.load.map(|load| load as f32 * h);
-                    [point.normal_impulse, point.tangent_impulse] = impulse;
+                if support.is_new {
+                    let contact = &mut contacts[support.contact as usize];
+                    let point = &mut contact.manifold.points[support.point];
+                    [point.normal_impulse, point.tangent_impulse] = support.load.map(|load| load as f32 * h);
                 }
             }
         }
@@ -484,6 +482,7 @@ fn supports<'c>(
     let contact = &contacts[index as usize];
     let is_b = contact.body_b == body;
     let normal = contact.manifold.normal.as_dvec2();
+    let is_new = contact.preload == 0.0 && contact.manifold.points().iter().all(|p| p.normal_impulse == 0.0);
     let rests =
         move |p: &ManifoldPoint| p.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, p) <= still;
     contact.manifold.points().iter().enumerate().filter(move |(_, p)| rests(p)).map(move |(point, p)| {
@@ -493,6 +492,7 @@ fn supports<'c>(
             normal: if is_b { normal } else { -normal },
             arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
             friction: f64::from(contact.friction),
+            is_new,
             load: [0.0; 2],
         }
     })

@@ -36,6 +36,8 @@ pub(super) struct Support {
     pub arm: DVec2,
     /// Coulomb coefficient (1).
     pub friction: f64,
+    /// Its contact has borne nothing yet.
+    pub is_new: bool,
     /// Along the normal and along (n_y, −n_x) of it (N).
     pub load: [f64; 2],
 }
