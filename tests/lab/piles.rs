@@ -7,6 +7,7 @@ use simpulse::engine::constraints::piles::{PileModes, Piles};
 use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
+use simpulse::lab::scenes::Scene;
 
 const GRAVITY: Vec2 = Vec2::new(0.0, -10.0);
 
@@ -116,9 +117,57 @@ fn sweeps(name: &str) -> usize {
 fn only_a_column_that_would_buckle_pays_for_it() {
     let usual = sweeps("disc_column:60");
     assert_eq!([sweeps("stack:30"), sweeps("pyramid:30"), sweeps("card_house")], [usual; 3]);
-    // Springs of the square root of the added sweeps, and so 32 at most.
+    // Springs of the square root of the added sweeps, and so 64 at most.
     let [sixty, thousand] = ["stack:60", "stack:1000"].map(sweeps);
     assert!(usual < sixty && sixty < thousand, "{usual} {sixty} {thousand}");
     let substeps = solvers::find("shim").unwrap().budget.substeps as usize;
-    assert_eq!(thousand, usual + 32 * substeps);
+    assert_eq!(thousand, usual + 64 * substeps);
+}
+
+/// Ten tables on top of each other rock on their legs, which preload shortens, and a column of boxes does not.
+#[test]
+fn tables_rock_more_slowly_than_their_columns_move() {
+    let column: Vec<_> = (0..10).map(|i| [0.0, 0.5 + f64::from(i)]).collect();
+    let one = modes(&mut boxes(&column, false, GRAVITY)).slowness;
+    let two: Vec<_> = column.iter().flat_map(|&[_, y]| [[-2.0, y], [2.0, y]]).collect();
+    assert_eq!(modes(&mut boxes(&two, false, GRAVITY)).slowness, one);
+    let text = |bodies: String| {
+        let ground = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[60,1]}}]}"#;
+        format!(r#"{{"name":"tables","bodies":[{ground}{bodies}]}}"#)
+    };
+    let table = |i: u32| {
+        let y = 1.5 * f64::from(i);
+        let part = |x: f64, y: f64, half: [f64; 2]| {
+            format!(r#",{{"type":"dynamic","position":[{x},{y}],"shapes":[{{"box":{{"half":{half:?}}}}}]}}"#)
+        };
+        let legs = [-1.5, 1.5].map(|x| part(x, y + 0.5, [0.2, 0.5]));
+        legs.concat() + &part(0.0, y + 1.25, [2.0, 0.25])
+    };
+    let scene = Scene::from_json(&text((0..10).map(table).collect()), "tables.json".as_ref()).unwrap();
+    let build = || scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
+    assert!(modes(&mut build()).slowness > 5.0 * one);
+    let mut world = build();
+    // They rest within ten seconds.
+    for _ in 0..600 {
+        world.step().unwrap();
+    }
+    let fastest = (0..world.bodies.len()).map(|b| world.bodies.velocity(b).length()).fold(0.0, f32::max);
+    assert!(fastest < 1e-3, "{fastest}");
+}
+
+/// A stack that begins at rest stays there from its first step on, and sinks by no more than what is left of its sag.
+#[test]
+fn statics_leaves_a_stack_where_it_is() {
+    for name in ["stack:20", "pyramid:10", "disc_column:10"] {
+        let mut world = scene(name);
+        let before = world.bodies.clone();
+        for _ in 0..120 {
+            world.step().unwrap();
+            for body in 0..world.bodies.len() {
+                let moved = (world.bodies.pose(body).position - before.pose(body).position).length();
+                // 20 µm at each contact below.
+                assert!(moved < 2e-5 * 20.0, "{name}: body {body} {moved} m");
+            }
+        }
+    }
 }

@@ -144,17 +144,19 @@ impl Joint {
         if between > 1e-9 * self.second { inertia * between / (all * all) } else { 0.0 }
     }
 
-    /// Moment of the weight above it over the resistance of its springs at 1 rad/s (s⁻²), for gravity g (m/s²) and
-    /// bodies of the radius of gyration √`gyration` (m²); 0 where the part does not stand on it.
-    fn buckling(&self, above: &Part, gyration: f64, g: f64) -> f64 {
-        let (middle, [resistance, _]) = (self.moment / self.mass, self.resistance());
-        let lever = above.moment / above.mass;
-        let stands = (self.range[0]..=self.range[1]).contains(&lever.x) && lever.y > middle.y;
-        if stands && !self.moves && resistance > NARROWEST * NARROWEST * gyration * self.mass {
-            g * above.mass * (lever.y - middle.y) / resistance
-        } else {
-            0.0
-        }
+    /// Whether the part `above` it stands on it: it does not move, has the centre of mass over it, and is not too narrow
+    /// for a body of the radius of gyration √`gyration` (m²).
+    fn stands(&self, above: &Part, gyration: f64) -> bool {
+        let (middle, lever) = (self.moment / self.mass, above.moment / above.mass);
+        let wide = self.resistance()[0] > NARROWEST * NARROWEST * gyration * self.mass;
+        let is_over = (self.range[0]..=self.range[1]).contains(&lever.x) && lever.y > middle.y;
+        wide && is_over && !self.moves
+    }
+
+    /// Moment of the weight above it over the resistance of its springs at 1 rad/s (s⁻²), for gravity g (m/s²).
+    fn buckling(&self, above: &Part, g: f64) -> f64 {
+        let height = above.moment.y - above.mass * self.moment.y / self.mass;
+        g * height / self.resistance()[0]
     }
 }
 
@@ -327,8 +329,10 @@ impl Piles {
             let joint = std::mem::take(&mut part.joint);
             if joint.mass > 0.0 {
                 let gyration = f64::from(search.bodies.inv_mass[body] / search.bodies.inv_inertia[body]);
-                part.buckling += joint.buckling(part, gyration, search.g);
-                part.rocking += joint.rocking(part);
+                if joint.stands(part, gyration) {
+                    part.buckling += joint.buckling(part, search.g);
+                    part.rocking += joint.rocking(part);
+                }
             }
             *greatest = [greatest[0].max(part.buckling), greatest[1].max(part.rocking)];
         }

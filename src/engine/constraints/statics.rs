@@ -84,3 +84,61 @@ pub(super) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(normal: DVec2, arm: DVec2, friction: f64) -> Support {
+        Support { contact: 0, point: 0, normal, arm, friction, is_new: false, load: [0.0; 2] }
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-4 * (1.0 + expected.abs())
+    }
+
+    /// A box of half width ½ whose weight of 10 N stands x beside its middle: ½ ± x of it, as levers say.
+    #[test]
+    fn two_corners_share_by_their_levers() {
+        for x in [-0.25, 0.0, 0.4] {
+            let mut corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.0));
+            load(&mut corners, DVec2::new(0.0, -10.0), -10.0 * x, 0.4);
+            let loads = corners.map(|corner| corner.load[0]);
+            assert!(close(loads[0], 10.0 * (0.5 - x)) && close(loads[1], 10.0 * (0.5 + x)), "{x}: {loads:?}");
+        }
+    }
+
+    /// Beyond a corner all of it is on that one.
+    #[test]
+    fn no_corner_pulls() {
+        let mut corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.0));
+        load(&mut corners, DVec2::new(0.0, -10.0), -10.0 * 0.8, 0.4);
+        assert_eq!(corners[0].load[0], 0.0);
+        assert!(corners[1].load[0] > 9.0);
+    }
+
+    /// A disc on an incline rolls: friction is a third of what drives it, or µ times the load if that is less.
+    #[test]
+    fn a_disc_on_an_incline_has_a_third_of_its_drive_as_friction() {
+        let (sin, cos) = (0.3f64.sin(), 0.3f64.cos());
+        for friction in [1.0, 0.05] {
+            let mut touching = [point(DVec2::Y, DVec2::new(0.0, -0.5), friction)];
+            load(&mut touching, 10.0 * DVec2::new(sin, -cos), 0.0, 0.5 / 2.0f64.sqrt());
+            let [normal, tangent] = touching[0].load;
+            let expected = (10.0 * sin / 3.0).min(friction * 10.0 * cos);
+            assert!(close(normal, 10.0 * cos) && close(-tangent, expected), "{friction}: {normal} {tangent}");
+        }
+    }
+
+    /// Between two walls at 60° a disc of 10 N asks each for 10 N/(2 cos 60°); in a narrower wedge for more than is
+    /// given.
+    #[test]
+    fn a_wedge_gets_what_it_asks_for_up_to_a_bound() {
+        for (angle, expected) in [(60f64, 10.0), (89.0, 20.0)] {
+            let (sin, cos) = angle.to_radians().sin_cos();
+            let mut walls = [sin, -sin].map(|x| point(DVec2::new(x, cos), -0.5 * DVec2::new(x, cos), 0.0));
+            load(&mut walls, DVec2::new(0.0, -10.0), 0.0, 0.35);
+            assert!(walls.iter().all(|wall| close(wall.load[0], expected)), "{angle}: {walls:?}");
+        }
+    }
+}

@@ -20,6 +20,7 @@
 //! |---|---|
 //! | free motion is exact on its discrete formula | semi-implicit Euler |
 //! | one body slides, sticks and rolls by Coulomb's law once loads are warm | friction rows are rigid, solved last |
+//! | columns stand, whatever their height, as long as sweeps are left | springs beyond Southwell's bound |
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
 //! | piles whose Gauss–Seidel rate leaves no error within the run come to rest | cos²(π/2N) and R/(1+R) per sweep |
 //! | overlap is pushed apart no faster than 3 m/s | the cap |
@@ -35,11 +36,11 @@
 //!
 //! - One solution where the sweeps of a step have not converged.
 //! - Heavy loads on light bodies, before preload has followed: the depth F/(m ω²) itself may exceed the body.
-//! - **High stacks.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
+//! - **High stacks of soft contacts.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
 //!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
 //!   column of N links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam
-//!   does, at q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔: 41.8 at the 154 Hz of the default solver. More
-//!   iterations do not help.
+//!   does, at q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔. More iterations do not help; stiffer springs do, which
+//!   the default solver has up to 100 boxes.
 //! - **Friction in the first substep.** A box on a slope has contact points ½ m below its centre:
 //!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
 //!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction

@@ -47,7 +47,7 @@ pub(super) static CASES: &[Case] = &[
         "s",
         "1/15 s is to hold",
         large_steps,
-        Yes("the cold first substep is a sixteenth of the step"),
+        Yes("the first substep begins with the impulses of statics"),
     ),
     Case::new(
         "B14.order",
