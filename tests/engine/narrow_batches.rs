@@ -1,4 +1,4 @@
-//! Law: the narrow phase in lanes finds what `collide` finds pair by pair, to the bit, at every
+//! Law: the narrow phase in lanes finds what `collide_in_step` finds pair by pair, to the bit, at every
 //! width; and a contact keeps the impulses of the points whose features go on.
 
 use glam::Vec2;
@@ -7,9 +7,9 @@ use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::{Contact, Manifold};
 use simpulse::engine::lanes::{LaneWidth, Quad};
 use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
-use simpulse::engine::narrowphase::collide;
 use simpulse::engine::narrowphase::lanes::Class;
 use simpulse::engine::narrowphase::lanes::PoseRow;
+use simpulse::engine::narrowphase::{collide, collide_in_step};
 use simpulse::engine::shapes::{Pose, Shape};
 
 const SPECULATIVE: f32 = 0.1;
@@ -76,7 +76,8 @@ impl Scene {
     /// What the step should have found, with the impulses of `old` where features go on.
     fn expected(&self, pair: usize, poses: &[Pose], old: &Manifold) -> Manifold {
         let (a, b) = (2 * pair, 2 * pair + 1);
-        let mut m = collide(&self.shapes[a], &poses[a], &self.shapes[b], &poses[b], SPECULATIVE);
+        let (shapes, poses) = ([&self.shapes[a], &self.shapes[b]], [&poses[a], &poses[b]]);
+        let mut m = collide_in_step(shapes, poses, [[0.0; 4]; 2], false, SPECULATIVE);
         for point in &mut m.points[..m.count as usize] {
             if let Some(same) = old.points().iter().find(|p| p.feature_id == point.feature_id) {
                 (point.normal_impulse, point.tangent_impulse) = (same.normal_impulse, same.tangent_impulse);

@@ -5,7 +5,7 @@ use glam::Vec2;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::Manifold;
-use simpulse::engine::narrowphase::{collide, epa, gjk};
+use simpulse::engine::narrowphase::{collide, collide_in_step, epa, gjk};
 use simpulse::engine::shapes::{Pose, Shape};
 
 /// Shapes are within a few metres of each other, so this keeps every point.
@@ -469,4 +469,20 @@ fn scaled(shape: &Shape, k: f32) -> Shape {
         }
     }
     .expect("valid")
+}
+
+/// Two unit boxes side by side, 1 cm apart, that face each other along `overlap`.
+#[test]
+fn faces_that_graze_each_other_are_no_contact_of_a_step() {
+    let unit = Shape::rectangle("box", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0).unwrap();
+    let found = |overlap: f32, gap: f32| {
+        let [a, b] = [Vec2::ZERO, Vec2::new(1.0 + gap, 1.0 - overlap)]
+            .map(|position| Pose { position, rotation: Vec2::X });
+        let geometry = collide(&unit, &a, &unit, &b, 0.02).count;
+        [geometry, collide_in_step([&unit; 2], [&a, &b], [[0.0; 4]; 2], false, 0.02).count]
+    };
+    assert_eq!(found(0.004, 0.01), [2, 0]);
+    assert_eq!(found(0.006, 0.01), [2, 2]);
+    // What overlaps has to be pushed apart.
+    assert_eq!(found(0.004, -0.001), [2, 2]);
 }

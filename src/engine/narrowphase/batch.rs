@@ -209,7 +209,7 @@ fn run<L: Lanes>(
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            rectangles::collide(&pair, speculative).on_held(poses.held[0])
+            rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0])
         }),
         Kind::Circles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
@@ -224,7 +224,7 @@ fn run<L: Lanes>(
             run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                pair.collide(&poses, speculative).on_held(poses.held[0])
+                pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0])
             })
         }
         Kind::HullCircle => {

@@ -78,6 +78,7 @@ pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<
         anchor_b: [anchor_b; 2],
         separation: [separation; 2],
         feature: [zero; 2],
+        passes: zero,
     };
     (touch, distance)
 }

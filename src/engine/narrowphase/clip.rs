@@ -34,6 +34,9 @@ pub const FLUSH: f32 = -0.99995;
 /// the coordinates over this length, would show. Points closer than this are one.
 const VERTEX_TOLERANCE: f32 = 0.01 * LINEAR_SLOP;
 
+/// Part of a face (1) that is a graze, if it is less than the slop; see [`Touch::without_grazes`].
+const GRAZE: f32 = 0.25;
+
 /// The two faces that bound a contact.
 pub struct Faces<L> {
     /// n, in world axes.
@@ -126,8 +129,13 @@ pub fn touch<L: Lanes>(
     let id_past =
         name(past_low.select_positive(first, second), q_is_left.select_positive(left_name, right_name));
 
+    // Flush faces that pass each other by less than a graze.
+    let width = t_left - t_right;
+    let graze = L::splat(LINEAR_SLOP).min(L::splat(GRAZE) * extent.min(high - low));
+    let passes = parallel.min(graze - width).min(s_0.min(s_1));
+
     // Which points there are. A cut that leaves next to nothing leaves the deeper end.
-    let one_point = L::splat(VERTEX_TOLERANCE) - (t_left - t_right);
+    let one_point = L::splat(VERTEX_TOLERANCE) - width;
     // To keep the far point of a pair whose other point is near was tried: it changes overlaps in
     // piles by −4 % to +4 % and gives the solver a seventh more points.
     let near = |s: L| (s - speculative).select_positive(none, one);
@@ -163,5 +171,6 @@ pub fn touch<L: Lanes>(
         anchor_b,
         separation: points.map(|p| p[2]),
         feature: points.map(|p| p[3]),
+        passes,
     }
 }

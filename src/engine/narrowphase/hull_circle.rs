@@ -112,6 +112,7 @@ impl<L: Lanes> HullCircle<L> {
             anchor_b: [anchor_b; 2],
             separation: [separation; 2],
             feature: [zero; 2],
+            passes: zero,
         };
         (touch, gap)
     }

@@ -32,7 +32,7 @@ use batch::Kind;
 use hull::HullRow;
 use hull_circle::HullCircle;
 use hulls::Hulls;
-use lanes::{Poses, ShapePair, ShapeRow};
+use lanes::{Poses, ShapePair, ShapeRow, Touch};
 
 /// Contact of shape `a` with shape `b`, each in the frame of its body's centre of mass.
 ///
@@ -52,11 +52,13 @@ use lanes::{Poses, ShapePair, ShapeRow};
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
-    collide_in_step([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, speculative_distance)
+    touch([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, speculative_distance)
+        .map_or_else(Manifold::default, |touch| touch.manifold())
 }
 
 /// As [`collide`], for the coming step, in which bodies move by `ways` if nothing hinders them (`[x, y, θ, 0]`, m and
-/// rad), and whether no impulse moves that of `a`: then points lie on the surface of `b`.
+/// rad), and whether no impulse moves that of `a`: then points lie on the surface of `b`. Without grazes, which bodies
+/// slide over.
 pub fn collide_in_step(
     [a, b]: [&Shape; 2],
     [pose_a, pose_b]: [&Pose; 2],
@@ -64,9 +66,21 @@ pub fn collide_in_step(
     a_is_held: bool,
     speculative_distance: f32,
 ) -> Manifold {
+    touch([a, b], [pose_a, pose_b], ways, a_is_held, speculative_distance)
+        .map_or_else(Manifold::default, |touch| touch.without_grazes().manifold())
+}
+
+/// What [`collide_in_step`] finds, with grazes; none for two segments.
+fn touch(
+    [a, b]: [&Shape; 2],
+    [pose_a, pose_b]: [&Pose; 2],
+    ways: [[f32; 4]; 2],
+    a_is_held: bool,
+    speculative_distance: f32,
+) -> Option<Touch<f32>> {
     // What lanes do in a step is done here with one lane: the same bits.
     let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
-    let Some(kind) = Kind::of(class_a, class_b) else { return Manifold::default() };
+    let kind = Kind::of(class_a, class_b)?;
     let poses = Poses::<f32>::new(pose_a, pose_b);
     let held = f32::from(u8::from(a_is_held));
     let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
@@ -93,7 +107,7 @@ pub fn collide_in_step(
             touch.swapped().on_held(held).with_gap(gap)
         }
     };
-    touch.manifold()
+    Some(touch)
 }
 
 impl Manifold {
