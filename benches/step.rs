@@ -12,7 +12,11 @@ fn bench(c: &mut Criterion) {
     for variant in &VARIANTS {
         let mut group = c.benchmark_group(format!("step/{}", variant.name));
         for scene in common::STEP_SCENES {
-            let truth = common::settled(scene, variant.name, LaneWidth::W1).state_hash();
+            let Some(scalar) = common::stable(scene, variant.name, LaneWidth::W1) else {
+                println!("step/{}/{scene}: left out, since it diverges", variant.name);
+                continue;
+            };
+            let truth = scalar.state_hash();
             for width in LaneWidth::ALL {
                 let mut world = common::settled(scene, variant.name, width);
                 assert_eq!(world.state_hash(), truth, "{} {scene} {width:?}", variant.name);
