@@ -17,7 +17,7 @@
 //! contacts have come or gone, a search of the contact graph. Sweeps of a step request 5935 B per contact.
 //!
 //! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies slide past
-//! each other, angular momentum is conserved to 3e-5 only: arms are those of the step's beginning, which matters to
+//! each other, angular momentum is conserved to 4e-5 only: arms are those of the step's beginning, which matters to
 //! impacts within it. And where an impact without restitution runs through a row of bodies: the second substep
 //! repeats it, and takes it back in two sweeps.
 
