@@ -39,6 +39,13 @@ fn boxes(places: &[[f64; 2]], with_wall: bool, gravity: Vec2) -> World {
     world
 }
 
+/// These bodies, each after a comma, on the ground.
+fn on_ground(bodies: &str) -> Scene {
+    let ground = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[60,1]}}]}"#;
+    Scene::from_json(&format!(r#"{{"name":"piles","bodies":[{ground}{bodies}]}}"#), "piles.json".as_ref())
+        .unwrap()
+}
+
 /// Bodies of 1 kg, two equal masses at a joint and one on the ground: Σ j/(1/2) up to N − 1, and N.
 #[test]
 fn a_column_of_discs_is_slow_by_the_square_of_its_length_and_has_hinges() {
@@ -131,10 +138,6 @@ fn tables_rock_more_slowly_than_their_columns_move() {
     let one = modes(&mut boxes(&column, false, GRAVITY)).slowness;
     let two: Vec<_> = column.iter().flat_map(|&[_, y]| [[-2.0, y], [2.0, y]]).collect();
     assert_eq!(modes(&mut boxes(&two, false, GRAVITY)).slowness, one);
-    let text = |bodies: String| {
-        let ground = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[60,1]}}]}"#;
-        format!(r#"{{"name":"tables","bodies":[{ground}{bodies}]}}"#)
-    };
     let table = |i: u32| {
         let y = 1.5 * f64::from(i);
         let part = |x: f64, y: f64, half: [f64; 2]| {
@@ -143,7 +146,7 @@ fn tables_rock_more_slowly_than_their_columns_move() {
         let legs = [-1.5, 1.5].map(|x| part(x, y + 0.5, [0.2, 0.5]));
         legs.concat() + &part(0.0, y + 1.25, [2.0, 0.25])
     };
-    let scene = Scene::from_json(&text((0..10).map(table).collect()), "tables.json".as_ref()).unwrap();
+    let scene = on_ground(&(0..10).map(table).collect::<String>());
     let build = || scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
     assert!(modes(&mut build()).slowness > 5.0 * one);
     let mut world = build();
@@ -169,5 +172,30 @@ fn statics_leaves_a_stack_where_it_is() {
                 assert!(moved < 2e-5 * 20.0, "{name}: body {body} {moved} m");
             }
         }
+    }
+}
+
+/// Unit boxes under one of many times their mass, for a minute: 20 µm at each contact.
+#[test]
+fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
+    for (count, density) in [(10, 100.0), (20, 900.0)] {
+        let boxed = |i: u32, density: f64| {
+            let y = 0.5 + f64::from(i);
+            let shape = format!(r#"{{"box":{{"half":[0.5,0.5]}},"density":{density}}}"#);
+            format!(r#",{{"type":"dynamic","position":[0,{y}],"shapes":[{shape}]}}"#)
+        };
+        let bodies = (0..count).map(|i| boxed(i, 1.0)).collect::<String>() + &boxed(count, density);
+        let mut world = on_ground(&bodies).build(common::settings(solvers::find("shim").unwrap())).unwrap();
+        for _ in 0..3600 {
+            world.step().unwrap();
+        }
+        let heavy = world.bodies.len() - 1;
+        let sunk = 0.5 + f64::from(count) - f64::from(world.bodies.position_y[heavy]);
+        println!(
+            "{count} boxes under {density} times the mass: the heavy one has sunk by {:.0} µm",
+            1e6 * sunk
+        );
+        assert!(sunk.abs() < 2e-5 * f64::from(count + 1) + 1e-5, "{count}: {sunk}");
+        assert!(world.bodies.velocity(heavy).length() < 1e-3, "{count}");
     }
 }

@@ -396,10 +396,7 @@ impl Piles {
                     self.forces[other][0] += carried;
                     self.forces[other][1] -= carried * arm.perp_dot(up);
                 }
-            }
-            for support in &self.supports {
                 if support.is_new {
-                    let contact = &mut contacts[support.contact as usize];
                     let point = &mut contact.manifold.points[support.point];
                     [point.normal_impulse, point.tangent_impulse] = support.load.map(|load| load as f32 * h);
                 }

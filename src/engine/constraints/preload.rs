@@ -89,23 +89,16 @@ impl Pass for Preload {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
             let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
                 OppositeKind::Dynamic => self.springs.dynamic,
                 _ => self.springs.against_static,
             };
             let compliance = impulse_scale / (mass_scale * bias_rate);
             let deepest = self.springs.push_speed / (mass_scale * bias_rate);
-            let layout = F::layout(segment.opposite);
-            preload_segment::<L>(
-                on.batches,
-                &segment,
-                &layout,
-                on.contacts,
-                [compliance, self.rate, deepest, self.h, 1.0 - self.share],
-            );
-        }
+            let factors = [compliance, self.rate, deepest, self.h, 1.0 - self.share];
+            preload_segment::<L>(batches, segment, layout, on.contacts, factors);
+        });
     }
 }
 

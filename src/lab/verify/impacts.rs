@@ -246,15 +246,7 @@ fn after_impact(rough: &Rough, e: f64, mu: f64) -> [f64; 3] {
     let (vn, vt) = (vy + w * x, vx - w * y);
     let (k_nn, k_tt) = (1.0 + x * x / rough.inertia, 1.0 + y * y / rough.inertia);
     let k_nt = -x * y / rough.inertia;
-    let rise = -(1.0 + e) * vn;
-    let determinant = k_nn * k_tt - k_nt * k_nt;
-    let mut normal = (k_tt * rise + k_nt * vt) / determinant;
-    let mut tangent = (-k_nn * vt - k_nt * rise) / determinant;
-    if tangent.abs() > mu * normal {
-        let slope = mu * tangent.signum();
-        normal = rise / (k_nn + slope * k_nt);
-        tangent = slope * normal;
-    }
+    let [tangent, normal] = rough_impulse([k_nn, k_tt, k_nt], [vt, vn], e, mu);
     [vx + tangent, vy + normal, w + (x * normal - y * tangent) / rough.inertia]
 }
 

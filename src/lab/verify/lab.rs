@@ -220,6 +220,23 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
 }
 
+/// Impulses [T, N] of an impact (N·s) under Newton's law with `e` and Coulomb's with `mu` on all of them: v_n⁺ = −e v_n,
+/// and along t what stops the points, or ±µ N. `k` is (nn, tt, nt) of the inverse masses, `[vt, vn]` how the points meet.
+pub(super) fn rough_impulse(k: [f64; 3], [vt, vn]: [f64; 2], e: f64, mu: f64) -> [f64; 2] {
+    let [k_nn, k_tt, k_nt] = k;
+    let rise = -(1.0 + e) * vn;
+    let determinant = k_nn * k_tt - k_nt * k_nt;
+    let normal = (k_tt * rise + k_nt * vt) / determinant;
+    let tangent = (-k_nn * vt - k_nt * rise) / determinant;
+    if tangent.abs() > mu * normal {
+        let slope = mu * tangent.signum();
+        let normal = rise / (k_nn + slope * k_nt);
+        [slope * normal, normal]
+    } else {
+        [tangent, normal]
+    }
+}
+
 /// Slope of the least-squares line through (t, x); NaN for fewer than two times.
 pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;

@@ -116,15 +116,7 @@ fn after_hit(a: &Hit, b: &Hit, e: f64, mu: f64) -> [[f64; 3]; 2] {
     };
     let (ka, kb) = (of(a), of(b));
     let [k_nn, k_tt, k_nt]: [f64; 3] = std::array::from_fn(|i| ka[i] + kb[i]);
-    let rise = -(1.0 + e) * vn;
-    let determinant = k_nn * k_tt - k_nt * k_nt;
-    let mut normal = (k_tt * rise + k_nt * vt) / determinant;
-    let mut tangent = (-k_nn * vt - k_nt * rise) / determinant;
-    if tangent.abs() > mu * normal {
-        let slope = mu * tangent.signum();
-        normal = rise / (k_nn + slope * k_nt);
-        tangent = slope * normal;
-    }
+    let [tangent, normal] = rough_impulse([k_nn, k_tt, k_nt], [vt, vn], e, mu);
     [a.after([-tangent, -normal]), b.after([tangent, normal])]
 }
 
