@@ -126,6 +126,8 @@ pub struct StepInput {
     pub points: usize,
     /// See [`Passes::pile_modes`].
     pub pile_modes: PileModes,
+    /// See [`Passes::contacts_changed`].
+    pub contacts_changed: bool,
 }
 
 /// One step's problem, prepared.
@@ -199,6 +201,12 @@ impl<'a> Passes<'a> {
     /// [`crate::engine::solvers::Variant::piles`] is set.
     pub fn pile_modes(&self) -> PileModes {
         self.input.pile_modes
+    }
+
+    /// Contacts have come or gone since the step before; not told unless
+    /// [`crate::engine::solvers::Variant::piles`] is set.
+    pub fn contacts_changed(&self) -> bool {
+        self.input.contacts_changed
     }
 
     /// Points of all contacts.

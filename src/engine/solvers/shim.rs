@@ -106,8 +106,8 @@ fn step(passes: &mut Passes<'_>) {
             passes.iteration_done();
         }
         passes.integrate_positions();
-        // Impulses of the step before meet contacts that came, went or moved: one sweep more.
-        let settling = u32::from(substep == 0);
+        // Impulses of the step before meet contacts that came, or miss some that went: one sweep more.
+        let settling = u32::from(substep == 0 && passes.contacts_changed());
         for _ in 0..budget.relax_iterations + added + settling {
             passes.parting_sweep(Phase::Relax, rigid, substep);
         }

@@ -247,6 +247,7 @@ impl World {
             record_impulses: s.record_impulses,
             points: self.counts.points,
             pile_modes: self.found.modes,
+            contacts_changed: self.found.contacts_changed,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());
