@@ -64,8 +64,8 @@ use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, Oppo
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::NormalRule;
 use super::sweep::{
-    BodyPair, Rows, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
-    spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, Rows, TURN, VX, VY, W, apply, arms, for_each_batch,
+    over_segments, spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 use crate::engine::params::LINEAR_SLOP;
@@ -215,7 +215,8 @@ fn segment<
             if has_friction && NORMAL_FIRST {
                 let vt = with_arms::<L, N, O>(along_t, progress.w, arm_t);
                 let at = layout.at(p, layout.tangent_impulse);
-                let (old, slope) = (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
+                let (old, slope) =
+                    (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
                 (tangent.arm[p], tangent.slope[p], tangent.old[p]) = (arm_t, slope, old);
                 tangent.impulse[p] = slope.neg_mul_add(vt, old);
             }

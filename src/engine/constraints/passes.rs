@@ -408,7 +408,8 @@ impl<'a> Passes<'a> {
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
     /// the impulses so far, of which a step takes over the part `rate`; see `preload.rs`.
     pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
-        self.run(Phase::Prepare, &Preload { springs, share, rate, h: self.h() });
+        let (h, dt) = (self.h(), self.h() * self.input.budget.substeps as f32);
+        self.run(Phase::Prepare, &Preload { springs, share, rate, h, dt });
     }
 
     /// Gives bodies their lanes for block descent, see [`super::descent`]: once a step, before all else of it.

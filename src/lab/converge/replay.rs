@@ -139,8 +139,17 @@ impl<'a> Replay<'a> {
         let phases = PhaseFilter::ALL;
         // Nothing buckles or swings in one step.
         let (record_impulses, pile_modes, contacts_changed) = (false, PileModes::default(), true);
-        let input =
-            StepInput { features, budget, h, parameters, phases, record_impulses, points, pile_modes, contacts_changed };
+        let input = StepInput {
+            features,
+            budget,
+            h,
+            parameters,
+            phases,
+            record_impulses,
+            points,
+            pile_modes,
+            contacts_changed,
+        };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],
