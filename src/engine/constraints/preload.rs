@@ -28,6 +28,19 @@
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
 //!
+//! # Contacts that roll
+//!
+//! Raised preload moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, d
+//! falls at once where they do and is raised again, so that the pile swells and settles without an end. A contact
+//! of one point is left alone once it has [`HELD`] of its goal,
+//!
+//! ```text
+//! d ← min(d + max(0, 0.9 goal − d) · rate, goal)
+//! ```
+//!
+//! What is held is a spring as others are, which makes nothing swing. The sooner it is held the better: its rate is
+//! [`QUICKER`] times as high.
+//!
 //! # Where it begins
 //!
 //! What statics says of the load ([`Contact::weight`], from time to time) follows no motion, so that a preload taken
@@ -75,6 +88,12 @@ pub(super) struct Preload {
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
 
+/// Part of its goal from which on the preload of a contact of one point stays as it is (1).
+const HELD: f32 = 0.9;
+
+/// Time in which preload follows the load on two points over that on one (1).
+const QUICKER: f32 = 4.0;
+
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
 const LEFT: f32 = 2e-5;
 
@@ -114,6 +133,9 @@ fn preload_segment<L: Lanes>(
 ) {
     // Without preload, all of the sag is left.
     let most_left = L::splat(if factors[4] < 1.0 { LEFT } else { f32::INFINITY });
+    let rate = factors[1];
+    // dt/(dt + T) for a time T that is shorter by the factor.
+    let quick = L::splat(QUICKER * rate / ((QUICKER - 1.0).mul_add(rate, 1.0)));
     let [compliance, rate, deepest, h, left] = factors.map(L::splat);
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
@@ -139,7 +161,11 @@ fn preload_segment<L: Lanes>(
             filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
         }
         let most = goal(impulse);
-        let preload = rate.mul_add(most - last, last).min(most);
+        // A point that is not there has no mass.
+        let second = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { L::zero() };
+        let held = second.select_positive(most, L::splat(HELD) * most);
+        let rate = second.select_positive(rate, quick);
+        let preload = rate.mul_add((held - last).max(L::zero()), last).min(most);
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);
             let depth = L::splat(EARNED).mul_add(preload, deepest);
