@@ -218,7 +218,7 @@ pub struct Piles {
     columns: Vec<Column>,
     /// What each body bears: weight (N), and its torque about the centre of mass (N·m).
     forces: Vec<[f64; 2]>,
-    /// A contact of the body has borne a load, by body.
+    /// Whether a contact of the body has borne a load.
     is_loaded: Vec<bool>,
     /// Of one body.
     supports: Vec<Support>,
@@ -366,9 +366,9 @@ impl Piles {
     }
 
     /// Writes what contacts bear at rest, from the top downwards: each body stands, with what it bears, on its
-    /// contacts with the level below. Those of bodies without a load yet get their impulses per substep of `h` (s):
-    /// of others motion knows better what a contact that comes will bear, and all contacts of one point unless a body
-    /// has only that (discs in a pile share their loads in many ways).
+    /// contacts with the level below. Bodies that have borne nothing yet get their impulses per substep of `h` (s), too:
+    /// of others motion knows better what a contact that comes will bear. Nor is anything written there for contacts of one
+    /// point, since discs in a pile share their loads in many ways.
     fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let up = -gravity.normalize();
         self.forces.clear();
@@ -397,10 +397,9 @@ impl Piles {
             let carried = |support: &Support| support.force().dot(up).max(0.0);
             let part = weight / self.supports.iter().map(carried).sum::<f64>();
             let is_new = !self.is_loaded[b];
-            let is_known = is_new || self.supports.len() == 1;
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];
-                if is_known || contact.manifold.count > 1 {
+                if is_new || contact.manifold.count > 1 {
                     contact.weight += support.load[0] as f32;
                 }
                 let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
