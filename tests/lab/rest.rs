@@ -72,6 +72,29 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
     assert!(fastest < 1e-4, "{fastest} m/s");
 }
 
+/// Median over the bodies of a pile of 1000 discs of their root mean square speed in the tenth second (m/s).
+fn median_speed(seed: u64) -> f64 {
+    let scene = simpulse::lab::scenes::load_with_seed("circle_pile:1000", seed).unwrap().scene;
+    let mut world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 540);
+    let mut squares = vec![0.0; world.bodies.len()];
+    for _ in 0..60 {
+        world.step().unwrap();
+        for (i, square) in squares.iter_mut().enumerate() {
+            *square += f64::from(world.bodies.velocity(i).length_squared()) / 60.0;
+        }
+    }
+    squares.sort_by(f64::total_cmp);
+    squares[squares.len() / 2].sqrt()
+}
+
+/// Single discs roll on for long, as they should. The pile around them does not swell and settle on its preload.
+#[test]
+fn a_pile_of_discs_does_not_breathe() {
+    let mut speeds = [1, 2, 3, 4, 5].map(median_speed);
+    speeds.sort_by(f64::total_cmp);
+    assert!(speeds[2] < 1e-4, "{speeds:?} m/s");
+}
+
 /// Lemke's method and Newton's end in the same state of the contact law, far closer to it than sweeps do.
 #[test]
 fn lemke_and_newton_agree_on_a_stack() {

@@ -218,6 +218,8 @@ pub struct Piles {
     columns: Vec<Column>,
     /// What each body bears: weight (N), and its torque about the centre of mass (N·m).
     forces: Vec<[f64; 2]>,
+    /// Whether a contact of the body has borne a load.
+    is_loaded: Vec<bool>,
     /// Of one body.
     supports: Vec<Support>,
 }
@@ -364,11 +366,19 @@ impl Piles {
     }
 
     /// Writes what contacts bear at rest, from the top downwards: each body stands, with what it bears, on its
-    /// contacts with the level below. Contacts that have borne nothing yet get their impulses per substep of `h` (s).
+    /// contacts with the level below. Bodies that have borne nothing yet get their impulses per substep of `h` (s), too:
+    /// of others motion knows better what a contact that comes will bear. Nor is anything written there for contacts of one
+    /// point, since discs in a pile share their loads in many ways.
     fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let up = -gravity.normalize();
         self.forces.clear();
         self.forces.resize(bodies.len(), [0.0; 2]);
+        self.is_loaded.clear();
+        self.is_loaded.resize(bodies.len(), false);
+        for contact in contacts.iter().filter(|contact| has_borne(contact)) {
+            self.is_loaded[contact.body_a as usize] = true;
+            self.is_loaded[contact.body_b as usize] = true;
+        }
         for &body in self.graph.upwards().iter().rev() {
             let b = body as usize;
             self.supports.clear();
@@ -386,9 +396,12 @@ impl Piles {
             // Weight goes down the pile, no more and no less; pushes to the sides end here.
             let carried = |support: &Support| support.force().dot(up).max(0.0);
             let part = weight / self.supports.iter().map(carried).sum::<f64>();
+            let is_new = !self.is_loaded[b];
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];
-                contact.weight += support.load[0] as f32;
+                if is_new || contact.manifold.count > 1 {
+                    contact.weight += support.load[0] as f32;
+                }
                 let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
                 let arm = center(bodies, b) + support.arm - center(bodies, other);
                 if part.is_finite() {
@@ -396,7 +409,7 @@ impl Piles {
                     self.forces[other][0] += carried;
                     self.forces[other][1] -= carried * arm.perp_dot(up);
                 }
-                if support.is_new {
+                if is_new {
                     let point = &mut contact.manifold.points[support.point];
                     [point.normal_impulse, point.tangent_impulse] = support.load.map(|load| load as f32 * h);
                 }
@@ -468,6 +481,7 @@ impl Piles {
             + held(&self.parts)
             + held(&self.columns)
             + held(&self.forces)
+            + held(&self.is_loaded)
             + held(&self.supports)
     }
 }
@@ -483,7 +497,6 @@ fn supports<'c>(
     let contact = &contacts[index as usize];
     let is_b = contact.body_b == body;
     let normal = contact.manifold.normal.as_dvec2();
-    let is_new = contact.preload <= 0.0 && contact.manifold.points().iter().all(|p| p.normal_impulse == 0.0);
     let rests =
         move |p: &ManifoldPoint| p.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, p) <= still;
     contact.manifold.points().iter().enumerate().filter(move |(_, p)| rests(p)).map(move |(point, p)| {
@@ -493,10 +506,14 @@ fn supports<'c>(
             normal: if is_b { normal } else { -normal },
             arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
             friction: f64::from(contact.friction),
-            is_new,
             load: [0.0; 2],
         }
     })
+}
+
+/// A load, now or before.
+fn has_borne(contact: &Contact) -> bool {
+    contact.preload > 0.0 || contact.manifold.points().iter().any(|p| p.normal_impulse > 0.0)
 }
 
 /// Centre of mass of a body (m).

@@ -28,6 +28,19 @@
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
 //!
+//! # Contacts that roll
+//!
+//! Raised preload moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, d
+//! falls at once where they do and is raised again, so that the pile swells and settles without an end. A contact
+//! of one point is left alone once it has [`HELD`] of its goal,
+//!
+//! ```text
+//! d ← min(d + max(0, 0.9 goal − d) · rate, goal)
+//! ```
+//!
+//! What is held is a spring as others are, which makes nothing swing. The sooner it is held the better: its rate is
+//! [`QUICKER`] times as high.
+//!
 //! # Where it begins
 //!
 //! What statics says of the load ([`Contact::weight`], from time to time) follows no motion, so that a preload taken
@@ -89,6 +102,12 @@ pub(super) struct Preload {
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
 
+/// Part of its goal from which on the preload of a contact of one point stays as it is (1).
+const HELD: f32 = 0.9;
+
+/// Time in which preload follows the load on two points over that on one (1).
+const QUICKER: f32 = 4.0;
+
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
 const LEFT: f32 = 2e-5;
 
@@ -108,33 +127,34 @@ impl Pass for Preload {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
-                OppositeKind::Dynamic => self.springs.dynamic,
-                _ => self.springs.against_static,
-            };
-            let compliance = impulse_scale / (mass_scale * bias_rate);
-            let deepest = self.springs.push_speed / (mass_scale * bias_rate);
-            let kept = PLACED_TIME / (PLACED_TIME + self.dt);
-            let factors = [compliance, self.rate, deepest, self.h, 1.0 - self.share, kept];
-            preload_segment::<L>(batches, segment, layout, on.contacts, factors);
+            preload_segment::<L>(batches, segment, layout, on.contacts, self);
         });
     }
 }
 
-/// `factors`: sag per impulse and effective mass (s), rate, depth at which springs reach the push speed (m), substep
-/// (s), part of the sag that is left, part of a placed overlap that a step leaves.
 #[inline(never)]
 fn preload_segment<L: Lanes>(
     batches: &mut Batches,
     segment: &Segment,
     layout: &Layout,
     contacts: &mut [Contact],
-    factors: [f32; 6],
+    &Preload { springs, share, rate, h, dt }: &Preload,
 ) {
+    let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
+        OppositeKind::Dynamic => springs.dynamic,
+        _ => springs.against_static,
+    };
+    // Sag per impulse and effective mass (s).
+    let compliance = L::splat(impulse_scale / (mass_scale * bias_rate));
+    // Depth at which springs reach the push speed (m).
+    let deepest = L::splat(springs.push_speed / (mass_scale * bias_rate));
+    let left = L::splat(1.0 - share);
     // Without preload, all of the sag is left.
-    let most_left = L::splat(if factors[4] < 1.0 { LEFT } else { f32::INFINITY });
-    let [compliance, rate, deepest, h, left, kept] = factors.map(L::splat);
-    let zero = L::zero();
+    let most_left = L::splat(if share > 0.0 { LEFT } else { f32::INFINITY });
+    // dt/(dt + T) for a time T that is shorter by the factor.
+    let quick = L::splat(QUICKER * rate / (QUICKER - 1.0).mul_add(rate, 1.0));
+    let kept = L::splat(PLACED_TIME / (PLACED_TIME + dt));
+    let (h, rate, zero) = (L::splat(h), L::splat(rate), L::zero());
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
@@ -160,10 +180,16 @@ fn preload_segment<L: Lanes>(
             last = is_borne.select_positive(last.max(at_rest), last);
             filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
         }
-        let (most, last) = (goal(impulse), last.max(lowest));
+        last = last.max(lowest);
         let (placed, borne) = (last.min(zero), last.max(zero));
         let placed = kept.mul_add(placed, L::splat(LEFT)).min(zero);
-        let preload = (rate.mul_add(most - borne, borne) + placed).min(most);
+        let most = goal(impulse);
+        // A point that is not there has no mass.
+        let second = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
+        let held = second.select_positive(most, L::splat(HELD) * most);
+        let rate = second.select_positive(rate, quick);
+        let borne = rate.mul_add((held - borne).max(zero), borne);
+        let preload = (borne + placed).min(most);
         let (placed, borne) = (preload.min(zero), preload.max(zero));
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);

@@ -36,8 +36,6 @@ pub(super) struct Support {
     pub arm: DVec2,
     /// Coulomb coefficient (1).
     pub friction: f64,
-    /// Its contact has borne nothing yet.
-    pub is_new: bool,
     /// Along the normal and along (n_y, −n_x) of it (N).
     pub load: [f64; 2],
 }
@@ -90,7 +88,7 @@ mod tests {
     use super::*;
 
     fn point(normal: DVec2, arm: DVec2, friction: f64) -> Support {
-        Support { contact: 0, point: 0, normal, arm, friction, is_new: false, load: [0.0; 2] }
+        Support { contact: 0, point: 0, normal, arm, friction, load: [0.0; 2] }
     }
 
     fn close(found: f64, expected: f64) -> bool {
