@@ -8,6 +8,7 @@
 //! keeps a solver's own numbers, [`piles`] says how stiff and how slow contacts have to be. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
 //! added, and [`types`] how constraints of other types join.
 
+mod arrivals;
 pub mod assign;
 pub mod batches;
 pub mod block;
@@ -30,6 +31,7 @@ pub mod order;
 pub mod pass;
 pub mod passes;
 pub mod piles;
+pub mod plastic;
 mod point_passes;
 pub mod point_vector;
 pub mod position;

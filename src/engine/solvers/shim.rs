@@ -93,6 +93,7 @@ fn step(passes: &mut Passes<'_>) {
     let rigid = Rigid::new(h);
     let dt = h * budget.substeps as f32;
     let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
+    passes.plastic_impacts();
     passes.preload(springs, share, dt / (dt + time));
     for substep in 0..budget.substeps {
         if substep == 0 {

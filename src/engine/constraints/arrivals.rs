@@ -1,0 +1,92 @@
+//! Arrivals: which contacts without restitution are hit in the coming step.
+//!
+//! A point arrives if it closes its gap within the step, and comes in faster than what rests can. Forces alone
+//! make a speed of dt |a| in a step. Between two bodies that others may push, in any direction: dt (|a_a| + |a_b|);
+//! against one that nothing pushes, dt |n·a_b|, so that a wall that moves with a jolt is seen.
+
+use super::batches::{Batches, Segment, SegmentRecords};
+use super::features::{KernelFeatures, Layout, OppositeKind};
+use super::pass::{Pass, PassInput, PerLane};
+use super::restitution::point;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use std::cell::RefCell;
+
+/// Looks for arrivals; see the [module](self).
+pub(super) struct Arrivals<'a> {
+    /// Substep (s).
+    pub h: f32,
+    /// Step (s).
+    pub dt: f32,
+    /// Slower is rest (m/s).
+    pub slowest: f32,
+    /// Lanes of the contacts that are hit, in order.
+    pub found: RefCell<&'a mut Vec<u32>>,
+}
+
+impl Pass for Arrivals<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Half a row of accelerations for each body that has some.
+        let accelerations = if opposite == OppositeKind::Dynamic { 8 } else { 4 };
+        let read = 2 + accelerations + layout.points * (layout.arms() + 2);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, 0, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            arrivals::<L>(on.rows, batches, segment, layout, on.contacts, on.increments, self);
+        });
+    }
+}
+
+/// A point is looked at for a tenth of its way further than it gets in the step (1).
+pub(super) const AHEAD: f32 = 1.1;
+
+#[inline(never)]
+fn arrivals<L: Lanes>(
+    rows: &[BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    contacts: &[Contact],
+    increments: &[[f32; 4]],
+    Arrivals { h, dt, slowest, found }: &Arrivals<'_>,
+) {
+    let between_dynamic = segment.pushes_a();
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let quads: &[Quad] = bytemuck::cast_slice(increments);
+    let (zero, per_step) = (L::zero(), L::splat(dt / h));
+    for (batch, (record, (row_a, row_b))) in records.enumerate() {
+        let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        let [bx, by, ..] = L::gather_quads::<1, 0>(quads, row_b);
+        let along = |x: L, y: L| record[0].mul_add(x, record[1] * y);
+        // What forces add to the velocity of approach in a step, and what at most (m/s).
+        let (gained, threshold) = if between_dynamic {
+            let [ax, ay, ..] = L::gather_quads::<1, 0>(quads, row_a);
+            let size = |x: L, y: L| x.mul_add(x, y * y).sqrt();
+            (along(ax - bx, ay - by), size(ax, ay) + size(bx, by))
+        } else {
+            let gained = -along(bx, by);
+            (gained, gained.max(-gained))
+        };
+        let threshold = (per_step * threshold).max(L::splat(*slowest));
+        let fall = per_step * gained * L::splat(0.5 + 0.5 * h / dt);
+        let mut any = zero;
+        for p in 0..layout.points {
+            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
+            let fast = (-threshold - v).select_positive(record[layout.at(p, layout.normal_mass)], zero);
+            any = any.max((-closes).select_positive(fast, zero));
+        }
+        if any.any_positive() {
+            let hit: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&any));
+            let first = batch * L::WIDTH;
+            for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| hit[lane] > 0.0) {
+                if contacts[contact.entries()[first + lane] as usize].restitution == 0.0 {
+                    found.borrow_mut().push((segment.first_lane + first + lane) as u32);
+                }
+            }
+        }
+    }
+}
