@@ -20,8 +20,8 @@ pub(super) struct Arrivals<'a> {
     pub dt: f32,
     /// Slower is rest (m/s).
     pub slowest: f32,
-    /// Lanes of the contacts that are hit, in order.
-    pub found: RefCell<&'a mut Vec<u32>>,
+    /// Lanes of the contacts that are hit, in order, and how much faster than rest (m/s).
+    pub found: RefCell<&'a mut Vec<(u32, f32)>>,
 }
 
 impl Pass for Arrivals<'_> {
@@ -56,6 +56,7 @@ fn arrivals<L: Lanes>(
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let quads: &[Quad] = bytemuck::cast_slice(increments);
+    let thr = std::env::var("THR").ok().and_then(|v| v.parse().ok()).unwrap_or(1.0f32);
     let (zero, per_step) = (L::zero(), L::splat(dt / h));
     for (batch, (record, (row_a, row_b))) in records.enumerate() {
         let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
@@ -70,7 +71,7 @@ fn arrivals<L: Lanes>(
             let gained = -along(bx, by);
             (gained, gained.max(-gained))
         };
-        let threshold = (per_step * threshold).max(L::splat(*slowest));
+        let threshold = (per_step * threshold * L::splat(thr)).max(L::splat(*slowest));
         let fall = per_step * gained * L::splat(0.5 + 0.5 * h / dt);
         let mut any = zero;
         for p in 0..layout.points {
@@ -84,7 +85,7 @@ fn arrivals<L: Lanes>(
             let first = batch * L::WIDTH;
             for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| hit[lane] > 0.0) {
                 if contacts[contact.entries()[first + lane] as usize].restitution == 0.0 {
-                    found.borrow_mut().push((segment.first_lane + first + lane) as u32);
+                    found.borrow_mut().push(((segment.first_lane + first + lane) as u32, hit[lane]));
                 }
             }
         }

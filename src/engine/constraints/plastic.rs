@@ -34,25 +34,38 @@ const NONE: u32 = u32::MAX;
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Debug, Default)]
 pub struct PlasticImpacts {
-    /// Lanes in which something arrives, of the coloured batches and of the serial ones.
-    pub(super) found: [Vec<u32>; 2],
-    /// First end of each body; see `next`. `[bodies]`
-    first: Vec<u32>,
+    /// Lanes in which something arrives, of the coloured batches and of the serial ones, and by how much faster than
+    /// what rests can (m/s).
+    pub(super) found: [Vec<(u32, f32)>; 2],
+    /// `[rows]`
+    bodies: Vec<Body>,
     /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1. `[2 lanes]`
     next: Vec<u32>,
-    /// Places of the two points of a lane in `points`, or none. `[2 lanes]`
+    /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
     listed: Vec<u32>,
+    /// In pairs; a point that is not there, or that bounces, has no mass.
     points: Vec<Point>,
-    /// Points that have to be looked at.
+    /// Bodies that were pushed since their points were looked at.
     queue: VecDeque<u32>,
     /// Bodies that were pushed.
     pushed: Vec<u32>,
-    /// `[bodies]`
-    is_pushed: Vec<bool>,
 }
 
-/// A contact point that may be hit.
+/// What is known of a body.
 #[derive(Clone, Copy, Debug)]
+struct Body {
+    /// Its first end; see `next`.
+    first: u32,
+    /// When it was last pushed (s); −∞ for never.
+    time: f32,
+    is_queued: bool,
+}
+
+/// A body that nothing has pushed.
+const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false };
+
+/// A contact point that may be hit.
+#[derive(Clone, Copy, Debug, Default)]
 struct Point {
     index: u32,
     contact: u32,
@@ -74,7 +87,6 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
-    is_queued: bool,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -126,19 +138,19 @@ impl On<'_> {
     }
 
     /// The points of a lane.
-    fn points(&self, lane: u32) -> [Option<Point>; 2] {
+    fn points(&self, lane: u32) -> [Point; 2] {
         let Place { layout, part, width, lane: of, first, pushes_a } = self.place(lane);
         let (batches, floats) = (&self.batches[part], self.floats(part));
         let contact = batches.contact()[of];
-        if self.contacts[contact as usize].restitution > 0.0 {
-            return [None; 2];
-        }
+        let bounces = self.contacts[contact as usize].restitution > 0.0;
         let rows = [batches.row_a()[of], batches.row_b()[of]];
         let at = |quantity: usize| floats[first + quantity * width];
         std::array::from_fn(|p| {
-            let mass = if p < layout.points { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
+            let is_there = p < layout.points && !bounces;
+            let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
+            let mut point = Point { contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
             if mass <= 0.0 {
-                return None;
+                return point;
             }
             let arm = |arm: usize, has: bool| {
                 if has { [at(layout.at(p, arm)), at(layout.at(p, arm) + 1)] } else { [0.0; 2] }
@@ -147,21 +159,10 @@ impl On<'_> {
             let inertia = |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
             let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
             let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
-            Some(Point {
-                index: p as u32,
-                contact,
-                rows,
-                pushes_a,
-                normal: [at(0), at(1)],
-                arms,
-                k: [1.0 / mass, k_tt, k_nt],
-                mass,
-                friction: if layout.has_friction { at(layout.friction) } else { 0.0 },
-                separation: at(layout.at(p, layout.separation)),
-                impulse: [0.0; 2],
-                time: 0.0,
-                is_queued: false,
-            })
+            (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
+            point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
+            point.separation = at(layout.at(p, layout.separation));
+            point
         })
     }
 }
@@ -187,17 +188,12 @@ impl Point {
         self.separation + moved + turned(b[2], self.arms[1]) - turned(a[2], self.arms[0])
     }
 
-    /// Whether it comes in faster than `slowest` (m/s), and within the step.
-    fn comes_in(&self, rows: &[BodyRow], slowest: f32, dt: f32) -> bool {
-        let [v, _] = self.velocity(rows);
-        v < -slowest && v.mul_add(AHEAD * dt, self.gap(rows)) < 0.0
-    }
-
-    /// Impulses `delta` (N·s) on both bodies, at its time.
+    /// Impulses `[n, t]` (N·s) on both bodies, at its time; returns whether the point's own velocity has changed by
+    /// more than these impulses make it.
     fn push(&self, rows: &mut [BodyRow], [n, t]: [f32; 2]) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
-        for (body, sign) in [(1, 1.0), (0, -1.0)].into_iter().filter(|&(body, _)| body == 1 || self.pushes_a) {
+        let give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
             let (row, arm) = (&mut rows[self.rows[body] as usize], self.arms[body]);
             let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
             let gained = [mass * x, mass * y, inertia * arm[0].mul_add(n, arm[1] * t)];
@@ -205,6 +201,23 @@ impl Point {
                 row.velocity[k] += gained;
                 row.delta[k] = self.time.neg_mul_add(gained, row.delta[k]);
             }
+        };
+        give(1, 1.0, rows);
+        if !self.pushes_a {
+            return;
+        }
+        give(0, -1.0, rows);
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+        let gained = apart(0).mul_add(y, -(apart(1) * x));
+        if gained == 0.0 || self.friction == 0.0 {
+            return;
+        }
+        for row in self.rows {
+            let row = &mut rows[row as usize];
+            let turn = 0.5 * gained * row.delta[3];
+            row.velocity[2] -= turn;
+            row.delta[2] = self.time.mul_add(turn, row.delta[2]);
         }
     }
 }
@@ -212,75 +225,86 @@ impl Point {
 impl PlasticImpacts {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.found[0], &self.found[1], &self.first, &self.next, &self.listed, &self.pushed];
+        let lists = [&self.next, &self.listed, &self.pushed];
         let queue = self.queue.capacity() * size_of::<u32>();
-        lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.is_pushed) + queue
+        let found = held(&self.found[0]) + held(&self.found[1]);
+        lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.bodies) + queue + found
     }
 
-    /// Lets impacts spread from the lanes in `found`; see the [module](self). Returns how many points were visited.
-    pub(super) fn spread(&mut self, on: &mut On<'_>) -> usize {
+    /// Lets impacts spread from the lanes in `found`; see the [module](self).
+    pub(super) fn spread(&mut self, on: &mut On<'_>) {
         self.link(on);
+        let knob = |name: &str, or: f32| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
+        let limit = knob("VISITS", 2000.0) as usize + (knob("PER", 1.0) * on.contacts.len() as f32) as usize;
+        let least = self.least(limit / 8);
         let coloured = on.batches[0].lanes() as u32;
         for part in 0..2 {
             for i in 0..self.found[part].len() {
-                self.list(on, self.found[part][i] + coloured * part as u32, 0.0);
+                let (lane, excess) = self.found[part][i];
+                if excess >= least {
+                    self.list(on, lane + coloured * part as u32);
+                }
             }
         }
+        let seeds = self.points.len();
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
-        let slowest = IMPACT_TOLERANCE * fastest;
-        let mut visits = 0;
-        while let Some(i) = self.queue.pop_front() {
-            visits += 1;
-            if visits > IMPACT_VISITS {
+        let slowest = knob("TOL", 1e-4) * fastest;
+        let mut visits = seeds;
+        for i in 0..seeds {
+            self.visit(on, i, slowest);
+        }
+        while let Some(body) = self.queue.pop_front() {
+            self.bodies[body as usize].is_queued = false;
+            let mut end = self.bodies[body as usize].first;
+            while end != NONE {
+                let lane = end / 2;
+                end = self.next[end as usize];
+                let first = self.list(on, lane);
+                self.visit(on, first, slowest);
+                self.visit(on, first + 1, slowest);
+                visits += 2;
+            }
+            if visits > limit {
                 break;
-            }
-            let point = &mut self.points[i as usize];
-            point.is_queued = false;
-            let [vn, vt] = point.velocity(on.rows);
-            if point.impulse[0] == 0.0 {
-                if !point.comes_in(on.rows, slowest, on.dt) {
-                    continue;
-                }
-                point.time = point.time.max(point.gap(on.rows) / -vn);
-            }
-            let old = point.impulse;
-            let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
-            let delta = [new[0] - old[0], new[1] - old[1]];
-            point.impulse = new;
-            let point = *point;
-            point.push(on.rows, delta);
-            if point.k[0] * (delta[0].abs() + delta[1].abs()) <= slowest {
-                continue;
-            }
-            for (body, row) in point.rows.into_iter().enumerate().filter(|&(body, _)| body == 1 || point.pushes_a)
-            {
-                self.look_around(on, row, i, point.time, slowest);
-                let _ = body;
             }
         }
         self.queue.clear();
-        self.part(on);
+        if knob("STATS", 0.0) > 0.0 {
+            eprintln!("seeds {seeds} fastest {fastest} points {} visits {visits} pushed {} of {} lanes {}", self.points.len(), self.pushed.len(), on.rows.len(), on.lanes());
+        }
+        if knob("PART", 1.0) > 0.0 { self.part(on); }
         if on.record_impulses {
             for point in &self.points {
                 let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
                 *sum = [sum[0] + point.impulse[0], sum[1] + point.impulse[1]];
             }
         }
-        visits
+    }
+
+    /// By how much faster than rest a point has to come in so that no more than `most` do (m/s).
+    fn least(&self, most: usize) -> f32 {
+        let mut least = 0.0;
+        let all = || self.found.iter().flatten().map(|&(_, excess)| excess);
+        let mut count = self.found[0].len() + self.found[1].len();
+        while count > most {
+            least = all().filter(|&excess| excess >= least).sum::<f32>() / count as f32;
+            let left = all().filter(|&excess| excess >= least).count();
+            if left == count {
+                break;
+            }
+            count = left;
+        }
+        least
     }
 
     /// Links the ends of each body.
     fn link(&mut self, on: &On<'_>) {
-        let bodies = on.rows.len();
-        self.first.clear();
-        self.first.resize(bodies, NONE);
-        self.is_pushed.clear();
-        self.is_pushed.resize(bodies, false);
-        let lanes = on.lanes();
-        self.next.clear();
+        let (bodies, lanes) = (on.rows.len(), on.lanes());
+        self.bodies.clear();
+        self.bodies.resize(bodies, STILL);
         self.next.resize(2 * lanes, NONE);
         self.listed.clear();
-        self.listed.resize(2 * lanes, NONE);
+        self.listed.resize(lanes, NONE);
         self.points.clear();
         self.pushed.clear();
         let mut end = 0;
@@ -289,7 +313,7 @@ impl PlasticImpacts {
                 for body in [a, b] {
                     // The last row is that of empty lanes.
                     if (body as usize) < bodies - 1 {
-                        self.next[end] = std::mem::replace(&mut self.first[body as usize], end as u32);
+                        self.next[end] = std::mem::replace(&mut self.bodies[body as usize].first, end as u32);
                     }
                     end += 1;
                 }
@@ -297,40 +321,57 @@ impl PlasticImpacts {
         }
     }
 
-    /// Adds the points of a lane to those that are looked at; none is hit before `time` (s).
-    fn list(&mut self, on: &On<'_>, lane: u32, time: f32) {
-        for (p, point) in on.points(lane).into_iter().enumerate() {
-            if let Some(point) = point {
-                self.listed[2 * lane as usize + p] = self.points.len() as u32;
-                self.queue.push_back(self.points.len() as u32);
-                self.points.push(Point { time, is_queued: true, ..point });
-            }
+    /// The place of the first point of a lane.
+    fn list(&mut self, on: &On<'_>, lane: u32) -> usize {
+        let listed = &mut self.listed[lane as usize];
+        if *listed == NONE {
+            *listed = self.points.len() as u32;
+            self.points.extend(on.points(lane));
         }
+        *listed as usize
     }
 
-    /// Looks at the points of a body that point `cause` has pushed at `time`.
-    fn look_around(&mut self, on: &On<'_>, row: u32, cause: u32, time: f32, slowest: f32) {
-        if !std::mem::replace(&mut self.is_pushed[row as usize], true) {
-            self.pushed.push(row);
+    /// Solves a point, if it comes in faster than `slowest` (m/s) or has been hit.
+    #[inline(always)]
+    fn visit(&mut self, on: &mut On<'_>, place: usize, slowest: f32) {
+        let point = &mut self.points[place];
+        if point.mass <= 0.0 {
+            return;
         }
-        let mut end = self.first[row as usize];
-        while end != NONE {
-            let lane = end / 2;
-            end = self.next[end as usize];
-            let places = [self.listed[2 * lane as usize], self.listed[2 * lane as usize + 1]];
-            if places == [NONE; 2] {
-                let comes_in = |point: &Point| point.comes_in(on.rows, slowest, on.dt);
-                if on.points(lane).iter().flatten().any(comes_in) {
-                    self.list(on, lane, time);
-                }
+        let [vn, vt] = point.velocity(on.rows);
+        if point.impulse[0] == 0.0 {
+            if vn >= -slowest {
+                return;
+            }
+            let gap = point.gap(on.rows);
+            if vn.mul_add(AHEAD * on.dt, gap) >= 0.0 {
+                return;
+            }
+            let time = gap / -vn;
+            point.time = if time < -on.dt { 0.0 } else { time };
+        }
+        for row in point.rows {
+            point.time = point.time.max(self.bodies[row as usize].time);
+        }
+        let old = point.impulse;
+        let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
+        let delta = [new[0] - old[0], new[1] - old[1]];
+        if point.k[0] * (delta[0].abs() + delta[1].abs()) <= slowest {
+            return;
+        }
+        point.impulse = new;
+        point.push(on.rows, delta);
+        for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
+            let body = &mut self.bodies[row as usize];
+            if !is_pushed {
                 continue;
             }
-            for place in places.into_iter().filter(|&place| place != NONE && place != cause) {
-                let point = &mut self.points[place as usize];
-                point.time = point.time.max(time);
-                if !std::mem::replace(&mut point.is_queued, true) {
-                    self.queue.push_back(place);
-                }
+            if body.time == f32::NEG_INFINITY {
+                self.pushed.push(row);
+            }
+            body.time = body.time.max(point.time);
+            if !std::mem::replace(&mut body.is_queued, true) {
+                self.queue.push_back(row);
             }
         }
     }
@@ -338,17 +379,20 @@ impl PlasticImpacts {
     /// Widens the gaps that bodies seem to have lost as they were put back.
     fn part(&mut self, on: &mut On<'_>) {
         for i in 0..self.pushed.len() {
-            let mut end = self.first[self.pushed[i] as usize];
+            let mut end = self.bodies[self.pushed[i] as usize].first;
             while end != NONE {
                 let lane = end / 2;
                 end = self.next[end as usize];
-                let Place { layout, part, width, first, .. } = on.place(lane);
-                for (p, point) in on.points(lane).into_iter().enumerate() {
-                    let Some(point) = point else { continue };
+                let first = self.list(on, lane);
+                for p in 0..2 {
+                    let place = first + p;
+                    let point = &self.points[place];
                     let lost = point.separation.min(0.0) - point.gap(on.rows);
-                    if lost > 0.0 {
+                    if lost > 0.0 && point.mass > 0.0 && point.velocity(on.rows)[0] * on.dt >= lost {
+                        let Place { layout, part, width, first, .. } = on.place(lane);
                         let at = first + layout.at(p, layout.separation) * width;
                         bytemuck::cast_slice_mut::<_, f32>(on.batches[part].records_mut())[at] += lost;
+                        self.points[place].separation += lost;
                     }
                 }
             }
