@@ -1,13 +1,12 @@
 //! Arrivals: which contacts without restitution are hit in the coming step.
 //!
-//! A point arrives if it closes its gap within the step, and comes in faster than what rests can. Forces alone
-//! make a speed of dt |a| in a step. Between two bodies that others may push, in any direction: dt (|a_a| + |a_b|);
-//! against one that nothing pushes, dt |n·a_b|, so that a wall that moves with a jolt is seen.
+//! A point arrives if it closes its gap within the step, and comes in several times as fast as what rests can.
+//! Forces alone make a speed of dt |a| in a step: between two bodies that others push as well, in any direction,
+//! dt (|a_a| + |a_b|); against one that nothing pushes, dt |n·a_b|, so that a wall that moves with a jolt is seen.
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
-use super::restitution::point;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 use std::cell::RefCell;
@@ -20,6 +19,8 @@ pub(super) struct Arrivals<'a> {
     pub dt: f32,
     /// Slower is rest (m/s).
     pub slowest: f32,
+    /// Least that forces add to the speed of a dynamic body in a step (m/s).
+    pub least_gain: f32,
     /// Lanes of the contacts that are hit, in order, and how much faster than rest (m/s).
     pub found: RefCell<&'a mut Vec<(u32, f32)>>,
 }
@@ -42,6 +43,10 @@ impl Pass for Arrivals<'_> {
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
 
+/// How much faster than what forces make in a step something comes in (1). Slower impacts are left to soft contacts, as
+/// loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
+const FASTER: f32 = 3.0;
+
 #[inline(never)]
 fn arrivals<L: Lanes>(
     rows: &[BodyRow],
@@ -50,20 +55,33 @@ fn arrivals<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    Arrivals { h, dt, slowest, found }: &Arrivals<'_>,
+    &Arrivals { h, dt, slowest, least_gain, ref found }: &Arrivals<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let quads: &[Quad] = bytemuck::cast_slice(increments);
-    let thr = std::env::var("THR").ok().and_then(|v| v.parse().ok()).unwrap_or(1.0f32);
-    let (zero, per_step) = (L::zero(), L::splat(dt / h));
+    let (zero, per_step) = (L::zero(), L::splat(FASTER * dt / h));
+    let least = if between_dynamic { slowest.max(2.0 * FASTER * least_gain) } else { slowest };
     for (batch, (record, (row_a, row_b))) in records.enumerate() {
         let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
-        let [bx, by, ..] = L::gather_quads::<1, 0>(quads, row_b);
+        // No body has moved yet.
+        let b = L::gather(rows, row_b);
+        let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
         let along = |x: L, y: L| record[0].mul_add(x, record[1] * y);
-        // What forces add to the velocity of approach in a step, and what at most (m/s).
-        let (gained, threshold) = if between_dynamic {
+        let straight = along(b[0] - a[0], b[1] - a[1]);
+        let velocity = |p: usize| {
+            let arm = |of: usize, has: bool| if has { record[layout.at(p, of)] } else { zero };
+            let (of_a, of_b) = (arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0]));
+            a[2].neg_mul_add(of_a, b[2].mul_add(of_b, straight))
+        };
+        let fastest = (0..layout.points).fold(zero, |most, p| most.max(-velocity(p)));
+        if !(fastest - L::splat(least)).any_positive() {
+            continue;
+        }
+        let [bx, by, ..] = L::gather_quads::<1, 0>(quads, row_b);
+        // What forces add to the velocity of approach in a substep, and what at most (m/s).
+        let (gained, most) = if between_dynamic {
             let [ax, ay, ..] = L::gather_quads::<1, 0>(quads, row_a);
             let size = |x: L, y: L| x.mul_add(x, y * y).sqrt();
             (along(ax - bx, ay - by), size(ax, ay) + size(bx, by))
@@ -71,13 +89,13 @@ fn arrivals<L: Lanes>(
             let gained = -along(bx, by);
             (gained, gained.max(-gained))
         };
-        let threshold = (per_step * threshold * L::splat(thr)).max(L::splat(*slowest));
-        let fall = per_step * gained * L::splat(0.5 + 0.5 * h / dt);
+        let threshold = (per_step * most).max(L::splat(slowest));
+        let fall = gained * L::splat((0.5 * dt + 0.5 * h) / h);
         let mut any = zero;
         for p in 0..layout.points {
-            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
             let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
-            let fast = (-threshold - v).select_positive(record[layout.at(p, layout.normal_mass)], zero);
+            let fast = record[layout.at(p, layout.normal_mass)].select_positive(-threshold - v, zero);
             any = any.max((-closes).select_positive(fast, zero));
         }
         if any.any_positive() {

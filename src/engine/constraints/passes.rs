@@ -650,11 +650,11 @@ impl<'a> Passes<'a> {
             return;
         }
         let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
-        if let Some(slowest) = self.least_impact(dt) {
+        if let Some([slowest, least_gain]) = self.least_impact(dt) {
             let mut found = std::mem::take(&mut self.work.plastic.found);
             for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(&mut found) {
                 found.clear();
-                self.over_part(part, &Arrivals { h, dt, slowest, found: RefCell::new(found) });
+                self.over_part(part, &Arrivals { h, dt, slowest, least_gain, found: RefCell::new(found) });
             }
             let any = found.iter().any(|found| !found.is_empty());
             self.work.plastic.found = found;
@@ -676,19 +676,26 @@ impl<'a> Passes<'a> {
         self.clock.lap(Phase::Prepare);
     }
 
-    /// Speed below which nothing is an impact (m/s); none if no body is as fast.
-    fn least_impact(&self, dt: f32) -> Option<f32> {
+    /// Speed below which nothing is an impact, and the least that forces add to the speed of a dynamic body in a step
+    /// (m/s); none if no body is as fast.
+    fn least_impact(&self, dt: f32) -> Option<[f32; 2]> {
+        /// Part of what forces make in a step (1).
         const SLOW: f32 = 0.01;
+        /// Turn in a step (rad).
         const SLOW_TURN: f32 = 1e-5;
         let Workspace { rows, motion, .. } = &*self.work;
         let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
-        let most = |squares: &mut dyn Iterator<Item = f32>| squares.fold(0.0, f32::max);
-        let gained = most(&mut motion.velocity_increments().iter().map(square)).sqrt();
-        let slowest = SLOW * gained * self.input.budget.substeps as f32;
+        let gains = || {
+            let all = rows.iter().zip(motion.velocity_increments());
+            all.filter(|(row, _)| row.velocity[3] > 0.0).map(|(_, increment)| square(increment))
+        };
+        let per_step = |square: f32| square.sqrt() * self.input.budget.substeps as f32;
+        let slowest = SLOW * per_step(gains().fold(0.0, f32::max));
         let moves = |row: &BodyRow| {
             square(&row.velocity) > slowest * slowest || (dt * row.velocity[2]).abs() > SLOW_TURN
         };
-        rows.iter().any(moves).then_some(slowest)
+        let least_gain = || per_step(gains().fold(f32::INFINITY, f32::min));
+        rows.iter().any(moves).then(|| [slowest, least_gain()])
     }
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.

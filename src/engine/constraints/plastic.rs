@@ -49,6 +49,9 @@ pub struct PlasticImpacts {
     queue: VecDeque<u32>,
     /// Bodies that were pushed.
     pushed: Vec<u32>,
+    /// How often a point was solved.
+    solved: usize,
+    knobs: [f32; 3],
 }
 
 /// What is known of a body.
@@ -87,6 +90,8 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
+    /// How often it was solved.
+    solved: u32,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -235,8 +240,8 @@ impl PlasticImpacts {
     pub(super) fn spread(&mut self, on: &mut On<'_>) {
         self.link(on);
         let knob = |name: &str, or: f32| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
-        let limit = knob("VISITS", 2000.0) as usize + (knob("PER", 1.0) * on.contacts.len() as f32) as usize;
-        let least = self.least(limit / 8);
+        self.knobs = [0.0, knob("OMEGA", 1.5), knob("AFTER", 4.0)];
+        let least = self.least(64);
         let coloured = on.batches[0].lanes() as u32;
         for part in 0..2 {
             for i in 0..self.found[part].len() {
@@ -249,7 +254,8 @@ impl PlasticImpacts {
         let seeds = self.points.len();
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
         let slowest = knob("TOL", 1e-4) * fastest;
-        let mut visits = seeds;
+        self.solved = 0;
+        let limit = knob("VISITS", 256.0) as usize + knob("FEW", 4096.0) as usize / seeds.max(1);
         for i in 0..seeds {
             self.visit(on, i, slowest);
         }
@@ -262,15 +268,14 @@ impl PlasticImpacts {
                 let first = self.list(on, lane);
                 self.visit(on, first, slowest);
                 self.visit(on, first + 1, slowest);
-                visits += 2;
             }
-            if visits > limit {
+            if self.solved > limit {
                 break;
             }
         }
         self.queue.clear();
         if knob("STATS", 0.0) > 0.0 {
-            eprintln!("seeds {seeds} fastest {fastest} points {} visits {visits} pushed {} of {} lanes {}", self.points.len(), self.pushed.len(), on.rows.len(), on.lanes());
+            eprintln!("seeds {seeds} fastest {fastest} points {} solved {} pushed {} of {} lanes {}", self.points.len(), self.solved, self.pushed.len(), on.rows.len(), on.lanes());
         }
         if knob("PART", 1.0) > 0.0 { self.part(on); }
         if on.record_impulses {
@@ -348,13 +353,21 @@ impl PlasticImpacts {
                 return;
             }
             let time = gap / -vn;
-            point.time = if time < -on.dt { 0.0 } else { time };
+            point.time = if gap.abs() < self.knobs[0] || time < -on.dt { 0.0 } else { time };
         }
         for row in point.rows {
             point.time = point.time.max(self.bodies[row as usize].time);
         }
         let old = point.impulse;
-        let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
+        let mut new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
+        self.solved += 1;
+        point.solved += 1;
+        if point.solved > self.knobs[2] as u32 {
+            new = std::array::from_fn(|i| self.knobs[1].mul_add(new[i] - old[i], old[i]));
+            new[0] = new[0].max(0.0);
+            let bound = point.friction * new[0];
+            new[1] = new[1].min(bound).max(-bound);
+        }
         let delta = [new[0] - old[0], new[1] - old[1]];
         if point.k[0] * (delta[0].abs() + delta[1].abs()) <= slowest {
             return;
