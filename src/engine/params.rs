@@ -48,9 +48,6 @@ pub const IMPACT_SWEEPS: u32 = 32;
 /// A wave of impacts is solved when a sweep changes velocities by less than this part of what it asks for (1).
 pub const IMPACT_TOLERANCE: f32 = 1e-6;
 
-/// Most visits of a point while impacts without restitution spread. What still comes in is stopped by the solver.
-pub const IMPACT_VISITS: usize = 20_000;
-
 /// Most vertices of a convex polygon.
 pub const MAX_POLYGON_VERTICES: usize = 8;
 

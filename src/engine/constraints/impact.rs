@@ -219,10 +219,8 @@ pub(super) fn rough_impulses<L: Lanes>(
     let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, wanted_t));
     let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
     let safe = determinant.select_positive(determinant, one);
-    let stick = [
-        k_tt.mul_add(want_n, -(k_nt * want_t)) / safe,
-        k_nn.mul_add(want_t, -(k_nt * want_n)) / safe,
-    ];
+    let stick =
+        [k_tt.mul_add(want_n, -(k_nt * want_t)) / safe, k_nn.mul_add(want_t, -(k_nt * want_n)) / safe];
     let size = stick[1].max(-stick[1]);
     let slope = stick[1].select_positive(mu, -mu);
     // Along the edge of the cone N meets k_nn ± µ k_nt; where that is not positive the
@@ -232,8 +230,7 @@ pub(super) fn rough_impulses<L: Lanes>(
     let edge_n = along.select_positive(edge_n, (want_n * mass).max(zero));
     let slides = mu.neg_mul_add(stick[0], size);
     let slides = stick[0].select_positive(slides, one);
-    let rough =
-        [slides.select_positive(edge_n, stick[0]), slides.select_positive(slope * edge_n, stick[1])];
+    let rough = [slides.select_positive(edge_n, stick[0]), slides.select_positive(slope * edge_n, stick[1])];
     std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]))
 }
 

@@ -176,9 +176,7 @@ impl<'a> Passes<'a> {
             passes.over_batches(Phase::Prepare, &Prepare);
             if input.features.restitution {
                 passes.bounce_before();
-                let begin = restitution::Begin { h: input.h, found: Cell::new(0.0) };
-                passes.over_contacts(&begin);
-                passes.bounces = begin.found.get() > 0.0;
+                passes.begin_bounces();
             }
             passes.clock.lap(Phase::Prepare);
         }
@@ -644,6 +642,15 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// Notes how fast points come in that shall bounce at the end of the step.
+    fn begin_bounces(&mut self) {
+        if self.input.features.restitution {
+            let begin = restitution::Begin { h: self.input.h, found: Cell::new(0.0) };
+            self.over_contacts(&begin);
+            self.bounces = begin.found.get() > 0.0;
+        }
+    }
+
     /// Stops what comes in without restitution, before the step; see [`super::plastic`].
     pub fn plastic_impacts(&mut self) {
         if !self.input.phases.runs(Phase::Prepare) {
@@ -671,6 +678,7 @@ impl<'a> Passes<'a> {
                     record_impulses,
                 });
                 self.work.motion.hide_turns(&mut self.work.rows);
+                self.begin_bounces();
             }
         }
         self.clock.lap(Phase::Prepare);

@@ -5,7 +5,7 @@
 //! That of [`super::impact`] with e = 0, at all points together: each has v_n⁺ ≥ 0, an impulse only where v_n⁺ = 0, and
 //! Coulomb's friction on the impulses of the whole impact. Gauss–Seidel on accumulated impulses, from point to point
 //! as an impact spreads: where a body is pushed, its other points are looked at next, until nothing comes in by more
-//! than [`IMPACT_TOLERANCE`] of the fastest arrival. So a row of boxes goes on together, and what
+//! than [`TOLERANCE`] of the fastest arrival. So a row of boxes goes on together, and what
 //! nothing hits costs nothing.
 //!
 //! # When in the step
@@ -15,21 +15,40 @@
 //! the step, and are put back by t Δv there. Such a point then touches all through the step. One
 //! that is pushed again by a body that was hit at t′ is so at the later of both times.
 //!
-//! Bodies that are put back may seem to overlap others from which they move away. What they are in truth not, is not
-//! pushed out: the gap in the record grows by as much.
+//! A contact is first seen when its bodies are closer than [`crate::engine::params::SPECULATIVE_DISTANCE`], and so
+//! most impacts are found after they have happened, with an overlap of |s| ≤ |v| dt: t is negative then, and bodies
+//! are put forward to where they would be.
+//!
+//! The impulse acts at arms of the step's beginning. When the two centres are displaced by D against each other at its
+//! time, it adds D × λ to angular momentum, which is taken from both spins, half from each (see [`super::block`]), if
+//! there is friction.
+//!
+//! # How far
+//!
+//! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: only the
+//! fastest [`MOST_ARRIVALS`] are followed, and the fewer there are, the farther. What still comes in is stopped by the solver.
 
 use super::arrivals::AHEAD;
 use super::batches::Batches;
 use super::features::{Features, Layout};
 use super::impact::rough_impulses;
+use super::segment::Segment;
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes, held};
-use crate::engine::params::{IMPACT_TOLERANCE, IMPACT_VISITS};
 use std::collections::VecDeque;
 
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
+
+/// Impacts spread until nothing comes in faster than this part of the fastest (1).
+const TOLERANCE: f32 = 1e-4;
+
+/// Contacts whose impacts are followed at most.
+const MOST_ARRIVALS: usize = 64;
+
+/// How often points are solved at most in a step, and as often again shared among all that arrive.
+const SOLVES: [usize; 2] = [256, 4096];
 
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Debug, Default)]
@@ -47,11 +66,8 @@ pub struct PlasticImpacts {
     points: Vec<Point>,
     /// Bodies that were pushed since their points were looked at.
     queue: VecDeque<u32>,
-    /// Bodies that were pushed.
-    pushed: Vec<u32>,
-    /// How often a point was solved.
+    /// How often a point was solved in this step.
     solved: usize,
-    knobs: [f32; 3],
 }
 
 /// What is known of a body.
@@ -90,8 +106,6 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
-    /// How often it was solved.
-    solved: u32,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -106,46 +120,23 @@ pub(super) struct On<'a> {
     pub record_impulses: bool,
 }
 
-/// Where a lane keeps its record.
-struct Place {
-    layout: Layout,
-    part: usize,
-    width: usize,
-    /// In its batches.
-    lane: usize,
-    /// Of the first quantity, in floats.
-    first: usize,
-    pushes_a: bool,
-}
-
 impl On<'_> {
     fn lanes(&self) -> usize {
         self.batches[0].lanes() + self.batches[1].lanes()
     }
 
-    fn place(&self, lane: u32) -> Place {
-        let (lane, lanes) = (lane as usize, self.batches[0].lanes());
-        let (part, lane) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
-        let (batches, width) = (&self.batches[part], self.batches[part].width());
-        // Segments follow each other in the order of their lanes, or of their stages.
-        let holds = |s: &&super::segment::Segment| {
-            (s.first_lane..s.first_lane + s.batches * width).contains(&lane)
-        };
-        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
-        let of = lane - segment.first_lane;
-        let vector = segment.first_vector + of / width * segment.stride;
-        let layout = Layout::for_features(self.features, segment.opposite);
-        Place { layout, part, width, lane, first: vector * width + of % width, pushes_a: segment.pushes_a() }
-    }
-
-    fn floats(&self, part: usize) -> &[f32] {
-        bytemuck::cast_slice(self.batches[part].records())
-    }
-
     /// The points of a lane.
     fn points(&self, lane: u32) -> [Point; 2] {
-        let Place { layout, part, width, lane: of, first, pushes_a } = self.place(lane);
-        let (batches, floats) = (&self.batches[part], self.floats(part));
+        let (lane, lanes) = (lane as usize, self.batches[0].lanes());
+        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        let (batches, width) = (&self.batches[part], self.batches[part].width());
+        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
+        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
+        let (layout, pushes_a) = (Layout::for_features(self.features, segment.opposite), segment.pushes_a());
+        let in_segment = of - segment.first_lane;
+        let vector = segment.first_vector + in_segment / width * segment.stride;
+        let first = vector * width + in_segment % width;
+        let floats: &[f32] = bytemuck::cast_slice(batches.records());
         let contact = batches.contact()[of];
         let bounces = self.contacts[contact as usize].restitution > 0.0;
         let rows = [batches.row_a()[of], batches.row_b()[of]];
@@ -161,7 +152,8 @@ impl On<'_> {
                 if has { [at(layout.at(p, arm)), at(layout.at(p, arm) + 1)] } else { [0.0; 2] }
             };
             let arms = [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])];
-            let inertia = |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
+            let inertia =
+                |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
             let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
             let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
             (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
@@ -193,8 +185,7 @@ impl Point {
         self.separation + moved + turned(b[2], self.arms[1]) - turned(a[2], self.arms[0])
     }
 
-    /// Impulses `[n, t]` (N·s) on both bodies, at its time; returns whether the point's own velocity has changed by
-    /// more than these impulses make it.
+    /// Impulses `[n, t]` (N·s) on both bodies, at its time.
     fn push(&self, rows: &mut [BodyRow], [n, t]: [f32; 2]) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
@@ -230,7 +221,7 @@ impl Point {
 impl PlasticImpacts {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.next, &self.listed, &self.pushed];
+        let lists = [&self.next, &self.listed];
         let queue = self.queue.capacity() * size_of::<u32>();
         let found = held(&self.found[0]) + held(&self.found[1]);
         lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.bodies) + queue + found
@@ -239,9 +230,7 @@ impl PlasticImpacts {
     /// Lets impacts spread from the lanes in `found`; see the [module](self).
     pub(super) fn spread(&mut self, on: &mut On<'_>) {
         self.link(on);
-        let knob = |name: &str, or: f32| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
-        self.knobs = [0.0, knob("OMEGA", 1.5), knob("AFTER", 4.0)];
-        let least = self.least(64);
+        let least = self.least();
         let coloured = on.batches[0].lanes() as u32;
         for part in 0..2 {
             for i in 0..self.found[part].len() {
@@ -251,12 +240,12 @@ impl PlasticImpacts {
                 }
             }
         }
-        let seeds = self.points.len();
+        let arrived = self.points.len();
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
-        let slowest = knob("TOL", 1e-4) * fastest;
+        let slowest = TOLERANCE * fastest;
+        let limit = SOLVES[0] + SOLVES[1] / arrived.max(1);
         self.solved = 0;
-        let limit = knob("VISITS", 256.0) as usize + knob("FEW", 4096.0) as usize / seeds.max(1);
-        for i in 0..seeds {
+        for i in 0..arrived {
             self.visit(on, i, slowest);
         }
         while let Some(body) = self.queue.pop_front() {
@@ -274,10 +263,6 @@ impl PlasticImpacts {
             }
         }
         self.queue.clear();
-        if knob("STATS", 0.0) > 0.0 {
-            eprintln!("seeds {seeds} fastest {fastest} points {} solved {} pushed {} of {} lanes {}", self.points.len(), self.solved, self.pushed.len(), on.rows.len(), on.lanes());
-        }
-        if knob("PART", 1.0) > 0.0 { self.part(on); }
         if on.record_impulses {
             for point in &self.points {
                 let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
@@ -286,12 +271,13 @@ impl PlasticImpacts {
         }
     }
 
-    /// By how much faster than rest a point has to come in so that no more than `most` do (m/s).
-    fn least(&self, most: usize) -> f32 {
+    /// By how much faster than rest a contact has to come in so that no more than [`MOST_ARRIVALS`] do (m/s), or that all
+    /// which do are equally fast.
+    fn least(&self) -> f32 {
         let mut least = 0.0;
         let all = || self.found.iter().flatten().map(|&(_, excess)| excess);
         let mut count = self.found[0].len() + self.found[1].len();
-        while count > most {
+        while count > MOST_ARRIVALS {
             least = all().filter(|&excess| excess >= least).sum::<f32>() / count as f32;
             let left = all().filter(|&excess| excess >= least).count();
             if left == count {
@@ -311,7 +297,6 @@ impl PlasticImpacts {
         self.listed.clear();
         self.listed.resize(lanes, NONE);
         self.points.clear();
-        self.pushed.clear();
         let mut end = 0;
         for batches in &on.batches {
             for (&a, &b) in batches.row_a().iter().zip(batches.row_b()) {
@@ -353,21 +338,14 @@ impl PlasticImpacts {
                 return;
             }
             let time = gap / -vn;
-            point.time = if gap.abs() < self.knobs[0] || time < -on.dt { 0.0 } else { time };
+            point.time = if time < -on.dt { 0.0 } else { time };
         }
         for row in point.rows {
             point.time = point.time.max(self.bodies[row as usize].time);
         }
         let old = point.impulse;
-        let mut new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
+        let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
         self.solved += 1;
-        point.solved += 1;
-        if point.solved > self.knobs[2] as u32 {
-            new = std::array::from_fn(|i| self.knobs[1].mul_add(new[i] - old[i], old[i]));
-            new[0] = new[0].max(0.0);
-            let bound = point.friction * new[0];
-            new[1] = new[1].min(bound).max(-bound);
-        }
         let delta = [new[0] - old[0], new[1] - old[1]];
         if point.k[0] * (delta[0].abs() + delta[1].abs()) <= slowest {
             return;
@@ -379,35 +357,9 @@ impl PlasticImpacts {
             if !is_pushed {
                 continue;
             }
-            if body.time == f32::NEG_INFINITY {
-                self.pushed.push(row);
-            }
             body.time = body.time.max(point.time);
             if !std::mem::replace(&mut body.is_queued, true) {
                 self.queue.push_back(row);
-            }
-        }
-    }
-
-    /// Widens the gaps that bodies seem to have lost as they were put back.
-    fn part(&mut self, on: &mut On<'_>) {
-        for i in 0..self.pushed.len() {
-            let mut end = self.bodies[self.pushed[i] as usize].first;
-            while end != NONE {
-                let lane = end / 2;
-                end = self.next[end as usize];
-                let first = self.list(on, lane);
-                for p in 0..2 {
-                    let place = first + p;
-                    let point = &self.points[place];
-                    let lost = point.separation.min(0.0) - point.gap(on.rows);
-                    if lost > 0.0 && point.mass > 0.0 && point.velocity(on.rows)[0] * on.dt >= lost {
-                        let Place { layout, part, width, first, .. } = on.place(lane);
-                        let at = first + layout.at(p, layout.separation) * width;
-                        bytemuck::cast_slice_mut::<_, f32>(on.batches[part].records_mut())[at] += lost;
-                        self.points[place].separation += lost;
-                    }
-                }
             }
         }
     }

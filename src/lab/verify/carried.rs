@@ -31,7 +31,9 @@ pub(super) static CASES: &[Case] = &[
         "N",
         "1 %",
         train,
-        Yes("a wall that is faster in every step is an impact in every step, and spreads along the row before it"),
+        Yes(
+            "a wall that is faster in every step is an impact in every step, and spreads along the row before it",
+        ),
     ),
     Case::new(
         "A23.shake",

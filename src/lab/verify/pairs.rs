@@ -49,7 +49,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A20.coupling",
-        "speeds after a plastic impact on a row of ten boxes of 1 to 4 kg, over the common one",
+        "speeds after a plastic impact on a row of six boxes of 1 to 4 kg, over the common one",
         "1",
         "1 %",
         coupling,
@@ -137,7 +137,11 @@ fn after_hit(a: &Hit, b: &Hit, e: f64, mu: f64) -> [[f64; 3]; 2] {
 }
 
 /// The worst difference from [`after_hit`] over restitutions and frictions (m/s, spins at their arms).
-fn rough_hit(lab: &Lab, bodies: &[(Hit, SceneShape, f64); 2], restitutions: &[f64]) -> Result<Finding, Failure> {
+fn rough_hit(
+    lab: &Lab,
+    bodies: &[(Hit, SceneShape, f64); 2],
+    restitutions: &[f64],
+) -> Result<Finding, Failure> {
     let (mut worst, mut of) = (0.0, String::new());
     for &e in restitutions {
         for mu in [0.05, 0.2, 0.5, 1.0] {
@@ -256,10 +260,10 @@ fn coupling(lab: &Lab) -> Result<Finding, Failure> {
     let mass = |i: u32| f64::from(1 + i % 4);
     let square = |i: u32| SceneShape::rectangle(0.5, 0.5).density(mass(i)).friction(0.0);
     let mut bodies = vec![SceneBody::dynamic([-1.3, 0.0], square(3)).moving([5.0, 0.0], 0.0)];
-    bodies.extend((0..10).map(|i| SceneBody::dynamic([f64::from(i), 0.0], square(i))));
-    let common = 5.0 * mass(3) / (mass(3) + (0..10).map(mass).sum::<f64>());
+    bodies.extend((0..6).map(|i| SceneBody::dynamic([f64::from(i), 0.0], square(i))));
+    let common = 5.0 * mass(3) / (mass(3) + (0..6).map(mass).sum::<f64>());
     let world = lab.run(Scene::new("coupling", bodies).weightless(), 1.0, |_| ())?;
-    let found: Vec<_> = (0..11).map(|i| velocity(&world, i)[0] / common).collect();
+    let found: Vec<_> = (0..7).map(|i| velocity(&world, i)[0] / common).collect();
     let off = largest(found.iter().map(|v| (v - 1.0).abs()));
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }
