@@ -306,3 +306,33 @@ fn solve<L: Lanes>(
     }
     change.set(largest(most).max(change.get()));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::rough_impulses;
+
+    /// Of a unit square's corner with k_nn, k_tt, k_nt that comes in at 4 m/s and slides at `vt`.
+    fn corner(mu: f32, old: [f32; 2], vt: f32) -> [f32; 2] {
+        rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, mu, old, [4.0, -vt])
+    }
+
+    #[test]
+    fn a_corner_sticks_slides_or_is_smooth() {
+        // 2 N + T = 4, N + 3 T = −1: N = 13/5, T = −6/5.
+        let [n, t] = corner(1.0, [0.0; 2], 1.0);
+        assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
+        // T = −N/4 and 2 N + T = 4: N = 16/7.
+        let [n, t] = corner(0.25, [0.0; 2], 1.0);
+        assert!((n - 16.0 / 7.0).abs() < 1e-6 && (t + 4.0 / 7.0).abs() < 1e-6, "{n} {t}");
+        assert_eq!(corner(0.0, [0.0; 2], 1.0), [2.0, 0.0]);
+    }
+
+    #[test]
+    fn impulses_so_far_are_part_of_the_whole() {
+        // What (2.6, −1.2) has made is done: nothing is left to gain.
+        let [n, t] = rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, 1.0, [2.6, -1.2], [0.0, 0.0]);
+        assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
+        // Points that leave by themselves take all of it back.
+        assert_eq!(rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, 1.0, [1.0, 0.0], [-4.0, -1.0]), [0.0, 0.0]);
+    }
+}
