@@ -2,8 +2,8 @@
 //!
 //! # The law
 //!
-//! That of [`super::impact`] with e = 0, at all points together: each has v_n⁺ ≥ 0, an impulse only where v_n⁺ = 0, and
-//! Coulomb's friction on the impulses of the whole impact. Gauss–Seidel on accumulated impulses, from point to point
+//! That of [`super::impact`] with e = 0, at all points together: each has v_n⁺ ≥ 0, an impulse only where v_n⁺ = 0,
+//! and Coulomb's friction on the impulses of the whole impact. Gauss–Seidel on accumulated impulses, from point to point
 //! as an impact spreads: where a body is pushed, its other points are looked at next, until nothing comes in by more
 //! than [`TOLERANCE`] of the fastest arrival. So a row of boxes goes on together, and what
 //! nothing hits costs nothing.
@@ -11,9 +11,9 @@
 //! # When in the step
 //!
 //! A point with the gap s that comes in at v is hit after t = s/|v|. Until then bodies fly as they did: an impulse
-//! at t that makes them faster by Δv moves them by (dt − t) Δv until the end of the step. They have Δv from the beginning of
-//! the step, and are put back by t Δv there. Such a point then touches all through the step. One
-//! that is pushed again by a body that was hit at t′ is so at the later of both times.
+//! at t that makes them faster by Δv moves them by (dt − t) Δv until the end of the step. They have Δv from the
+//! beginning of the step, and are put back by t Δv there. Such a point then touches all through the step.
+//! One that is pushed again by a body that was hit at t′ is so at the later of both times.
 //!
 //! A contact is first seen when its bodies are closer than [`crate::engine::params::SPECULATIVE_DISTANCE`], and so
 //! most impacts are found after they have happened, with an overlap of |s| ≤ |v| dt: t is negative then, and bodies
@@ -26,7 +26,8 @@
 //! # How far
 //!
 //! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: only the
-//! fastest [`MOST_ARRIVALS`] are followed, and the fewer there are, the farther. What still comes in is stopped by the solver.
+//! fastest [`MOST_ARRIVALS`] are followed, and the fewer there are, the farther. What still comes in is stopped by
+//! the solver.
 
 use super::arrivals::AHEAD;
 use super::batches::Batches;
@@ -45,10 +46,10 @@ const NONE: u32 = u32::MAX;
 const TOLERANCE: f32 = 1e-4;
 
 /// Contacts whose impacts are followed at most.
-const MOST_ARRIVALS: usize = 64;
+const MOST_ARRIVALS: usize = 32;
 
-/// How often points are solved at most in a step, and as often again shared among all that arrive.
-const SOLVES: [usize; 2] = [256, 4096];
+/// How often points are solved at most in a step: so often, and so often over the number of points that arrive.
+const SOLVES: [usize; 2] = [64, 8192];
 
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Debug, Default)]
@@ -58,7 +59,8 @@ pub struct PlasticImpacts {
     pub(super) found: [Vec<(u32, f32)>; 2],
     /// `[rows]`
     bodies: Vec<Body>,
-    /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1. `[2 lanes]`
+    /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
+    /// `[2 lanes]`
     next: Vec<u32>,
     /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
     listed: Vec<u32>,

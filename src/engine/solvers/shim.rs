@@ -13,13 +13,14 @@
 //! before the step ([`crate::engine::constraints::Passes::plastic_impacts`]); and relaxing takes the angular momentum that
 //! pushing bodies apart has made from their spins ([`crate::engine::constraints::Passes::parting_sweep`]).
 //!
-//! **Cost.** Per step, if something moves, 1 pass that looks for impacts; 1 warm start, 1 pass that shortens springs and 1 rigid block sweep; per substep 2 body
-//! passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Every 32 steps at most, if
-//! contacts have come or gone, a search of the contact graph. Sweeps of a step request 5935 B per contact.
+//! **Cost.** Per step 1 warm start, 1 pass that shortens springs, 1 rigid block sweep and, if something moves, 1 pass
+//! that looks for impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and `relax_iterations`
+//! rigid ones. Every 32 steps at most, if contacts have come or gone, a search of the contact graph. Sweeps of a
+//! step request 5935 B per contact.
 //!
-//! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies slide past
-//! each other, angular momentum is conserved to 4e-5 only: arms are those of the step's beginning, which matters to
-//! impacts within it. And where an impact without restitution runs through a row of more than ten bodies, or many
+//! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where
+//! bodies slide past each other, angular momentum is conserved to rounding only in impacts that are seen before the
+//! step: arms are those of its beginning, which matters to impacts within it. And where an impact without restitution runs through a row of more than ten bodies, or many
 //! happen at once: visits are limited, and what is left the sweeps of a substep spread by two bodies each.
 
 use super::{Law, Uses, Variant};
