@@ -58,7 +58,8 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// By how much the contact's springs are shortened (m), for solvers that do; zero when it comes.
+    /// By how much the contact's springs are shortened (m), for solvers that do. Zero when it comes, but for the overlap
+    /// that a body is put into the world with: negative.
     pub preload: f32,
     /// What the contact bears in statics (N), until the solver has made use of it; see
     /// [`crate::engine::constraints::piles`].

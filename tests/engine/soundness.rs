@@ -414,6 +414,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         record_impulses: true,
         points: 0,
         pile_modes: PileModes::default(),
+        contacts_changed: true,
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };

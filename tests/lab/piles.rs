@@ -4,10 +4,12 @@ use super::common;
 use glam::Vec2;
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::constraints::piles::{PileModes, Piles};
+use simpulse::engine::constraints::rules::Softness;
 use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
+use std::f32::consts::TAU;
 
 const GRAVITY: Vec2 = Vec2::new(0.0, -10.0);
 
@@ -198,4 +200,51 @@ fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
         assert!(sunk.abs() < 2e-5 * f64::from(count + 1) + 1e-5, "{count}: {sunk}");
         assert!(world.bodies.velocity(heavy).length() < 1e-3, "{count}");
     }
+}
+
+/// Cards begin up to 2 mm in each other. Pushed apart at once, they lose the top of the house at many lengths of a step.
+#[test]
+fn a_house_of_cards_that_begins_in_itself_stands_at_any_step() {
+    for rate in [30, 40, 60, 90, 120, 240, 480] {
+        let entry = common::scene("card_house");
+        let mut world = entry
+            .build(Settings { dt: 1.0 / rate as f32, ..common::settings(solvers::find("shim").unwrap()) })
+            .unwrap();
+        let heights = world.bodies.position_y.clone();
+        for _ in 0..4 * rate {
+            world.step().unwrap();
+        }
+        for (body, (now, then)) in world.bodies.position_y.iter().zip(heights.iter()).enumerate() {
+            assert!(
+                (now - then).abs() < 0.05,
+                "{rate} steps a second: card {body} is at {now}, and was at {then}"
+            );
+        }
+    }
+}
+
+/// Two discs without weight, 0.2 m in each other. Of the overlap p with which springs are content, a step leaves
+/// p τ/(τ + dt) − 20 µm, and in each substep springs push what is beyond at γ_m β.
+#[test]
+fn placed_overlap_goes_in_a_tenth_of_a_second() {
+    let mut world =
+        World::new(Settings { gravity: [0.0; 2], ..common::settings(solvers::find("shim").unwrap()) });
+    for x in [-0.4, 0.4] {
+        let disc = Shape::circle("disc", Vec2::ZERO, 0.5).unwrap();
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, [x, 0.0], vec![ShapeDef::new(disc)]));
+    }
+    let (dt, h) = (world.settings.dt, world.settings.h());
+    let [stiffness, damping_ratio] = [0, 1].map(|i| world.settings.parameters[i]);
+    let springs = Softness::new(TAU * stiffness / h, damping_ratio, h);
+    let (mut content, mut overlap) = (0.2_f32, 0.2_f32);
+    for step in 0..60 {
+        content = (content.min(overlap) * (0.1 / (0.1 + dt)) - 2e-5).max(0.0);
+        for _ in 0..world.settings.budget.substeps {
+            overlap -= h * springs.mass_scale * springs.bias_rate * (overlap - content);
+        }
+        world.step().unwrap();
+        let found = 1.0 - (world.bodies.position_x[1] - world.bodies.position_x[0]);
+        assert!((found - overlap).abs() < 1e-5, "step {step}: {found} m left, {overlap} expected");
+    }
+    assert!(overlap < 1e-3, "{overlap}");
 }

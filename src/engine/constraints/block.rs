@@ -64,8 +64,8 @@ use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, Oppo
 use super::pass::{Pass, PassInput, PerLane};
 use super::sweep::NormalRule;
 use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
-    spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, Rows, TURN, VX, VY, W, apply, arms, for_each_batch,
+    over_segments, spin, to_frame, turn, with_arms,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 use crate::engine::params::LINEAR_SLOP;
@@ -201,6 +201,7 @@ fn segment<
         let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
         let (mut arm, mut old) = ([[L::zero(); 2]; 2], [L::zero(); 2]);
         let (mut constant, mut slope, mut v) = ([L::zero(); 2], [L::zero(); 2], [L::zero(); 2]);
+        let mut tangent = Rows::<L>::new();
         for p in 0..N::POINTS {
             arm[p] = arms::<L, N, O>(record, &layout, p, 0);
             let arm_t = arms::<L, N, O>(record, &layout, p, 1);
@@ -211,6 +212,14 @@ fn segment<
             let mass = record[layout.at(p, layout.normal_mass)];
             [constant[p], slope[p]] = rule.line(!pushes_a, separation, mass, old[p]);
             v[p] = with_arms::<L, N, O>(along_n, progress.w, arm[p]);
+            if has_friction && NORMAL_FIRST {
+                let vt = with_arms::<L, N, O>(along_t, progress.w, arm_t);
+                let at = layout.at(p, layout.tangent_impulse);
+                let (old, slope) =
+                    (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
+                (tangent.arm[p], tangent.slope[p], tangent.old[p]) = (arm_t, slope, old);
+                tangent.impulse[p] = slope.neg_mul_add(vt, old);
+            }
         }
         let mut coupling = L::zero();
         if N::POINTS == 2 {
@@ -228,9 +237,26 @@ fn segment<
             let delta = new[p] - old[p];
             progress.sum[0] = progress.sum[0] + delta;
             spin::<L, N, O>(&mut progress.w, inertia, arm[p], delta);
+            if has_friction && NORMAL_FIRST {
+                for q in 0..N::POINTS {
+                    tangent.answer::<N, O>(q, L::zero(), inertia, arm[p], delta);
+                }
+            }
         }
         if has_friction && NORMAL_FIRST {
-            friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
+            let friction = record[layout.friction];
+            for p in 0..N::POINTS {
+                let bound = friction * new[p];
+                let new = tangent.impulse[p].min(bound).max(-bound);
+                record[layout.at(p, layout.tangent_impulse)] = new;
+                let delta = new - tangent.old[p];
+                progress.sum[1] = progress.sum[1] + delta;
+                let arm = tangent.arm[p];
+                for q in p + 1..N::POINTS {
+                    tangent.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+                }
+                spin::<L, N, O>(&mut progress.w, inertia, arm, delta);
+            }
         }
         if const { PARTING && O::HAS_ROW && N::FRICTION && R::FRICTION } {
             let slides = along_t.max(-along_t) - L::splat(slowest);
@@ -270,7 +296,8 @@ fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling
     let determinant = g[0].neg_mul_add(g[1], L::splat(1.0));
     // A point that is not there has s = 0.
     let regular = (determinant - L::splat(SINGULAR)).min(s[0]).min(s[1]);
-    let inverse = L::splat(1.0) / regular.select_positive(determinant, L::splat(1.0));
+    // Where it is zero, the result is not used.
+    let inverse = L::splat(1.0) / determinant;
     let both = [g[0].neg_mul_add(q[1], q[0]) * inverse, g[1].neg_mul_add(q[0], q[1]) * inverse];
     std::array::from_fn(|p| {
         let alone = q[p].max(zero);

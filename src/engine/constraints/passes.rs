@@ -131,6 +131,8 @@ pub struct StepInput {
     pub points: usize,
     /// See [`Passes::pile_modes`].
     pub pile_modes: PileModes,
+    /// See [`Passes::contacts_changed`].
+    pub contacts_changed: bool,
 }
 
 /// One step's problem, prepared.
@@ -202,6 +204,12 @@ impl<'a> Passes<'a> {
     /// [`crate::engine::solvers::Variant::piles`] is set.
     pub fn pile_modes(&self) -> PileModes {
         self.input.pile_modes
+    }
+
+    /// Contacts have come or gone since the step before; not told unless
+    /// [`crate::engine::solvers::Variant::piles`] is set.
+    pub fn contacts_changed(&self) -> bool {
+        self.input.contacts_changed
     }
 
     /// Points of all contacts.
@@ -403,7 +411,8 @@ impl<'a> Passes<'a> {
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
     /// the impulses so far, of which a step takes over the part `rate`; see `preload.rs`.
     pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
-        self.run(Phase::Prepare, &Preload { springs, share, rate, h: self.h() });
+        let (h, dt) = (self.h(), self.h() * self.input.budget.substeps as f32);
+        self.run(Phase::Prepare, &Preload { springs, share, rate, h, dt });
     }
 
     /// Gives bodies their lanes for block descent, see [`super::descent`]: once a step, before all else of it.

@@ -483,7 +483,7 @@ fn supports<'c>(
     let contact = &contacts[index as usize];
     let is_b = contact.body_b == body;
     let normal = contact.manifold.normal.as_dvec2();
-    let is_new = contact.preload == 0.0 && contact.manifold.points().iter().all(|p| p.normal_impulse == 0.0);
+    let is_new = contact.preload <= 0.0 && contact.manifold.points().iter().all(|p| p.normal_impulse == 0.0);
     let rests =
         move |p: &ManifoldPoint| p.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, p) <= still;
     contact.manifold.points().iter().enumerate().filter(move |(_, p)| rests(p)).map(move |(point, p)| {

@@ -86,12 +86,18 @@ impl World {
 
         let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, .. } = narrow;
         fresh.clear();
+        let stepped = self.stepped;
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
             candidate.contact = if contact.manifold.count == 0 {
                 NO_CONTACT
             } else {
-                fresh.push(Contact { manifold: contact.manifold, ..candidate.without_manifold() });
+                let preload = if candidate.bodies.iter().any(|&body| body as usize >= stepped) {
+                    contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least))
+                } else {
+                    0.0
+                };
+                fresh.push(Contact { manifold: contact.manifold, preload, ..candidate.without_manifold() });
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;

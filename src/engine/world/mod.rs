@@ -71,6 +71,8 @@ pub struct World {
     pub counts: StepCounts,
     /// Steps taken.
     pub step_index: u64,
+    /// Bodies that have taken a step: the first ones.
+    stepped: usize,
     traits: Traits,
     features: Features,
     surfaces: Vec<Surface>,
@@ -101,6 +103,7 @@ impl World {
             timings: Timings::default(),
             counts: StepCounts::default(),
             step_index: 0,
+            stepped: 0,
             traits: Traits::default(),
             features: Features::NONE,
             surfaces: Vec::new(),
@@ -170,6 +173,7 @@ impl World {
         self.store();
         clock.lap(Phase::Store);
         self.step_index += 1;
+        self.stepped = self.bodies.len();
         self.timings = clock.stop();
         self.check()
     }
@@ -247,6 +251,7 @@ impl World {
             record_impulses: s.record_impulses,
             points: self.counts.points,
             pile_modes: self.found.modes,
+            contacts_changed: self.found.contacts_changed,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());

@@ -16,6 +16,8 @@ pub(super) struct Found {
     contacts: usize,
     /// Contacts have come or gone since.
     is_stale: bool,
+    /// Contacts have come or gone in this step.
+    pub contacts_changed: bool,
 }
 
 impl World {
@@ -26,7 +28,8 @@ impl World {
             return;
         }
         let found = &mut self.found;
-        found.is_stale |= self.narrow.is_changed;
+        found.contacts_changed = self.narrow.is_changed;
+        found.is_stale |= found.contacts_changed;
         let grown = 4 * self.contacts.len() > 5 * found.contacts;
         if found.is_stale && (grown || self.step_index.is_multiple_of(EVERY)) {
             let gravity = Vec2::from(self.settings.gravity);
@@ -36,7 +39,7 @@ impl World {
                 gravity,
                 [self.settings.dt, self.settings.h()],
             );
-            *found = Found { modes, contacts: self.contacts.len(), is_stale: false };
+            *found = Found { modes, contacts: self.contacts.len(), is_stale: false, ..*found };
         }
     }
 }

@@ -138,9 +138,18 @@ impl<'a> Replay<'a> {
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         let phases = PhaseFilter::ALL;
         // Nothing buckles or swings in one step.
-        let (record_impulses, pile_modes) = (false, PileModes::default());
-        let input =
-            StepInput { features, budget, h, parameters, phases, record_impulses, points, pile_modes };
+        let (record_impulses, pile_modes, contacts_changed) = (false, PileModes::default(), true);
+        let input = StepInput {
+            features,
+            budget,
+            h,
+            parameters,
+            phases,
+            record_impulses,
+            points,
+            pile_modes,
+            contacts_changed,
+        };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
             gravity: [0.0; 2],
