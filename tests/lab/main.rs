@@ -9,6 +9,7 @@ mod features;
 mod impulses;
 mod metrics;
 mod piles;
+mod plastic;
 mod profile;
 mod recycling;
 mod rest;

@@ -201,6 +201,39 @@ fn wave<L: Lanes>(
     found.set(largest(most).max(found.get()));
 }
 
+/// Accumulated impulses along n and t (N·s) after which a point has gained `wanted` (m/s), or as much of it along t
+/// as friction lets it; see the [module](self). `k`: k_nn, k_tt, k_nt (1/kg); `mass`: 1/k_nn, zero for a point that is
+/// not there; `old`: those so far.
+#[inline(always)]
+pub(super) fn rough_impulses<L: Lanes>(
+    [k_nn, k_tt, k_nt]: [L; 3],
+    mass: L,
+    mu: L,
+    [old_n, old_t]: [L; 2],
+    [wanted_n, wanted_t]: [L; 2],
+) -> [L; 2] {
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let smooth = [mass.mul_add(wanted_n, old_n).max(zero), zero];
+    // Velocities that are to be made, from none of the impulses so far.
+    let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted_n));
+    let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, wanted_t));
+    let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
+    let safe = determinant.select_positive(determinant, one);
+    let stick =
+        [k_tt.mul_add(want_n, -(k_nt * want_t)) / safe, k_nn.mul_add(want_t, -(k_nt * want_n)) / safe];
+    let size = stick[1].max(-stick[1]);
+    let slope = stick[1].select_positive(mu, -mu);
+    // Along the edge of the cone N meets k_nn ± µ k_nt; where that is not positive the
+    // edge leads nowhere (Painlevé), and N is that without friction.
+    let along = slope.mul_add(k_nt, k_nn);
+    let edge_n = (want_n / along.select_positive(along, one)).max(zero);
+    let edge_n = along.select_positive(edge_n, (want_n * mass).max(zero));
+    let slides = mu.neg_mul_add(stick[0], size);
+    let slides = stick[0].select_positive(slides, one);
+    let rough = [slides.select_positive(edge_n, stick[0]), slides.select_positive(slope * edge_n, stick[1])];
+    std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]))
+}
+
 #[inline(never)]
 fn solve<L: Lanes>(
     rows: &mut [BodyRow],
@@ -236,8 +269,7 @@ fn solve<L: Lanes>(
             let k_nn = one / mass.select_positive(mass, one);
             let wanted = target - vn;
             // Without friction, whether the scene has any or not.
-            let smooth = [mass.mul_add(wanted, old_n).max(zero), zero];
-            let mut new = smooth;
+            let mut new = [mass.mul_add(wanted, old_n).max(zero), zero];
             if layout.has_friction {
                 let vt = {
                     let x = b[0] - a[0];
@@ -248,30 +280,8 @@ fn solve<L: Lanes>(
                 let k_tt = one / mass_t.select_positive(mass_t, one);
                 let answers = if pushes_a { a[7] } else { zero };
                 let k_nt = (b[7] * arm_b[0]).mul_add(arm_b[1], answers * arm_a[0] * arm_a[1]);
-                // Velocities that are to be made, from none of the wave's impulses.
-                let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted));
-                let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, -vt));
-                let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
-                let safe = determinant.select_positive(determinant, one);
-                let stick = [
-                    k_tt.mul_add(want_n, -(k_nt * want_t)) / safe,
-                    k_nn.mul_add(want_t, -(k_nt * want_n)) / safe,
-                ];
-                let mu = record[layout.friction];
-                let size = stick[1].max(-stick[1]);
-                let slope = stick[1].select_positive(mu, -mu);
-                // Along the edge of the cone N meets k_nn ± µ k_nt; where that is not positive the
-                // edge leads nowhere (Painlevé), and N is that without friction.
-                let along = slope.mul_add(k_nt, k_nn);
-                let edge_n = (want_n / along.select_positive(along, one)).max(zero);
-                let edge_n = along.select_positive(edge_n, (want_n * mass).max(zero));
-                let slides = mu.neg_mul_add(stick[0], size);
-                let slides = stick[0].select_positive(slides, one);
-                let rough = [
-                    slides.select_positive(edge_n, stick[0]),
-                    slides.select_positive(slope * edge_n, stick[1]),
-                ];
-                new = std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]));
+                let k = [k_nn, k_tt, k_nt];
+                new = rough_impulses(k, mass, record[layout.friction], [old_n, old_t], [wanted, -vt]);
             }
             // What bounces leaves by itself: it is not pushed out as well.
             let at_surface = record[layout.at(p, layout.separation)];
@@ -295,4 +305,34 @@ fn solve<L: Lanes>(
         }
     }
     change.set(largest(most).max(change.get()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rough_impulses;
+
+    /// Of a unit square's corner with k_nn, k_tt, k_nt that comes in at 4 m/s and slides at `vt`.
+    fn corner(mu: f32, old: [f32; 2], vt: f32) -> [f32; 2] {
+        rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, mu, old, [4.0, -vt])
+    }
+
+    #[test]
+    fn a_corner_sticks_slides_or_is_smooth() {
+        // 2 N + T = 4, N + 3 T = −1: N = 13/5, T = −6/5.
+        let [n, t] = corner(1.0, [0.0; 2], 1.0);
+        assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
+        // T = −N/4 and 2 N + T = 4: N = 16/7.
+        let [n, t] = corner(0.25, [0.0; 2], 1.0);
+        assert!((n - 16.0 / 7.0).abs() < 1e-6 && (t + 4.0 / 7.0).abs() < 1e-6, "{n} {t}");
+        assert_eq!(corner(0.0, [0.0; 2], 1.0), [2.0, 0.0]);
+    }
+
+    #[test]
+    fn impulses_so_far_are_part_of_the_whole() {
+        // What (2.6, −1.2) has made is done: nothing is left to gain.
+        let [n, t] = rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, 1.0, [2.6, -1.2], [0.0, 0.0]);
+        assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
+        // Points that leave by themselves take all of it back.
+        assert_eq!(rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, 1.0, [1.0, 0.0], [-4.0, -1.0]), [0.0, 0.0]);
+    }
 }

@@ -2,12 +2,13 @@
 //!
 //! Reading order: [`features`] (what is compiled in, where a record keeps what), [`batches`] and
 //! [`assign`] (which contact is in which lane), [`sweep`] (the kernel) and [`rules`] (what it
-//! solves), [`prepare`], [`impact`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
+//! solves), [`prepare`], [`impact`], [`plastic`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
 //! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
 //! sweep; [`system`] shows the problem as vectors, in lanes as [`point_vector`], [`graph`] as nodes and edges, and [`kept`]
 //! keeps a solver's own numbers, [`piles`] says how stiff and how slow contacts have to be. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
 //! added, and [`types`] how constraints of other types join.
 
+mod arrivals;
 pub mod assign;
 pub mod batches;
 pub mod block;
@@ -30,6 +31,7 @@ pub mod order;
 pub mod pass;
 pub mod passes;
 pub mod piles;
+pub mod plastic;
 mod point_passes;
 pub mod point_vector;
 pub mod position;

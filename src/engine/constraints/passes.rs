@@ -1,5 +1,6 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
+use super::arrivals::Arrivals;
 use super::batches::Batches;
 use super::block::{BlockSweep, Parting};
 use super::bounces::Bounces;
@@ -15,6 +16,7 @@ use super::observe::ObservedRule;
 use super::order::SweepOrder;
 use super::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
 use super::piles::PileModes;
+use super::plastic::{self, PlasticImpacts};
 use super::point_vector::PointVector;
 use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
@@ -30,7 +32,7 @@ use crate::engine::clock::{Clock, Phase, PhaseFilter};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, held};
 use crate::engine::params::{Budget, IMPACT_SWEEPS, IMPACT_TOLERANCE, IMPACT_WAVES, Parameters};
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::fmt;
 
 /// Everything a step works on, kept from step to step so that nothing is allocated.
@@ -64,6 +66,8 @@ pub struct Workspace {
     pub points: PointVector,
     /// Vectors that solvers have given back.
     pub vectors: Vec<PointVector>,
+    /// How impacts without restitution spread.
+    pub plastic: PlasticImpacts,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
     pub masses: Vec<[f32; 2]>,
     /// Keep the rule of the last velocity sweep in `last_rule`.
@@ -93,6 +97,7 @@ impl Workspace {
             + self.descent.held_bytes()
             + self.points.held_bytes()
             + vectors
+            + self.plastic.held_bytes()
             + held(&self.masses)
     }
 }
@@ -173,9 +178,7 @@ impl<'a> Passes<'a> {
             passes.over_batches(Phase::Prepare, &Prepare);
             if input.features.restitution {
                 passes.bounce_before();
-                let begin = restitution::Begin { h: input.h, found: Cell::new(0.0) };
-                passes.over_contacts(&begin);
-                passes.bounces = begin.found.get() > 0.0;
+                passes.begin_bounces();
             }
             passes.clock.lap(Phase::Prepare);
         }
@@ -646,6 +649,70 @@ impl<'a> Passes<'a> {
                 self.over_contacts(&impact::Book);
             }
         }
+    }
+
+    /// Notes how fast points come in that shall bounce at the end of the step.
+    fn begin_bounces(&mut self) {
+        if self.input.features.restitution {
+            let begin = restitution::Begin { h: self.input.h, found: Cell::new(0.0) };
+            self.over_contacts(&begin);
+            self.bounces = begin.found.get() > 0.0;
+        }
+    }
+
+    /// Stops what comes in without restitution, before the step; see [`super::plastic`].
+    pub fn plastic_impacts(&mut self) {
+        if !self.input.phases.runs(Phase::Prepare) {
+            return;
+        }
+        let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
+        if let Some([slowest, least_gain]) = self.least_impact(dt) {
+            let mut found = std::mem::take(&mut self.work.plastic.found);
+            for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(&mut found) {
+                found.clear();
+                self.over_part(part, &Arrivals { h, dt, slowest, least_gain, found: RefCell::new(found) });
+            }
+            let any = found.iter().any(|found| !found.is_empty());
+            self.work.plastic.found = found;
+            if any {
+                let Workspace { rows, lanes, serial, plastic, .. } = &mut *self.work;
+                let (features, record_impulses) = (&self.input.features, self.input.record_impulses);
+                let batches = [lanes, serial];
+                plastic.spread(&mut plastic::On {
+                    rows,
+                    batches,
+                    contacts: self.contacts,
+                    features,
+                    dt,
+                    record_impulses,
+                });
+                self.work.motion.hide_turns(&mut self.work.rows);
+                self.begin_bounces();
+            }
+        }
+        self.clock.lap(Phase::Prepare);
+    }
+
+    /// Speed below which nothing is an impact, and the least that forces add to the speed of a dynamic body in a step
+    /// (m/s); none if no body is as fast.
+    fn least_impact(&self, dt: f32) -> Option<[f32; 2]> {
+        /// Part of what forces make in a step (1).
+        const SLOW: f32 = 0.01;
+        /// Turn in a step (rad).
+        const SLOW_TURN: f32 = 1e-5;
+        let Workspace { rows, motion, .. } = &*self.work;
+        let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
+        let gains = || {
+            let all = rows.iter().zip(motion.velocity_increments());
+            all.filter(|(row, _)| row.velocity[3] > 0.0).map(|(_, increment)| square(increment))
+        };
+        let per_step = |square: f32| square.sqrt() * self.input.budget.substeps as f32;
+        let slowest = SLOW * per_step(gains().fold(0.0, f32::max));
+        let moves = |row: &BodyRow| {
+            square(&row.velocity) > slowest * slowest || (dt * row.velocity[2]).abs() > SLOW_TURN
+        };
+        let least_gain = || per_step(gains().fold(f32::INFINITY, f32::min));
+        rows.iter().any(moves).then(|| [slowest, least_gain()])
     }
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.

@@ -9,19 +9,21 @@
 //! rest begin with what statics says they bear, and a column that would buckle gets stiffer springs and the
 //! sweeps that these need (both [`crate::engine::constraints::piles`]); springs bear a load however deep its contact
 //! is; the two normal rows of a contact are solved together, friction rows after them; where contacts have come or
-//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago; and
+//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago; what comes
+//! in without restitution is stopped before the step ([`crate::engine::constraints::Passes::plastic_impacts`]); and
 //! relaxing takes the angular momentum that pushing bodies apart has made from their spins
 //! ([`crate::engine::constraints::Passes::parting_sweep`]).
 //!
-//! **Cost.** Per step 1 warm start and 1 pass that shortens springs; per substep 2 body passes,
-//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. In steps in which contacts come or go 1
-//! rigid sweep more, and every 32 of these at most a search of the contact graph. Sweeps of a step request 5736 B per
-//! contact.
+//! **Cost.** Per step 1 warm start, 1 pass that shortens springs and, if something moves, 1 pass that looks for
+//! impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. In
+//! steps in which contacts come or go 1 rigid sweep more, and every 32 of these at most a search of the contact graph.
+//! Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies
-//! slide past each other, angular momentum is conserved to 4e-5 only: arms are those of the step's beginning, which
-//! matters to impacts within it. And where an impact without restitution runs through a row of bodies: the second
-//! substep repeats it, and takes it back in two sweeps.
+//! slide past each other, angular momentum is conserved to rounding only in impacts that are seen before the step: arms
+//! are those of its beginning, which matters to impacts within it. And where an impact without restitution runs through
+//! a row of more than ten bodies, or many happen at once: visits are limited, and what is left the sweeps of a substep
+//! spread by two bodies each.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -95,6 +97,7 @@ fn step(passes: &mut Passes<'_>) {
     let rigid = Rigid::new(h);
     let dt = h * budget.substeps as f32;
     let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
+    passes.plastic_impacts();
     passes.preload(springs, share, dt / (dt + time));
     for substep in 0..budget.substeps {
         if substep == 0 {

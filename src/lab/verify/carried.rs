@@ -1,6 +1,6 @@
 //! A23 and A24: bodies on supports that move.
 
-use super::Required::{No, Yes};
+use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::engine::bodies::BodyKind;
@@ -31,8 +31,8 @@ pub(super) static CASES: &[Case] = &[
         "N",
         "1 %",
         train,
-        No(
-            "a wall that is faster in every step is an impact in every step, which runs to and fro along the row",
+        Yes(
+            "a wall that is faster in every step is an impact in every step, and spreads along the row before it",
         ),
     ),
     Case::new(

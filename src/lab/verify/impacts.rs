@@ -1,6 +1,6 @@
 //! A5–A7 and A17–A19: bounces.
 
-use super::Required::{No, Yes};
+use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -106,9 +106,25 @@ pub(super) static CASES: &[Case] = &[
         "A19.plastic",
         "the same of a disc and of a corner without restitution, from touch",
         "m/s",
-        "1 % of 4 m/s: three sweeps of rate k_nt²/(k_nn k_tt) = 0.19",
+        "f32: 1e-4 of a metre per second",
         plastic,
-        No("the second substep repeats what the first gave, and takes it back in two sweeps"),
+        Yes("what comes in without restitution is stopped before the step, both rows at once"),
+    ),
+    Case::new(
+        "A19.landed",
+        "the same from above, whenever within a step they meet the ground",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        landed,
+        Yes("what comes in without restitution is stopped before the step, both rows at once"),
+    ),
+    Case::new(
+        "A19.flat",
+        "velocities of a rough box that lands flat at 4 m/s and 3 m/s along the ground, worst of height and µ",
+        "m/s",
+        "1e-3 of 4 m/s: where impulses stop to spread, and soft contacts do the rest",
+        flat_landing,
+        Yes("both points of a face are hit, and no spin comes of it unless one lets go"),
     ),
 ];
 
@@ -312,11 +328,39 @@ fn fallen_corner(lab: &Lab) -> Result<Finding, Failure> {
     rough_impacts(lab, &[0.2, 0.5, 0.9], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })
 }
 
-/// A19. Without restitution impacts are solved with all other contacts.
+/// A19. The law is the same without restitution, v_n⁺ = 0.
 fn plastic(lab: &Lab) -> Result<Finding, Failure> {
-    let disc = rough_impacts(lab, &[0.0], &[0.0], 0.04, disc)?;
-    let corner = rough_impacts(lab, &[0.0], &[0.0], 0.04, corner)?;
+    let disc = rough_impacts(lab, &[0.0], &[0.0], 1e-4, disc)?;
+    let corner = rough_impacts(lab, &[0.0], &[0.0], 1e-4, corner)?;
     Ok(if disc.measured > corner.measured { disc } else { corner })
+}
+
+/// A19. Without restitution from above; the corner without spin until it arrives.
+fn landed(lab: &Lab) -> Result<Finding, Failure> {
+    let disc = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, disc)?;
+    let corner = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })?;
+    Ok(if disc.measured > corner.measured { disc } else { corner })
+}
+
+/// A19. A box of 2 m × ½ m does not turn over: both ends of its face are hit, and the whole impulse is 4 N·s per
+/// kilogram. Friction takes µ of it, or all of 3 m/s.
+fn flat_landing(lab: &Lab) -> Result<Finding, Failure> {
+    let (mut worst, mut of) = (0.0, String::new());
+    for mu in [0.05, 0.2, 0.5, 1.0] {
+        for &height in HEIGHTS {
+            let shape = SceneShape::rectangle(1.0, 0.25).friction(mu);
+            let falling = SceneBody::dynamic([0.0, 0.25 + height], shape).moving([3.0, -4.0], 0.0);
+            let scene = Scene::new("flat", vec![ground(50.0, mu), falling]).weightless();
+            let dt = scene.dt;
+            let world = lab.run(scene, (4.0 + (height / 4.0 / dt).ceil()) * dt, |_| ())?;
+            let [vx, vy] = velocity(&world, 1);
+            let error = largest([(vx - (3.0 - 4.0 * mu).max(0.0)).abs(), vy.abs(), spin(&world, 1).abs()]);
+            if error > worst {
+                (worst, of) = (error, format!("worst with µ = {mu}, from {height} m"));
+            }
+        }
+    }
+    Ok(Finding::new(worst, 0.0, 4e-3).note(of))
 }
 
 fn disc() -> Rough {

@@ -1,6 +1,6 @@
 //! A20–A22: two bodies that both move.
 
-use super::Required::{No, Yes};
+use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -45,7 +45,23 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "1 %",
         plastic_row,
-        No("a substep sweeps a row twice, and repeats in the next what an impact gave"),
+        Yes("an impact without restitution spreads from body to body before the step"),
+    ),
+    Case::new(
+        "A20.coupling",
+        "speeds after a plastic impact on a row of six boxes of 1 to 4 kg, over the common one",
+        "1",
+        "1 %",
+        coupling,
+        Yes("an impact without restitution spreads from body to body before the step"),
+    ),
+    Case::new(
+        "A20.caught",
+        "velocities after rough plastic impacts of two discs, and of a corner on a box, worst of µ",
+        "m/s",
+        "f32: 1e-4 of a metre per second",
+        caught,
+        Yes("normal and tangential impulse of an impact are found together"),
     ),
     Case::new(
         "A20.miss",
@@ -121,9 +137,13 @@ fn after_hit(a: &Hit, b: &Hit, e: f64, mu: f64) -> [[f64; 3]; 2] {
 }
 
 /// The worst difference from [`after_hit`] over restitutions and frictions (m/s, spins at their arms).
-fn rough_hit(lab: &Lab, bodies: [(Hit, SceneShape, f64); 2]) -> Result<Finding, Failure> {
+fn rough_hit(
+    lab: &Lab,
+    bodies: &[(Hit, SceneShape, f64); 2],
+    restitutions: &[f64],
+) -> Result<Finding, Failure> {
     let (mut worst, mut of) = (0.0, String::new());
-    for e in [0.2, 0.5, 0.9] {
+    for &e in restitutions {
         for mu in [0.05, 0.2, 0.5, 1.0] {
             let truth = after_hit(&bodies[0].0, &bodies[1].0, e, mu);
             let placed = bodies.iter().map(|(hit, shape, angle)| {
@@ -150,17 +170,34 @@ fn rough_hit(lab: &Lab, bodies: [(Hit, SceneShape, f64); 2]) -> Result<Finding, 
 
 /// A20. Two discs of different size and mass, one above the other.
 fn rough_discs(lab: &Lab) -> Result<Finding, Failure> {
+    rough_hit(lab, &two_discs(), BOUNCING)
+}
+
+/// Restitutions of what bounces.
+const BOUNCING: &[f64] = &[0.2, 0.5, 0.9];
+
+fn two_discs() -> [(Hit, SceneShape, f64); 2] {
     let disc = |radius: f64, density: f64, up: f64, velocity, spin| {
         let mass = density * PI * radius * radius;
         let hit =
             Hit { mass, inertia: 0.5 * mass * radius * radius, arm: [0.0, -up * radius], velocity, spin };
         (hit, SceneShape::disc(radius).density(density), 0.0)
     };
-    rough_hit(lab, [disc(0.8, 1.0, -1.0, [-1.0, 0.5], 1.5), disc(0.5, 2.0, 1.0, [2.0, -3.5], 3.0)])
+    [disc(0.8, 1.0, -1.0, [-1.0, 0.5], 1.5), disc(0.5, 2.0, 1.0, [2.0, -3.5], 3.0)]
 }
 
 /// A20. A corner of one box on the upper face of another, away from the middle of both.
 fn rough_boxes(lab: &Lab) -> Result<Finding, Failure> {
+    rough_hit(lab, &corner_on_box(), BOUNCING)
+}
+
+/// A20. Without restitution the law is the same.
+fn caught(lab: &Lab) -> Result<Finding, Failure> {
+    let [discs, corner] = [rough_hit(lab, &two_discs(), &[0.0])?, rough_hit(lab, &corner_on_box(), &[0.0])?];
+    Ok(if discs.measured > corner.measured { discs } else { corner })
+}
+
+fn corner_on_box() -> [(Hit, SceneShape, f64); 2] {
     let (sin, cos) = 25f64.to_radians().sin_cos();
     let upper = Hit {
         mass: 1.0,
@@ -173,7 +210,7 @@ fn rough_boxes(lab: &Lab) -> Result<Finding, Failure> {
     let lower = Hit { mass: 4.0, inertia: 4.0 / 12.0 * 5.0, arm: [0.6, 0.5], velocity: [0.0; 2], spin: 0.0 };
     let square = SceneShape::rectangle(0.5, 0.5).density(1.0);
     let plank = SceneShape::rectangle(1.0, 0.5).density(2.0);
-    rough_hit(lab, [(lower, plank, 0.0), (upper, square, 25f64.to_radians())])
+    [(lower, plank, 0.0), (upper, square, 25f64.to_radians())]
 }
 
 /// A20. With gaps of 1 mm each disc hits the next and stays behind at (m − M)/(m + M) of its speed, −1/3; the
@@ -214,6 +251,19 @@ fn plastic_row(lab: &Lab) -> Result<Finding, Failure> {
     bodies.extend((0..4).map(|i| SceneBody::dynamic([f64::from(i), 0.0], square())));
     let world = lab.run(Scene::new("row", bodies).weightless(), 1.0, |_| ())?;
     let found: Vec<_> = (0..5).map(|i| velocity(&world, i)[0]).collect();
+    let off = largest(found.iter().map(|v| (v - 1.0).abs()));
+    Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
+}
+
+/// A20. Σ m_i v_i/Σ m_i, whatever the masses and wherever in the row the fast one stands.
+fn coupling(lab: &Lab) -> Result<Finding, Failure> {
+    let mass = |i: u32| f64::from(1 + i % 4);
+    let square = |i: u32| SceneShape::rectangle(0.5, 0.5).density(mass(i)).friction(0.0);
+    let mut bodies = vec![SceneBody::dynamic([-1.3, 0.0], square(3)).moving([5.0, 0.0], 0.0)];
+    bodies.extend((0..6).map(|i| SceneBody::dynamic([f64::from(i), 0.0], square(i))));
+    let common = 5.0 * mass(3) / (mass(3) + (0..6).map(mass).sum::<f64>());
+    let world = lab.run(Scene::new("coupling", bodies).weightless(), 1.0, |_| ())?;
+    let found: Vec<_> = (0..7).map(|i| velocity(&world, i)[0] / common).collect();
     let off = largest(found.iter().map(|v| (v - 1.0).abs()));
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }

@@ -1,0 +1,368 @@
+//! Plastic impacts: what comes in without restitution stays, before the step is solved.
+//!
+//! # The law
+//!
+//! That of [`super::impact`] with e = 0, at all points together: each has v_n⁺ ≥ 0, an impulse only where v_n⁺ = 0,
+//! and Coulomb's friction on the impulses of the whole impact. Gauss–Seidel on accumulated impulses, from point to point
+//! as an impact spreads: where a body is pushed, its other points are looked at next, until nothing comes in by more
+//! than [`TOLERANCE`] of the fastest arrival. So a row of boxes goes on together, and what
+//! nothing hits costs nothing.
+//!
+//! # When in the step
+//!
+//! A point with the gap s that comes in at v is hit after t = s/|v|. Until then bodies fly as they did: an impulse
+//! at t that makes them faster by Δv moves them by (dt − t) Δv until the end of the step. They have Δv from the
+//! beginning of the step, and are put back by t Δv there. Such a point then touches all through the step.
+//! One that is pushed again by a body that was hit at t′ is so at the later of both times.
+//!
+//! A contact is first seen when its bodies are closer than [`crate::engine::params::SPECULATIVE_DISTANCE`], and so
+//! most impacts are found after they have happened, with an overlap of |s| ≤ |v| dt: t is negative then, and bodies
+//! are put forward to where they would be.
+//!
+//! The impulse acts at arms of the step's beginning. When the two centres are displaced by D against each other at its
+//! time, it adds D × λ to angular momentum, which is taken from both spins, half from each (see [`super::block`]), if
+//! there is friction.
+//!
+//! # How far
+//!
+//! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: only the
+//! fastest [`MOST_ARRIVALS`] are followed, and the fewer there are, the farther. What still comes in is stopped by
+//! the solver.
+
+use super::arrivals::AHEAD;
+use super::batches::Batches;
+use super::features::{Features, Layout};
+use super::impact::rough_impulses;
+use super::segment::Segment;
+use super::sweep::turn;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, Lanes, held};
+use std::collections::VecDeque;
+
+/// No lane, no point.
+const NONE: u32 = u32::MAX;
+
+/// Impacts spread until nothing comes in faster than this part of the fastest (1).
+const TOLERANCE: f32 = 1e-4;
+
+/// Contacts whose impacts are followed at most.
+const MOST_ARRIVALS: usize = 32;
+
+/// How often points are solved at most in a step: so often, and so often over the number of points that arrive.
+const SOLVES: [usize; 2] = [64, 8192];
+
+/// Spreads impacts; keeps its memory from step to step.
+#[derive(Debug, Default)]
+pub struct PlasticImpacts {
+    /// Lanes in which something arrives, of the coloured batches and of the serial ones, and by how much faster than
+    /// what rests can (m/s).
+    pub(super) found: [Vec<(u32, f32)>; 2],
+    /// `[rows]`
+    bodies: Vec<Body>,
+    /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
+    /// `[2 lanes]`
+    next: Vec<u32>,
+    /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
+    listed: Vec<u32>,
+    /// In pairs; a point that is not there, or that bounces, has no mass.
+    points: Vec<Point>,
+    /// Bodies that were pushed since their points were looked at.
+    queue: VecDeque<u32>,
+    /// How often a point was solved in this step.
+    solved: usize,
+}
+
+/// What is known of a body.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    /// Its first end; see `next`.
+    first: u32,
+    /// When it was last pushed (s); −∞ for never.
+    time: f32,
+    is_queued: bool,
+}
+
+/// A body that nothing has pushed.
+const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false };
+
+/// A contact point that may be hit.
+#[derive(Clone, Copy, Debug, Default)]
+struct Point {
+    index: u32,
+    contact: u32,
+    /// Rows of a and b.
+    rows: [u32; 2],
+    /// Impulses change a.
+    pushes_a: bool,
+    normal: [f32; 2],
+    /// r × n and r × t of a and b (m).
+    arms: [[f32; 2]; 2],
+    /// k_nn, k_tt, k_nt (1/kg).
+    k: [f32; 3],
+    /// 1/k_nn (kg).
+    mass: f32,
+    friction: f32,
+    /// At the beginning of the step (m).
+    separation: f32,
+    /// Impulses so far, along n and t (N·s).
+    impulse: [f32; 2],
+    /// When it is hit (s).
+    time: f32,
+}
+
+/// What [`PlasticImpacts::spread`] works on.
+pub(super) struct On<'a> {
+    pub rows: &'a mut [BodyRow],
+    /// Coloured batches, serial ones.
+    pub batches: [&'a mut Batches; 2],
+    pub contacts: &'a mut [Contact],
+    pub features: &'a Features,
+    /// Step (s).
+    pub dt: f32,
+    pub record_impulses: bool,
+}
+
+impl On<'_> {
+    fn lanes(&self) -> usize {
+        self.batches[0].lanes() + self.batches[1].lanes()
+    }
+
+    /// The points of a lane.
+    fn points(&self, lane: u32) -> [Point; 2] {
+        let (lane, lanes) = (lane as usize, self.batches[0].lanes());
+        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        let (batches, width) = (&self.batches[part], self.batches[part].width());
+        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
+        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
+        let (layout, pushes_a) = (Layout::for_features(self.features, segment.opposite), segment.pushes_a());
+        let in_segment = of - segment.first_lane;
+        let vector = segment.first_vector + in_segment / width * segment.stride;
+        let first = vector * width + in_segment % width;
+        let floats: &[f32] = bytemuck::cast_slice(batches.records());
+        let contact = batches.contact()[of];
+        let bounces = self.contacts[contact as usize].restitution > 0.0;
+        let rows = [batches.row_a()[of], batches.row_b()[of]];
+        let at = |quantity: usize| floats[first + quantity * width];
+        std::array::from_fn(|p| {
+            let is_there = p < layout.points && !bounces;
+            let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
+            let mut point = Point { contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+            if mass <= 0.0 {
+                return point;
+            }
+            let arm = |arm: usize, has: bool| {
+                if has { [at(layout.at(p, arm)), at(layout.at(p, arm) + 1)] } else { [0.0; 2] }
+            };
+            let arms = [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])];
+            let inertia =
+                |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
+            let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
+            let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
+            (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
+            point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
+            point.separation = at(layout.at(p, layout.separation));
+            point
+        })
+    }
+}
+
+impl Point {
+    /// Velocity of b against a along n and t (m/s).
+    fn velocity(&self, rows: &[BodyRow]) -> [f32; 2] {
+        let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].velocity), self.normal);
+        let (x, y) = (b[0] - a[0], b[1] - a[1]);
+        let [of_a, of_b] = self.arms;
+        let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
+        std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
+    }
+
+    /// Gap as bodies are now (m).
+    fn gap(&self, rows: &[BodyRow]) -> f32 {
+        let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].delta), self.normal);
+        let moved = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
+        let turned = |angle: f32, [n, t]: [f32; 2]| {
+            let (sine, versine) = turn(angle);
+            sine.mul_add(n, versine * t)
+        };
+        self.separation + moved + turned(b[2], self.arms[1]) - turned(a[2], self.arms[0])
+    }
+
+    /// Impulses `[n, t]` (N·s) on both bodies, at its time.
+    fn push(&self, rows: &mut [BodyRow], [n, t]: [f32; 2]) {
+        let [nx, ny] = self.normal;
+        let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
+        let give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
+            let (row, arm) = (&mut rows[self.rows[body] as usize], self.arms[body]);
+            let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
+            let gained = [mass * x, mass * y, inertia * arm[0].mul_add(n, arm[1] * t)];
+            for (k, gained) in gained.into_iter().enumerate() {
+                row.velocity[k] += gained;
+                row.delta[k] = self.time.neg_mul_add(gained, row.delta[k]);
+            }
+        };
+        give(1, 1.0, rows);
+        if !self.pushes_a {
+            return;
+        }
+        give(0, -1.0, rows);
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+        let gained = apart(0).mul_add(y, -(apart(1) * x));
+        if gained == 0.0 || self.friction == 0.0 {
+            return;
+        }
+        for row in self.rows {
+            let row = &mut rows[row as usize];
+            let turn = 0.5 * gained * row.delta[3];
+            row.velocity[2] -= turn;
+            row.delta[2] = self.time.mul_add(turn, row.delta[2]);
+        }
+    }
+}
+
+impl PlasticImpacts {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let lists = [&self.next, &self.listed];
+        let queue = self.queue.capacity() * size_of::<u32>();
+        let found = held(&self.found[0]) + held(&self.found[1]);
+        lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.bodies) + queue + found
+    }
+
+    /// Lets impacts spread from the lanes in `found`; see the [module](self).
+    pub(super) fn spread(&mut self, on: &mut On<'_>) {
+        self.link(on);
+        let least = self.least();
+        let coloured = on.batches[0].lanes() as u32;
+        for part in 0..2 {
+            for i in 0..self.found[part].len() {
+                let (lane, excess) = self.found[part][i];
+                if excess >= least {
+                    self.list(on, lane + coloured * part as u32);
+                }
+            }
+        }
+        let arrived = self.points.len();
+        let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
+        let slowest = TOLERANCE * fastest;
+        let limit = SOLVES[0] + SOLVES[1] / arrived.max(1);
+        self.solved = 0;
+        for i in 0..arrived {
+            self.visit(on, i, slowest);
+        }
+        while let Some(body) = self.queue.pop_front() {
+            self.bodies[body as usize].is_queued = false;
+            let mut end = self.bodies[body as usize].first;
+            while end != NONE {
+                let lane = end / 2;
+                end = self.next[end as usize];
+                let first = self.list(on, lane);
+                self.visit(on, first, slowest);
+                self.visit(on, first + 1, slowest);
+            }
+            if self.solved > limit {
+                break;
+            }
+        }
+        self.queue.clear();
+        if on.record_impulses {
+            for point in &self.points {
+                let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
+                *sum = [sum[0] + point.impulse[0], sum[1] + point.impulse[1]];
+            }
+        }
+    }
+
+    /// By how much faster than rest a contact has to come in so that no more than [`MOST_ARRIVALS`] do (m/s), or that all
+    /// which do are equally fast.
+    fn least(&self) -> f32 {
+        let mut least = 0.0;
+        let all = || self.found.iter().flatten().map(|&(_, excess)| excess);
+        let mut count = self.found[0].len() + self.found[1].len();
+        while count > MOST_ARRIVALS {
+            least = all().filter(|&excess| excess >= least).sum::<f32>() / count as f32;
+            let left = all().filter(|&excess| excess >= least).count();
+            if left == count {
+                break;
+            }
+            count = left;
+        }
+        least
+    }
+
+    /// Links the ends of each body.
+    fn link(&mut self, on: &On<'_>) {
+        let (bodies, lanes) = (on.rows.len(), on.lanes());
+        self.bodies.clear();
+        self.bodies.resize(bodies, STILL);
+        self.next.resize(2 * lanes, NONE);
+        self.listed.clear();
+        self.listed.resize(lanes, NONE);
+        self.points.clear();
+        let mut end = 0;
+        for batches in &on.batches {
+            for (&a, &b) in batches.row_a().iter().zip(batches.row_b()) {
+                for body in [a, b] {
+                    // The last row is that of empty lanes.
+                    if (body as usize) < bodies - 1 {
+                        self.next[end] = std::mem::replace(&mut self.bodies[body as usize].first, end as u32);
+                    }
+                    end += 1;
+                }
+            }
+        }
+    }
+
+    /// The place of the first point of a lane.
+    fn list(&mut self, on: &On<'_>, lane: u32) -> usize {
+        let listed = &mut self.listed[lane as usize];
+        if *listed == NONE {
+            *listed = self.points.len() as u32;
+            self.points.extend(on.points(lane));
+        }
+        *listed as usize
+    }
+
+    /// Solves a point, if it comes in faster than `slowest` (m/s) or has been hit.
+    #[inline(always)]
+    fn visit(&mut self, on: &mut On<'_>, place: usize, slowest: f32) {
+        let point = &mut self.points[place];
+        if point.mass <= 0.0 {
+            return;
+        }
+        let [vn, vt] = point.velocity(on.rows);
+        if point.impulse[0] == 0.0 {
+            if vn >= -slowest {
+                return;
+            }
+            let gap = point.gap(on.rows);
+            if vn.mul_add(AHEAD * on.dt, gap) >= 0.0 {
+                return;
+            }
+            let time = gap / -vn;
+            point.time = if time < -on.dt { 0.0 } else { time };
+        }
+        for row in point.rows {
+            point.time = point.time.max(self.bodies[row as usize].time);
+        }
+        let old = point.impulse;
+        let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
+        self.solved += 1;
+        let delta = [new[0] - old[0], new[1] - old[1]];
+        if point.k[0] * (delta[0].abs() + delta[1].abs()) <= slowest {
+            return;
+        }
+        point.impulse = new;
+        point.push(on.rows, delta);
+        for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
+            let body = &mut self.bodies[row as usize];
+            if !is_pushed {
+                continue;
+            }
+            body.time = body.time.max(point.time);
+            if !std::mem::replace(&mut body.is_queued, true) {
+                self.queue.push_back(row);
+            }
+        }
+    }
+}

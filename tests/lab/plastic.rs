@@ -1,0 +1,103 @@
+//! Laws of impacts without restitution, under the solver that stops them before the step.
+
+use proptest::prelude::*;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::{DEFAULT, find};
+use simpulse::engine::world::World;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+
+/// Linear momentum (N·s), angular momentum (N·m·s) and kinetic energy (J).
+fn totals(world: &World) -> [f64; 4] {
+    let b = &world.bodies;
+    (0..b.len()).fold([0.0; 4], |[px, py, spin, energy], i| {
+        let (m, inertia) = (1.0 / f64::from(b.inv_mass[i]), 1.0 / f64::from(b.inv_inertia[i]));
+        let [x, y] = b.center(i);
+        let [vx, vy, w] = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+        [
+            px + m * vx,
+            py + m * vy,
+            spin + m * (x * vy - y * vx) + inertia * w,
+            energy + 0.5 * (m * (vx * vx + vy * vy) + inertia * w * w),
+        ]
+    })
+}
+
+fn pair(
+    angles: [f64; 2],
+    offset: f64,
+    speed: [f64; 2],
+    spins: [f64; 2],
+    friction: f64,
+    density: f64,
+) -> Scene {
+    let boxed = |half: f64| SceneShape::rectangle(half, 0.5).friction(friction);
+    let bodies = vec![
+        SceneBody::dynamic([0.0, 0.0], boxed(0.8)).moving([0.0, 0.0], spins[0]).turned(angles[0]),
+        SceneBody::dynamic([-2.0, offset], boxed(0.5).density(density))
+            .moving(speed, spins[1])
+            .turned(angles[1]),
+    ];
+    Scene::new("pair", bodies).weightless()
+}
+
+proptest! {
+    /// Two free boxes that hit each other anywhere keep both momenta and make no energy.
+    #[test]
+    fn momenta_are_kept_and_no_energy_is_made(
+        angles in [-1.5f64..1.5, -1.5..1.5],
+        offset in -0.8f64..0.8,
+        speed in [3f64..10.0, -1.0..1.0],
+        spins in [-4f64..4.0, -4.0..4.0],
+        friction in 0f64..1.0,
+        density in 0.2f64..5.0,
+    ) {
+        let scene = pair(angles, offset, speed, spins, friction, density);
+        let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+        let before = totals(&world);
+        for _ in 0..60 {
+            world.step().unwrap();
+        }
+        let after = totals(&world);
+        let scale = before[0].hypot(before[1]).max(1.0);
+        for k in 0..2 {
+            prop_assert!((after[k] - before[k]).abs() < 1e-5 * scale, "{before:?} {after:?}");
+        }
+        // A gap that closes within a step without having been foreseen is off by v dt (see `papers/shim.md`).
+        prop_assert!((after[2] - before[2]).abs() < 0.01 * scale, "{before:?} {after:?}");
+        prop_assert!(after[3] < 1.0001 * before[3], "{before:?} {after:?}");
+    }
+}
+
+#[test]
+fn impacts_of_a_crowd_have_the_same_bits_at_every_width() {
+    let mut bodies = Vec::new();
+    for i in 0..60 {
+        let (x, y) = (f64::from(i % 10), f64::from(i / 10));
+        let shape = if i % 3 == 0 { SceneShape::disc(0.48) } else { SceneShape::rectangle(0.48, 0.45) };
+        let body = SceneBody::dynamic([1.02 * x, 1.02 * y], shape);
+        let (sin, cos) = f64::from(i).sin_cos();
+        bodies.push(body.moving([8.0 * cos - x, 8.0 * sin - y], 3.0 * sin));
+    }
+    let scene = Scene::new("crowd", bodies).weightless();
+    let hash = |width| {
+        let settings = crate::common::with_width(find(DEFAULT).unwrap(), width);
+        crate::common::run(&scene, settings, 60).state_hash()
+    };
+    let one = hash(LaneWidth::W1);
+    for width in [LaneWidth::W4, LaneWidth::W8, LaneWidth::W16] {
+        assert_eq!(hash(width), one, "{width:?}");
+    }
+}
+
+#[test]
+fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
+    // 4 m/s, from heights that leave parts of a step.
+    for height in [0.005, 0.012, 0.03, 0.05] {
+        let ground = SceneBody::fixed([0.0, 0.0], SceneShape::line(5.0));
+        let falling = SceneBody::dynamic([0.0, 0.5 + height], SceneShape::disc(0.5)).moving([0.0, -4.0], 0.0);
+        let scene = Scene::new("landing", vec![ground, falling]).weightless();
+        let world = crate::common::run(&scene, crate::common::settings(find(DEFAULT).unwrap()), 3);
+        let [_, y] = world.bodies.center(1);
+        assert!((y - 0.5).abs() < 1e-6 && world.bodies.velocity_y[1].abs() < 1e-6, "{height}: {y}");
+    }
+}
