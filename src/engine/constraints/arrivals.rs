@@ -21,8 +21,8 @@ pub(super) struct Arrivals<'a> {
     pub slowest: f32,
     /// Least that forces add to the speed of a dynamic body in a step (m/s).
     pub least_gain: f32,
-    /// Lanes of the contacts that are hit, in order, and how much faster than rest (m/s).
-    pub found: RefCell<&'a mut Vec<(u32, f32)>>,
+    /// Lanes of the contacts that are hit, in order: all of them, or more than are followed.
+    pub found: RefCell<&'a mut Vec<u32>>,
 }
 
 impl Pass for Arrivals<'_> {
@@ -39,6 +39,9 @@ impl Pass for Arrivals<'_> {
         });
     }
 }
+
+/// More contacts that are hit at once are not followed.
+pub(super) const MOST: usize = 32;
 
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
@@ -65,6 +68,9 @@ fn arrivals<L: Lanes>(
     let least = if between_dynamic { slowest.max(2.0 * FASTER * least_gain) } else { slowest };
     for (batch, (record, (row_a, row_b))) in records.enumerate() {
         let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        if found.borrow().len() > MOST {
+            return;
+        }
         // No body has moved yet.
         let b = L::gather(rows, row_b);
         let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
@@ -103,7 +109,7 @@ fn arrivals<L: Lanes>(
             let first = batch * L::WIDTH;
             for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| hit[lane] > 0.0) {
                 if contacts[contact.entries()[first + lane] as usize].restitution == 0.0 {
-                    found.borrow_mut().push(((segment.first_lane + first + lane) as u32, hit[lane]));
+                    found.borrow_mut().push((segment.first_lane + first + lane) as u32);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! What a solver sees: passes over bodies and over constraints, to be called in its own order.
 
-use super::arrivals::Arrivals;
+use super::arrivals::{self, Arrivals};
 use super::batches::Batches;
 use super::block::{BlockSweep, Parting};
 use super::bounces::Bounces;
@@ -672,9 +672,9 @@ impl<'a> Passes<'a> {
                 found.clear();
                 self.over_part(part, &Arrivals { h, dt, slowest, least_gain, found: RefCell::new(found) });
             }
-            let any = found.iter().any(|found| !found.is_empty());
+            let count: usize = found.iter().map(Vec::len).sum();
             self.work.plastic.found = found;
-            if any {
+            if (1..=arrivals::MOST).contains(&count) {
                 let Workspace { rows, lanes, serial, plastic, .. } = &mut *self.work;
                 let (features, record_impulses) = (&self.input.features, self.input.record_impulses);
                 let batches = [lanes, serial];

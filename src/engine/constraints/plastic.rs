@@ -25,9 +25,9 @@
 //!
 //! # How far
 //!
-//! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: only the
-//! fastest [`MOST_ARRIVALS`] are followed, and the fewer there are, the farther. What still comes in is stopped by
-//! the solver.
+//! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: more than
+//! [`super::arrivals::MOST`] are left to the solver. The fewer there are, the farther they are followed. What comes in even
+//! then is stopped by the solver, and no body is displaced: one might be into a third that nobody has looked at.
 
 use super::arrivals::AHEAD;
 use super::batches::Batches;
@@ -45,18 +45,14 @@ const NONE: u32 = u32::MAX;
 /// Impacts spread until nothing comes in faster than this part of the fastest (1).
 const TOLERANCE: f32 = 1e-4;
 
-/// Contacts whose impacts are followed at most.
-const MOST_ARRIVALS: usize = 32;
-
 /// How often points are solved at most in a step: so often, and so often over the number of points that arrive.
 const SOLVES: [usize; 2] = [64, 8192];
 
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Debug, Default)]
 pub struct PlasticImpacts {
-    /// Lanes in which something arrives, of the coloured batches and of the serial ones, and by how much faster than
-    /// what rests can (m/s).
-    pub(super) found: [Vec<(u32, f32)>; 2],
+    /// Lanes in which something arrives, of the coloured batches and of the serial ones.
+    pub(super) found: [Vec<u32>; 2],
     /// `[rows]`
     bodies: Vec<Body>,
     /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
@@ -232,14 +228,9 @@ impl PlasticImpacts {
     /// Lets impacts spread from the lanes in `found`; see the [module](self).
     pub(super) fn spread(&mut self, on: &mut On<'_>) {
         self.link(on);
-        let least = self.least();
-        let coloured = on.batches[0].lanes() as u32;
-        for part in 0..2 {
+        for (part, first) in [0, on.batches[0].lanes() as u32].into_iter().enumerate() {
             for i in 0..self.found[part].len() {
-                let (lane, excess) = self.found[part][i];
-                if excess >= least {
-                    self.list(on, lane + coloured * part as u32);
-                }
+                self.list(on, first + self.found[part][i]);
             }
         }
         let arrived = self.points.len();
@@ -261,6 +252,7 @@ impl PlasticImpacts {
                 self.visit(on, first + 1, slowest);
             }
             if self.solved > limit {
+                self.put_back(on.rows);
                 break;
             }
         }
@@ -273,21 +265,11 @@ impl PlasticImpacts {
         }
     }
 
-    /// By how much faster than rest a contact has to come in so that no more than [`MOST_ARRIVALS`] do (m/s), or that all
-    /// which do are equally fast.
-    fn least(&self) -> f32 {
-        let mut least = 0.0;
-        let all = || self.found.iter().flatten().map(|&(_, excess)| excess);
-        let mut count = self.found[0].len() + self.found[1].len();
-        while count > MOST_ARRIVALS {
-            least = all().filter(|&excess| excess >= least).sum::<f32>() / count as f32;
-            let left = all().filter(|&excess| excess >= least).count();
-            if left == count {
-                break;
-            }
-            count = left;
+    /// Bodies stay where they are: nothing has looked yet at what they were displaced into.
+    fn put_back(&self, rows: &mut [BodyRow]) {
+        for (row, _) in rows.iter_mut().zip(&self.bodies).filter(|(_, body)| body.time > STILL.time) {
+            row.delta[..3].fill(0.0);
         }
-        least
     }
 
     /// Links the ends of each body.
