@@ -26,7 +26,8 @@
 //! | overlap is pushed apart no faster than 3 m/s | the cap |
 //! | the distance from the origin and the length of a step do not matter | positions keep what their sums round away |
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
-//! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step |
+//! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step, without restitution from each body that is pushed to those it touches |
+//! | impacts and pushes keep angular momentum | spins give back what the displacement of arms adds |
 //! | discs roll without lifting off | their contact points do not turn with them |
 //! | on a held body friction acts at the own surface, however deep | contact points lie there, and midway between two bodies that move |
 //! | discs feel only what they touch | their gaps are those at the end of their way |
@@ -47,7 +48,8 @@
 //!   that exceeds tan θ by little takes long to stop that.
 //! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometre sees the
 //!   side of the next tile (A24.tiles).
-//! - **Plastic impacts through rows.** A substep sweeps twice, and its impulses are where the next one starts.
+//! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or an impact runs through more than
+//!   ten bodies, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
