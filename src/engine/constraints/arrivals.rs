@@ -21,6 +21,8 @@ pub(super) struct Arrivals<'a> {
     pub slowest: f32,
     /// Least that forces add to the speed of a dynamic body in a step (m/s).
     pub least_gain: f32,
+    /// No point of a body is faster (m/s).
+    pub fastest: f32,
     /// Lanes of the contacts that are hit, in order: all of them, or more than are followed.
     pub found: RefCell<&'a mut Vec<u32>>,
 }
@@ -58,14 +60,17 @@ fn arrivals<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &Arrivals { h, dt, slowest, least_gain, ref found }: &Arrivals<'_>,
+    &Arrivals { h, dt, slowest, least_gain, fastest, ref found }: &Arrivals<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
+    let least = if between_dynamic { slowest.max(2.0 * FASTER * least_gain) } else { slowest };
+    if 2.0 * fastest <= least {
+        return;
+    }
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let quads: &[Quad] = bytemuck::cast_slice(increments);
     let (zero, per_step) = (L::zero(), L::splat(FASTER * dt / h));
-    let least = if between_dynamic { slowest.max(2.0 * FASTER * least_gain) } else { slowest };
     for (batch, (record, (row_a, row_b))) in records.enumerate() {
         let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
         if found.borrow().len() > MOST {

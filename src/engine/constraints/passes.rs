@@ -666,11 +666,14 @@ impl<'a> Passes<'a> {
             return;
         }
         let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
-        if let Some([slowest, least_gain]) = self.least_impact(dt) {
+        if let Some([slowest, least_gain, fastest]) = self.impact_speeds(dt) {
             let mut found = std::mem::take(&mut self.work.plastic.found);
             for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(&mut found) {
                 found.clear();
-                self.over_part(part, &Arrivals { h, dt, slowest, least_gain, found: RefCell::new(found) });
+                self.over_part(
+                    part,
+                    &Arrivals { h, dt, slowest, least_gain, fastest, found: RefCell::new(found) },
+                );
             }
             let count: usize = found.iter().map(Vec::len).sum();
             self.work.plastic.found = found;
@@ -693,26 +696,30 @@ impl<'a> Passes<'a> {
         self.clock.lap(Phase::Prepare);
     }
 
-    /// Speed below which nothing is an impact, and the least that forces add to the speed of a dynamic body in a step
-    /// (m/s); none if no body is as fast.
-    fn least_impact(&self, dt: f32) -> Option<[f32; 2]> {
+    /// Speed below which nothing is an impact, the least that forces add to the speed of a dynamic body in a step, and
+    /// a speed that no point of a body exceeds (m/s); none if that is slower than an impact.
+    fn impact_speeds(&self, dt: f32) -> Option<[f32; 3]> {
         /// Part of what forces make in a step (1).
         const SLOW: f32 = 0.01;
-        /// Turn in a step (rad).
-        const SLOW_TURN: f32 = 1e-5;
+        /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
+        const REACH: f32 = 3.0;
         let Workspace { rows, motion, .. } = &*self.work;
         let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
-        let gains = || {
-            let all = rows.iter().zip(motion.velocity_increments());
-            all.filter(|(row, _)| row.velocity[3] > 0.0).map(|(_, increment)| square(increment))
-        };
-        let per_step = |square: f32| square.sqrt() * self.input.budget.substeps as f32;
-        let slowest = SLOW * per_step(gains().fold(0.0, f32::max));
-        let moves = |row: &BodyRow| {
-            square(&row.velocity) > slowest * slowest || (dt * row.velocity[2]).abs() > SLOW_TURN
-        };
-        let least_gain = || per_step(gains().fold(f32::INFINITY, f32::min));
-        rows.iter().any(moves).then(|| [slowest, least_gain()])
+        let (mut fastest, mut most, mut least) = (0.0_f32, 0.0_f32, f32::INFINITY);
+        for (BodyRow { velocity, delta }, increment) in rows.iter().zip(motion.velocity_increments()) {
+            let [inv_mass, inv_inertia] = [velocity[3], delta[3]];
+            // (ω R)²: infinite for a kinematic body that turns, NaN, which is never the maximum, for one that does not.
+            let gyration = REACH.mul_add(REACH * inv_mass, f32::MIN_POSITIVE) / inv_inertia;
+            let straight = square(velocity);
+            fastest = fastest.max(straight).max((velocity[2] * velocity[2]).mul_add(gyration, straight));
+            let gained = square(increment);
+            most = most.max(if inv_mass > 0.0 { gained } else { 0.0 });
+            least = least.min(if inv_mass > 0.0 { gained } else { f32::INFINITY });
+        }
+        let [slowest, least] = [SLOW * most.sqrt(), least.sqrt()].map(|gained| gained * dt / self.input.h);
+        // |v| + |ω| R ≤ √2 √(v² + ω² R²)
+        let fastest = (2.0 * fastest).sqrt();
+        (fastest > slowest).then_some([slowest, least, fastest])
     }
 
     /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
