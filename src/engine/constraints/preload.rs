@@ -81,7 +81,7 @@ use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::rules::{Soft, Softness};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::Lanes;
+use crate::engine::lanes::{Lanes, prefetch_quad};
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
 /// Follows the load and shortens the springs; see the [module](self).
@@ -114,6 +114,9 @@ const LEFT: f32 = 2e-5;
 /// τ: time in which overlap goes that a contact was placed with (s). Longer, the card house falls at 30 steps a
 /// second; shorter, it is thrown over at 240.
 const PLACED_TIME: f32 = 0.1;
+
+/// Batches between asking for contacts and reading them.
+const AHEAD: usize = 3;
 
 /// Part by which an impulse may be short of another by rounding (1).
 const ROUNDED: f32 = 1e-5;
@@ -159,6 +162,13 @@ fn preload_segment<L: Lanes>(
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
         let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
+        let ahead = (batch + AHEAD) * L::WIDTH;
+        let coming =
+            contact.entries().get(ahead..(ahead + L::WIDTH).min(contact.entries().len())).unwrap_or(&[]);
+        prefetch_quad::<{ quad::STRIDE }, { quad::PRELOAD }>(
+            bytemuck::cast_slice(contacts),
+            coming.iter().copied(),
+        );
         let (mut impulse, mut mass, mut lowest) = (zero, zero, zero);
         for p in 0..layout.points {
             lowest = lowest.min(record[layout.at(p, layout.separation)]);

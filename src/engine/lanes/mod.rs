@@ -24,7 +24,7 @@ mod width;
 pub use aligned::{Block, LaneVec, held};
 pub use counted::{Counted, Operations};
 pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
-pub use quads::{Quad, prefetch, prefetch_records};
+pub use quads::{Quad, prefetch, prefetch_quad, prefetch_records};
 pub use rows::BodyRow;
 pub use store::{RowColumns, RowStore};
 pub use vector::{FUSED, Lanes};

@@ -86,6 +86,23 @@ pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterato
     let _ = (quads, index);
 }
 
+/// Asks for quad `OFFSET` of records of `STRIDE` quads before they are needed.
+#[inline(always)]
+pub fn prefetch_quad<const STRIDE: usize, const OFFSET: usize>(
+    quads: &[Quad],
+    index: impl Iterator<Item = u32>,
+) {
+    #[cfg(target_arch = "x86_64")]
+    for i in index {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let quad = quads.as_ptr().wrapping_add(i as usize * STRIDE + OFFSET);
+        // SAFETY: a hint; it faults at no address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(quad.cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (quads, index);
+}
+
 #[inline(always)]
 pub fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 1]>) -> [f32; 4] {
     let [i] = *checked::<_, S, O>(quads, index);
