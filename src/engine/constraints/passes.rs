@@ -666,6 +666,7 @@ impl<'a> Passes<'a> {
             return;
         }
         let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
+        self.work.plastic.earn(self.contacts.len());
         if let Some([slowest, least_gain, fastest]) = self.impact_speeds(dt) {
             let mut found = std::mem::take(&mut self.work.plastic.found);
             for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(&mut found) {

@@ -26,8 +26,10 @@
 //! # How far
 //!
 //! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: more than
-//! [`super::arrivals::MOST`] are left to the solver. The fewer there are, the farther they are followed. What comes in even
-//! then is stopped by the solver, and no body is displaced: one might be into a third that nobody has looked at.
+//! [`super::arrivals::MOST`] are left to the solver. Fewer are followed as far as they go if that is rare, as when
+//! something heavy falls on a pile: there are [`MOST_SPENT`] visits for that, which are earned anew by one for
+//! [`EARNING`] contacts in a step, a thirtieth of what a step costs. What comes in even then is stopped by the
+//! solver, and no body is displaced: one might be into a third that nobody has looked at.
 
 use super::arrivals::AHEAD;
 use super::batches::Batches;
@@ -45,8 +47,14 @@ const NONE: u32 = u32::MAX;
 /// Impacts spread until nothing comes in faster than this part of the fastest (1).
 const TOLERANCE: f32 = 1e-4;
 
-/// How often points are solved at most in a step: so often, and so often over the number of points that arrive.
+/// How often points are solved in any step: so often, and so often over the number of points that arrive.
 const SOLVES: [usize; 2] = [64, 8192];
+
+/// How often they are solved beyond that, until it has been earned again.
+const MOST_SPENT: usize = 1 << 18;
+
+/// Contacts of a step that earn one visit (1).
+const EARNING: usize = 8;
 
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Debug, Default)]
@@ -66,6 +74,8 @@ pub struct PlasticImpacts {
     queue: VecDeque<u32>,
     /// How often a point was solved in this step.
     solved: usize,
+    /// How often points were solved in the last steps beyond what any step may, less what has been earned since.
+    pub(crate) spent: usize,
 }
 
 /// What is known of a body.
@@ -225,6 +235,11 @@ impl PlasticImpacts {
         lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.bodies) + queue + found
     }
 
+    /// Begins a step with so many contacts.
+    pub(super) fn earn(&mut self, contacts: usize) {
+        self.spent = self.spent.saturating_sub(contacts / EARNING);
+    }
+
     /// Lets impacts spread from the lanes in `found`; see the [module](self).
     pub(super) fn spread(&mut self, on: &mut On<'_>) {
         self.link(on);
@@ -236,7 +251,8 @@ impl PlasticImpacts {
         let arrived = self.points.len();
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
         let slowest = TOLERANCE * fastest;
-        let limit = SOLVES[0] + SOLVES[1] / arrived.max(1);
+        let always = SOLVES[0] + SOLVES[1] / arrived.max(1);
+        let limit = always + (MOST_SPENT - self.spent.min(MOST_SPENT));
         self.solved = 0;
         for i in 0..arrived {
             self.visit(on, i, slowest);
@@ -257,6 +273,7 @@ impl PlasticImpacts {
             }
         }
         self.queue.clear();
+        self.spent += self.solved.saturating_sub(always);
         if on.record_impulses {
             for point in &self.points {
                 let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];

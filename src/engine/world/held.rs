@@ -52,6 +52,8 @@ struct Saved {
     recycled: Recycled,
     found: Found,
     is_changed: bool,
+    /// Visits that impacts have spent.
+    spent: usize,
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -88,6 +90,7 @@ impl World {
             recycled: self.narrow.recycled.clone(),
             found: self.found,
             is_changed: self.narrow.is_changed,
+            spent: self.work.plastic.spent,
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -100,11 +103,12 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, found, is_changed, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, recycled, found, is_changed, spent, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.narrow.recycled.clone_from(recycled);
+        self.work.plastic.spent = *spent;
         // The list is another, but no contact has come or gone.
         (self.found, self.narrow.is_changed, self.lanes_are_for) = (*found, *is_changed, None);
     }
