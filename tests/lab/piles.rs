@@ -248,3 +248,18 @@ fn placed_overlap_goes_in_a_tenth_of_a_second() {
     }
     assert!(overlap < 1e-3, "{overlap}");
 }
+
+/// Boxes of 100, 200 and 300 times the mass of a brick arrive at 6.3 m/s. Their impact reaches the ground in the step in
+/// which it happens, or bricks are thrown out of the pile.
+#[test]
+fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
+    let mut world = scene("high_mass_ratio_1");
+    let heights = world.bodies.position_y.clone();
+    for _ in 0..600 {
+        world.step().unwrap();
+    }
+    for (body, (now, then)) in world.bodies.position_y.iter().zip(heights.iter()).enumerate() {
+        let falls = if *then > 20.0 { 2.0 } else { 0.0 };
+        assert!((now - then + falls).abs() < 0.1, "body {body} is at {now}, and was at {then}");
+    }
+}

@@ -53,6 +53,10 @@ const SOLVES: [usize; 2] = [64, 8192];
 /// How often they are solved beyond that, until it has been earned again.
 const MOST_SPENT: usize = 1 << 18;
 
+/// How often of these a point is: heavy on light needs some thousands, a pair between whose edges friction runs to and
+/// fro without an end has enough then.
+const PER_POINT: usize = 8192;
+
 /// Contacts of a step that earn one visit (1).
 const EARNING: usize = 8;
 
@@ -86,10 +90,12 @@ struct Body {
     /// When it was last pushed (s); −∞ for never.
     time: f32,
     is_queued: bool,
+    /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
+    rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false };
+const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, rounded: [0.0; 3] };
 
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -194,16 +200,19 @@ impl Point {
     }
 
     /// Impulses `[n, t]` (N·s) on both bodies, at its time.
-    fn push(&self, rows: &mut [BodyRow], [n, t]: [f32; 2]) {
+    fn push(&self, rows: &mut [BodyRow], bodies: &mut [Body], [n, t]: [f32; 2]) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
-        let give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
-            let (row, arm) = (&mut rows[self.rows[body] as usize], self.arms[body]);
+        let mut give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
+            let (place, arm) = (self.rows[body] as usize, self.arms[body]);
+            let (row, rounded) = (&mut rows[place], &mut bodies[place].rounded);
             let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
             let gained = [mass * x, mass * y, inertia * arm[0].mul_add(n, arm[1] * t)];
             for (k, gained) in gained.into_iter().enumerate() {
-                row.velocity[k] += gained;
                 row.delta[k] = self.time.neg_mul_add(gained, row.delta[k]);
+                let (before, gained) = (row.velocity[k], gained + rounded[k]);
+                row.velocity[k] = before + gained;
+                rounded[k] = gained - (row.velocity[k] - before);
             }
         };
         give(1, 1.0, rows);
@@ -252,7 +261,7 @@ impl PlasticImpacts {
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
         let slowest = TOLERANCE * fastest;
         let always = SOLVES[0] + SOLVES[1] / arrived.max(1);
-        let limit = always + (MOST_SPENT - self.spent.min(MOST_SPENT));
+        let left = MOST_SPENT.saturating_sub(self.spent);
         self.solved = 0;
         for i in 0..arrived {
             self.visit(on, i, slowest);
@@ -267,7 +276,7 @@ impl PlasticImpacts {
                 self.visit(on, first, slowest);
                 self.visit(on, first + 1, slowest);
             }
-            if self.solved > limit {
+            if self.solved > always + left.min(PER_POINT * self.points.len()) {
                 self.put_back(on.rows);
                 break;
             }
@@ -352,7 +361,7 @@ impl PlasticImpacts {
             return;
         }
         point.impulse = new;
-        point.push(on.rows, delta);
+        point.push(on.rows, &mut self.bodies, delta);
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             let body = &mut self.bodies[row as usize];
             if !is_pushed {

@@ -16,14 +16,13 @@
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that shortens springs and, if something moves, 1 pass that looks for
 //! impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. In
-//! steps in which contacts come or go 1 rigid sweep more, and every 32 of these at most a search of the contact graph.
-//! Sweeps of a step request 5736 B per contact.
+//! steps in which contacts come or go 1 rigid sweep more, and at most every 32 steps, if they have, a search of the
+//! contact graph. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies
 //! slide past each other, angular momentum is conserved to rounding only in impacts that are seen before the step: arms
-//! are those of its beginning, which matters to impacts within it. And where an impact without restitution runs through
-//! a row of more than ten bodies, or many happen at once: visits are limited, and what is left the sweeps of a substep
-//! spread by two bodies each.
+//! are those of its beginning, which matters to impacts within it. And where impacts without restitution are many: only
+//! 32 contacts at once are followed, and the sweeps of a substep spread what is left by two bodies each.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

@@ -48,8 +48,8 @@
 //!   that exceeds tan θ by little takes long to stop that.
 //! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometre sees the
 //!   side of the next tile (A24.tiles).
-//! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or an impact runs through more than
-//!   ten bodies, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
+//! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or impacts that run far are not
+//!   rare, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
