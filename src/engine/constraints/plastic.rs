@@ -5,7 +5,7 @@
 //! That of [`super::impact`] with e = 0, at all points together: each has v_n⁺ ≥ 0, an impulse only where v_n⁺ = 0,
 //! and Coulomb's friction on the impulses of the whole impact. Gauss–Seidel on accumulated impulses, from point to point
 //! as an impact spreads: where a body is pushed, its other points are looked at next, until nothing comes in by more
-//! than [`TOLERANCE`] of the fastest arrival. So a row of boxes goes on together, and what
+//! than a ten-thousandth of the fastest arrival. So a row of boxes goes on together, and what
 //! nothing hits costs nothing.
 //!
 //! # When in the step
@@ -26,9 +26,9 @@
 //! # How far
 //!
 //! Many impacts at once, as in a drum, are a load on many bodies, and their effects overlap: more than
-//! [`super::arrivals::MOST`] are left to the solver. Fewer are followed as far as they go if that is rare, as when
-//! something heavy falls on a pile: there are [`MOST_SPENT`] visits for that, which are earned anew by one for
-//! [`EARNING`] contacts in a step, a thirtieth of what a step costs. What comes in even then is stopped by the
+//! 32 contacts are left to the solver. Fewer are followed as far as they go if that is rare, as when
+//! something heavy falls on a pile: there are 2¹⁸ visits for that, which are earned anew by one for
+//! 8 contacts in a step, a thirtieth of what a step costs. What comes in even then is stopped by the
 //! solver, and no body is displaced: one might be into a third that nobody has looked at.
 
 use super::arrivals::AHEAD;
