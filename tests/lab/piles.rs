@@ -206,10 +206,8 @@ fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
 #[test]
 fn a_house_of_cards_that_begins_in_itself_stands_at_any_step() {
     for rate in [30, 40, 60, 90, 120, 240, 480] {
-        let entry = common::scene("card_house");
-        let mut world = entry
-            .build(Settings { dt: 1.0 / rate as f32, ..common::settings(solvers::find("shim").unwrap()) })
-            .unwrap();
+        let mut world = scene("card_house");
+        world.settings.dt = 1.0 / rate as f32;
         let heights = world.bodies.position_y.clone();
         for _ in 0..4 * rate {
             world.step().unwrap();

@@ -6,6 +6,7 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OppositeKind};
+use super::impact::AHEAD;
 use super::pass::{Pass, PassInput, PerLane};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
@@ -44,9 +45,6 @@ impl Pass for Arrivals<'_> {
 
 /// More contacts that are hit at once are not followed.
 pub(super) const MOST: usize = 32;
-
-/// A point is looked at for a tenth of its way further than it gets in the step (1).
-pub(super) const AHEAD: f32 = 1.1;
 
 /// How much faster than what forces make in a step something comes in (1). Slower impacts are left to soft contacts, as
 /// loads are: a house of cards that is built with air below its cards comes down on them in its first steps.

@@ -214,11 +214,7 @@ fn segment<
             v[p] = with_arms::<L, N, O>(along_n, progress.w, arm[p]);
             if has_friction && NORMAL_FIRST {
                 let vt = with_arms::<L, N, O>(along_t, progress.w, arm_t);
-                let at = layout.at(p, layout.tangent_impulse);
-                let (old, slope) =
-                    (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
-                (tangent.arm[p], tangent.slope[p], tangent.old[p]) = (arm_t, slope, old);
-                tangent.impulse[p] = slope.neg_mul_add(vt, old);
+                tangent.load_friction(p, record, &layout, rule, arm_t, vt);
             }
         }
         let mut coupling = L::zero();
@@ -244,19 +240,8 @@ fn segment<
             }
         }
         if has_friction && NORMAL_FIRST {
-            let friction = record[layout.friction];
-            for p in 0..N::POINTS {
-                let bound = friction * new[p];
-                let new = tangent.impulse[p].min(bound).max(-bound);
-                record[layout.at(p, layout.tangent_impulse)] = new;
-                let delta = new - tangent.old[p];
-                progress.sum[1] = progress.sum[1] + delta;
-                let arm = tangent.arm[p];
-                for q in p + 1..N::POINTS {
-                    tangent.answer::<N, O>(q, mass_sum, inertia, arm, delta);
-                }
-                spin::<L, N, O>(&mut progress.w, inertia, arm, delta);
-            }
+            tangent.solve_friction::<N, O>(record, &layout, new, mass_sum, inertia, &mut progress.w);
+            progress.sum[1] = tangent.sum;
         }
         if const { PARTING && O::HAS_ROW && N::FRICTION && R::FRICTION } {
             let slides = along_t.max(-along_t) - L::splat(slowest);

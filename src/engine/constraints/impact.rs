@@ -67,6 +67,9 @@ pub(super) struct Book;
 const FIRST: usize = 3;
 const PER_POINT: usize = 3;
 
+/// A point is looked at for a tenth of its way further than it gets in the step (1).
+pub(super) const AHEAD: f32 = 1.1;
+
 impl Pass for Load {
     fn traffic(&self, _: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane { halves: 0, ..PerLane::of_bodies(1, FIRST, opposite) }
@@ -183,9 +186,9 @@ fn wave<L: Lanes>(
         let (a, e, threshold) = (side[0], side[1], side[2]);
         for p in 0..layout.points {
             let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
-            // Where it would be at the end of the step, a tenth of its way further.
+            // Where it would be at the end of the step, and further.
             let fall = a * L::splat(0.5 * (dt + h));
-            let closes = (v - fall).mul_add(dt_lanes * L::splat(1.1), s);
+            let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
             let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
             let target = rebound(e * e * energy, a, s, *h);
             let is_fast = (-threshold - v).select_positive(target, zero);

@@ -195,6 +195,11 @@ impl<'a> Passes<'a> {
         self.input.h
     }
 
+    /// Step (s).
+    pub fn dt(&self) -> f32 {
+        self.input.h * self.input.budget.substeps as f32
+    }
+
     /// The solver's own parameter of this index in [`crate::engine::solvers::Variant::parameters`].
     pub fn parameter(&self, index: usize) -> f32 {
         self.input.parameters[index]
@@ -411,7 +416,7 @@ impl<'a> Passes<'a> {
     /// Constraint pass: shortens the springs of the coming sweeps by the part `share` of what they sag under
     /// the impulses so far, of which a step takes over the part `rate`; see `preload.rs`.
     pub fn preload(&mut self, springs: Soft, share: f32, rate: f32) {
-        let (h, dt) = (self.h(), self.h() * self.input.budget.substeps as f32);
+        let (h, dt) = (self.h(), self.dt());
         self.run(Phase::Prepare, &Preload { springs, share, rate, h, dt });
     }
 
@@ -629,7 +634,7 @@ impl<'a> Passes<'a> {
 
     /// Lets bounce what comes in, wave by wave; see [`super::impact`].
     fn bounce_before(&mut self) {
-        let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
+        let (h, dt) = (self.h(), self.dt());
         self.over_contacts(&impact::Load { h, dt });
         for _ in 0..IMPACT_WAVES {
             let wave = impact::Wave { h, dt, found: Cell::new(0.0) };
@@ -665,7 +670,7 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(Phase::Prepare) {
             return;
         }
-        let (h, dt) = (self.input.h, self.input.h * self.input.budget.substeps as f32);
+        let (h, dt) = (self.h(), self.dt());
         self.work.plastic.earn(self.contacts.len());
         if let Some([slowest, least_gain, fastest]) = self.impact_speeds(dt) {
             let mut found = std::mem::take(&mut self.work.plastic.found);

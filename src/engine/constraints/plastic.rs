@@ -31,10 +31,9 @@
 //! 8 contacts in a step, a thirtieth of what a step costs. What comes in even then is stopped by the
 //! solver, and no body is displaced: one might be into a third that nobody has looked at.
 
-use super::arrivals::AHEAD;
 use super::batches::Batches;
 use super::features::{Features, Layout};
-use super::impact::rough_impulses;
+use super::impact::{AHEAD, rough_impulses};
 use super::segment::Segment;
 use super::sweep::turn;
 use crate::engine::contacts::Contact;

@@ -162,13 +162,9 @@ fn preload_segment<L: Lanes>(
     let records = records.chunks_exact_mut(layout.stride);
     for (batch, (record, index)) in records.zip(contact.batches::<L::Index>()).enumerate() {
         let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
-        let ahead = (batch + AHEAD) * L::WIDTH;
-        let coming =
-            contact.entries().get(ahead..(ahead + L::WIDTH).min(contact.entries().len())).unwrap_or(&[]);
-        prefetch_quad::<{ quad::STRIDE }, { quad::PRELOAD }>(
-            bytemuck::cast_slice(contacts),
-            coming.iter().copied(),
-        );
+        for &coming in contact.entries_of(batch + AHEAD, L::WIDTH) {
+            prefetch_quad::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), coming);
+        }
         let (mut impulse, mut mass, mut lowest) = (zero, zero, zero);
         for p in 0..layout.points {
             lowest = lowest.min(record[layout.at(p, layout.separation)]);

@@ -35,9 +35,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
     for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
         // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
-        let ahead = (batch + AHEAD) * L::WIDTH;
-        let ahead = ahead..(ahead + L::WIDTH).min(contact.entries().len());
-        let coming = contact.entries().get(ahead).unwrap_or(&[]);
+        let coming = contact.entries_of(batch + AHEAD, L::WIDTH);
         prefetch_records::<STRIDE>(quads, coming.iter().copied());
         // Only a segment's last batch has empty lanes. They read a contact and ignore it.
         let mut present = L::splat(1.0);

@@ -284,13 +284,13 @@ pub(super) fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(
 /// The rows of a contact along one axis.
 pub(super) struct Rows<L> {
     /// Of bodies a and b, per point.
-    pub(super) arm: [[L; 2]; 2],
+    arm: [[L; 2]; 2],
     /// s: what a unit of velocity takes away (kg).
-    pub(super) slope: [L; 2],
+    slope: [L; 2],
     /// c − s v, unclamped, at the velocity so far (N·s).
-    pub(super) impulse: [L; 2],
+    impulse: [L; 2],
     /// Accumulated impulse before the sweep (N·s).
-    pub(super) old: [L; 2],
+    old: [L; 2],
     /// What the rows have applied (N·s).
     pub(super) sum: L,
 }
@@ -320,6 +320,49 @@ impl<L: Lanes> Rows<L> {
             }
         }
         self.impulse[q] = (self.slope[q] * k).neg_mul_add(delta, self.impulse[q]);
+    }
+
+    /// Reads the friction row of point `p`, whose arms are `arm` and which slides at `vt` (m/s).
+    #[inline(always)]
+    pub(super) fn load_friction<R: NormalRule>(
+        &mut self,
+        p: usize,
+        record: &[L],
+        layout: &Layout,
+        rule: R,
+        arm: [L; 2],
+        vt: L,
+    ) {
+        let slope = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
+        let old = record[layout.at(p, layout.tangent_impulse)];
+        self.impulse[p] = slope.neg_mul_add(vt, old);
+        (self.arm[p], self.slope[p], self.old[p]) = (arm, slope, old);
+    }
+
+    /// Solves the friction rows one after the other, bounded by `normal` impulses; `w` are the spins.
+    #[inline(always)]
+    pub(super) fn solve_friction<N: KernelFeatures, O: Opposite>(
+        &mut self,
+        record: &mut [L],
+        layout: &Layout,
+        normal: [L; 2],
+        mass_sum: L,
+        inertia: [L; 2],
+        w: &mut [L; 2],
+    ) {
+        let friction = record[layout.friction];
+        for p in 0..N::POINTS {
+            let bound = friction * normal[p];
+            let new = self.impulse[p].min(bound).max(-bound);
+            record[layout.at(p, layout.tangent_impulse)] = new;
+            let delta = new - self.old[p];
+            self.sum = self.sum + delta;
+            let arm = self.arm[p];
+            for q in p + 1..N::POINTS {
+                self.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+            }
+            spin::<L, N, O>(w, inertia, arm, delta);
+        }
     }
 }
 
@@ -358,7 +401,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
             if R::TURNED {
                 [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
             }
-            (normal.arm[p], tangent.arm[p]) = (arm_n, arm_t);
+            normal.arm[p] = arm_n;
             let mass = record[layout.at(p, layout.normal_mass)];
             let old = record[layout.at(p, layout.normal_impulse)];
             let [constant, slope] = rule.line(!pushes_a, separation, mass, old);
@@ -366,11 +409,8 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
             normal.impulse[p] = slope.neg_mul_add(vn, constant);
             (normal.slope[p], normal.old[p]) = (slope, old);
             if friction_rows {
-                let mass = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
-                let old = record[layout.at(p, layout.tangent_impulse)];
                 let vt = with_arms::<L, N, O>(along_t, w, arm_t);
-                tangent.impulse[p] = mass.neg_mul_add(vt, old);
-                (tangent.slope[p], tangent.old[p]) = (mass, old);
+                tangent.load_friction(p, record, &layout, rule, arm_t, vt);
             }
         }
 
@@ -392,19 +432,7 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
             spin::<L, N, O>(&mut w, inertia, arm, delta);
         }
         if friction_rows {
-            let friction = record[layout.friction];
-            for p in 0..N::POINTS {
-                let bound = friction * normal.impulse[p];
-                let new = tangent.impulse[p].min(bound).max(-bound);
-                record[layout.at(p, layout.tangent_impulse)] = new;
-                let delta = new - tangent.old[p];
-                tangent.sum = tangent.sum + delta;
-                let arm = tangent.arm[p];
-                for q in p + 1..N::POINTS {
-                    tangent.answer::<N, O>(q, mass_sum, inertia, arm, delta);
-                }
-                spin::<L, N, O>(&mut w, inertia, arm, delta);
-            }
+            tangent.solve_friction::<N, O>(record, &layout, normal.impulse, mass_sum, inertia, &mut w);
         }
 
         apply::<L, O>(&mut a, &mut b, n, [normal.sum, tangent.sum], w);

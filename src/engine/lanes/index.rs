@@ -98,6 +98,13 @@ impl<'a> IndexList<'a> {
         IndexList { entries: &self.entries[range], bound: self.bound }
     }
 
+    /// The entries of batch `batch` of `width` lanes: fewer, or none, where the list ends before.
+    #[inline(always)]
+    pub fn entries_of(self, batch: usize, width: usize) -> &'a [u32] {
+        let (first, len) = (batch * width, self.entries.len());
+        self.entries.get(first..(first + width).min(len)).unwrap_or(&[])
+    }
+
     /// The list batch by batch.
     ///
     /// # Panics

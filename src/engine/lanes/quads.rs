@@ -72,35 +72,24 @@ pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
 /// Asks for records of `STRIDE` quads, up to two cache lines of each, before they are needed.
 #[inline(always)]
 pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterator<Item = u32>) {
-    #[cfg(target_arch = "x86_64")]
     for i in index {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let record = quads.as_ptr().wrapping_add(i as usize * STRIDE);
-        // SAFETY: a hint; it faults at no address.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(record.cast());
-            _mm_prefetch::<_MM_HINT_T0>(record.wrapping_add(4).cast());
-        }
+        prefetch_quad::<STRIDE, 0>(quads, i);
+        prefetch_quad::<STRIDE, 4>(quads, i);
     }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (quads, index);
 }
 
-/// Asks for quad `OFFSET` of records of `STRIDE` quads before they are needed.
+/// Asks for the cache line of quad `OFFSET` of record `i` of `STRIDE` quads before it is needed.
 #[inline(always)]
-pub fn prefetch_quad<const STRIDE: usize, const OFFSET: usize>(
-    quads: &[Quad],
-    index: impl Iterator<Item = u32>,
-) {
+pub fn prefetch_quad<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) {
     #[cfg(target_arch = "x86_64")]
-    for i in index {
+    {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let quad = quads.as_ptr().wrapping_add(i as usize * STRIDE + OFFSET);
         // SAFETY: a hint; it faults at no address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(quad.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (quads, index);
+    let _ = (quads, i);
 }
 
 #[inline(always)]

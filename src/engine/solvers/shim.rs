@@ -94,7 +94,7 @@ fn step(passes: &mut Passes<'_>) {
     let omega = usual * (1.0 + added as f32 / sweeps).sqrt();
     let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
     let rigid = Rigid::new(h);
-    let dt = h * budget.substeps as f32;
+    let dt = passes.dt();
     let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
     passes.plastic_impacts();
     passes.preload(springs, share, dt / (dt + time));

@@ -332,14 +332,14 @@ fn fallen_corner(lab: &Lab) -> Result<Finding, Failure> {
 fn plastic(lab: &Lab) -> Result<Finding, Failure> {
     let disc = rough_impacts(lab, &[0.0], &[0.0], 1e-4, disc)?;
     let corner = rough_impacts(lab, &[0.0], &[0.0], 1e-4, corner)?;
-    Ok(if disc.measured > corner.measured { disc } else { corner })
+    Ok(worse(disc, corner))
 }
 
 /// A19. Without restitution from above; the corner without spin until it arrives.
 fn landed(lab: &Lab) -> Result<Finding, Failure> {
     let disc = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, disc)?;
     let corner = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })?;
-    Ok(if disc.measured > corner.measured { disc } else { corner })
+    Ok(worse(disc, corner))
 }
 
 /// A19. A box of 2 m × ½ m does not turn over: both ends of its face are hit, and the whole impulse is 4 N·s per

@@ -220,6 +220,11 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
 }
 
+/// The finding that is farther off.
+pub(super) fn worse(a: Finding, b: Finding) -> Finding {
+    if a.measured > b.measured { a } else { b }
+}
+
 /// Impulses [T, N] of an impact (N·s) under Newton's law with `e` and Coulomb's with `mu` on all of them: v_n⁺ = −e v_n,
 /// and along t what stops the points, or ±µ N. `k` is (nn, tt, nt) of the inverse masses, `[vt, vn]` how the points meet.
 pub(super) fn rough_impulse(k: [f64; 3], [vt, vn]: [f64; 2], e: f64, mu: f64) -> [f64; 2] {

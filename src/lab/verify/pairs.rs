@@ -194,7 +194,7 @@ fn rough_boxes(lab: &Lab) -> Result<Finding, Failure> {
 /// A20. Without restitution the law is the same.
 fn caught(lab: &Lab) -> Result<Finding, Failure> {
     let [discs, corner] = [rough_hit(lab, &two_discs(), &[0.0])?, rough_hit(lab, &corner_on_box(), &[0.0])?];
-    Ok(if discs.measured > corner.measured { discs } else { corner })
+    Ok(worse(discs, corner))
 }
 
 fn corner_on_box() -> [(Hit, SceneShape, f64); 2] {
