@@ -64,9 +64,9 @@ pub struct Contact {
     /// What the contact bears in statics (N), until the solver has made use of it; see
     /// [`crate::engine::constraints::piles`].
     pub weight: f32,
-    /// Fills the last quad.
-    #[doc(hidden)]
-    pub padding: u32,
+    /// Time from the beginning of the step to that of the contact's frame (s), see
+    /// [`crate::engine::narrowphase::frames`].
+    pub lead: f32,
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -83,7 +83,7 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
-    /// `[of the step's impulses, preload, weight, padding]`.
+    /// `[of the step's impulses, preload, weight, lead]`.
     pub const PRELOAD: usize = 7;
 }
 

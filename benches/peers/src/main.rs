@@ -59,6 +59,9 @@ struct Args {
     /// Default settings only, 180 steps
     #[arg(long)]
     quick: bool,
+    /// Random seed of scenes that have one
+    #[arg(long)]
+    seed: Option<u64>,
     /// Folder for peers.csv and peers.svg
     #[arg(long, default_value = "results")]
     out: PathBuf,
@@ -87,7 +90,7 @@ fn run(args: &Args) -> Result<(), String> {
     let mut raced = Vec::new();
     for (name, steps, stands) in scenes {
         let steps = args.steps.unwrap_or(if args.quick { QUICK_STEPS } else { steps });
-        let outcomes = race::race(name, steps, args.repeats, stands, &contenders)?;
+        let outcomes = race::race(name, args.seed, steps, args.repeats, stands, &contenders)?;
         println!("\n{name}: {} bodies, {steps} steps", outcomes[0].counts.0);
         println!("{}", table::comparison(&outcomes));
         println!("ms per step by stage, four substeps, clocks on");

@@ -110,16 +110,21 @@ struct Runner {
     clocked: Vec<Breakdown>,
 }
 
-/// Runs a scene of the catalogue for `steps` steps, `repeats` times; `stands` tells the check that
+/// Runs a scene of the catalogue for `steps` steps, `repeats` times, with `seed` where it has one; `stands` tells the check that
 /// nothing may fall. Errors: an unknown scene, or one that an engine cannot hold.
 pub fn race(
     name: &str,
+    seed: Option<u64>,
     steps: u32,
     repeats: u32,
     stands: bool,
     contenders: &[Contender],
 ) -> Result<Vec<Outcome>, String> {
-    let load = || scenes::load(name).map_err(|e| e.to_string());
+    let load = || match seed {
+        Some(seed) => scenes::load_with_seed(name, seed),
+        None => scenes::load(name),
+    };
+    let load = || load().map_err(|e| e.to_string());
     let scene = load()?.scene;
     let rounds = steps.saturating_sub(WINDOW) / BLOCK;
     let mut runners = Vec::new();

@@ -19,9 +19,10 @@
 //! most impacts are found after they have happened, with an overlap of |s| ≤ |v| dt: t is negative then, and bodies
 //! are put forward to where they would be.
 //!
-//! The impulse acts at arms of the step's beginning. When the two centres are displaced by D against each other at its
-//! time, it adds D × λ to angular momentum, which is taken from both spins, half from each (see [`super::block`]), if
-//! there is friction.
+//! Arms are those of the contact's frame. When the two centres are displaced by D against each other at the time of the
+//! impulse, it adds D × λ to angular momentum, so that arms end at a point of both bodies then, r_a + D/2 and r_b − D/2, if
+//! there is friction. In the rows themselves and not beside them: what an impulse does that its row does not know of
+//! may add energy, and has shot bodies out of piles. D does not depend on impulses at that time.
 //!
 //! # How far
 //!
@@ -89,12 +90,15 @@ struct Body {
     /// When it was last pushed (s); −∞ for never.
     time: f32,
     is_queued: bool,
+    /// Its velocity before anything pushed it (m/s).
+    flown: [f32; 2],
     /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
     rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, rounded: [0.0; 3] };
+const STILL: Body =
+    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 2], rounded: [0.0; 3] };
 
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -119,6 +123,10 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
+    /// Time of its frame (s); see [`Contact::lead`].
+    lead: f32,
+    /// See [`Point::meet`].
+    has_met: bool,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -172,6 +180,7 @@ impl On<'_> {
             (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
             point.separation = at(layout.at(p, layout.separation));
+            point.lead = self.contacts[contact as usize].lead;
             point
         })
     }
@@ -215,22 +224,38 @@ impl Point {
             }
         };
         give(1, 1.0, rows);
-        if !self.pushes_a {
+        if self.pushes_a {
+            give(0, -1.0, rows);
+        }
+    }
+
+    /// Puts its place between where both bodies are at its time; see the [module](self).
+    fn meet(&mut self, rows: &[BodyRow], bodies: &[Body]) {
+        self.has_met = true;
+        if !self.pushes_a || self.friction == 0.0 {
             return;
         }
-        give(0, -1.0, rows);
         let [a, b] = self.rows.map(|row| rows[row as usize]);
-        let apart = |k: usize| self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
-        let gained = apart(0).mul_add(y, -(apart(1) * x));
-        if gained == 0.0 || self.friction == 0.0 {
-            return;
+        let flown = self.rows.map(|row| bodies[row as usize].flown);
+        let apart = |k: usize| {
+            let now = self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+            self.lead.neg_mul_add(flown[1][k] - flown[0][k], now)
+        };
+        let ([x, y], [nx, ny]) = ([0.5 * apart(0), 0.5 * apart(1)], self.normal);
+        // D/2 × n and D/2 × t.
+        let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
+        let inertia = [a.delta[3], b.delta[3]];
+        for axis in 0..2 {
+            self.arms[0][axis] += shift[axis];
+            self.arms[1][axis] -= shift[axis];
         }
-        for row in self.rows {
-            let row = &mut rows[row as usize];
-            let turn = 0.5 * gained * row.delta[3];
-            row.velocity[2] -= turn;
-            row.delta[2] = self.time.mul_add(turn, row.delta[2]);
-        }
+        let direct = a.velocity[3] + b.velocity[3];
+        let turns = |i: usize, j: usize| {
+            let of = |body: usize| inertia[body] * self.arms[body][i] * self.arms[body][j];
+            of(0) + of(1)
+        };
+        self.k = [direct + turns(0, 0), direct + turns(1, 1), turns(0, 1)];
+        self.mass = 1.0 / self.k[0];
     }
 }
 
@@ -299,9 +324,10 @@ impl PlasticImpacts {
 
     /// Links the ends of each body.
     fn link(&mut self, on: &On<'_>) {
-        let (bodies, lanes) = (on.rows.len(), on.lanes());
+        let (count, lanes) = (on.rows.len(), on.lanes());
         self.bodies.clear();
-        self.bodies.resize(bodies, STILL);
+        self.bodies
+            .extend(on.rows.iter().map(|row| Body { flown: [row.velocity[0], row.velocity[1]], ..STILL }));
         self.next.resize(2 * lanes, NONE);
         self.listed.clear();
         self.listed.resize(lanes, NONE);
@@ -311,7 +337,7 @@ impl PlasticImpacts {
             for (&a, &b) in batches.row_a().iter().zip(batches.row_b()) {
                 for body in [a, b] {
                     // The last row is that of empty lanes.
-                    if (body as usize) < bodies - 1 {
+                    if (body as usize) < count - 1 {
                         self.next[end] = std::mem::replace(&mut self.bodies[body as usize].first, end as u32);
                     }
                     end += 1;
@@ -337,8 +363,8 @@ impl PlasticImpacts {
         if point.mass <= 0.0 {
             return;
         }
-        let [vn, vt] = point.velocity(on.rows);
         if point.impulse[0] == 0.0 {
+            let [vn, _] = point.velocity(on.rows);
             if vn >= -slowest {
                 return;
             }
@@ -352,6 +378,10 @@ impl PlasticImpacts {
         for row in point.rows {
             point.time = point.time.max(self.bodies[row as usize].time);
         }
+        if !point.has_met {
+            point.meet(on.rows, &self.bodies);
+        }
+        let [vn, vt] = point.velocity(on.rows);
         let old = point.impulse;
         let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);
         self.solved += 1;

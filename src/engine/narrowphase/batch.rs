@@ -1,5 +1,6 @@
 //! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
 
+use super::frames::FrameTimes;
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
@@ -136,6 +137,8 @@ pub struct Input<'a> {
     /// What bodies move and turn by in the coming step, and a little longer, if nothing hinders them: `[x, y, θ, 0]`
     /// (m, rad), by body.
     pub ways: &'a [Quad],
+    /// Of the frames of round contacts, if these are not of the step's beginning.
+    pub times: Option<FrameTimes>,
     /// Shapes by number.
     pub shapes: &'a Shapes,
     /// Points farther apart are left out (m).
@@ -204,24 +207,22 @@ fn run<L: Lanes>(
     made: usize,
     change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
-    let Input { poses, ways, shapes: Shapes { rows, hulls }, speculative } = input;
+    let Input { poses, ways, times, shapes: Shapes { rows, hulls }, speculative } = input;
     match kind {
-        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
+        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
             rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0])
         }),
-        Kind::Circles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
+        Kind::Circles => run_kernel(jobs, indices, contacts, made, times, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            let (touch, distance) = circles::with_distance(&pair, speculative);
             let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-            let gap = circles::passing(&touch, distance, pair.way(ways));
-            touch.on_held(poses.held[0]).with_gap(gap)
+            circles::in_step(&pair, ways, times, speculative)
         }),
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
+            run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
                 pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0])
@@ -229,22 +230,21 @@ fn run<L: Lanes>(
         }
         Kind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
+            run_kernel(jobs, indices, contacts, made, times, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
-                let way = pair.way(&poses, bodies.map(|body| L::gather_quads::<1, 0>(ways, body)));
-                let (touch, gap) = pair.collide(&poses, way, speculative);
+                let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
+                let (touch, gap) = pair.in_step(&poses, ways, times, speculative);
                 touch.on_held(poses.held[0]).with_gap(gap)
             })
         }
         Kind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, change, |bodies, [a, b]| {
+            run_kernel(jobs, indices, contacts, made, times, change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
-                let way =
-                    pair.way(&poses, [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body)));
-                let (touch, gap) = pair.collide(&poses, way, speculative);
+                let ways = [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body));
+                let (touch, gap) = pair.in_step(&poses, ways, times, speculative);
                 touch.swapped().on_held(poses.held[1]).with_gap(gap)
             })
         }
@@ -252,13 +252,14 @@ fn run<L: Lanes>(
 }
 
 /// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
-/// given their bodies and shapes.
+/// given their bodies and shapes; `times` are those of the frames it makes, if it does.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
     jobs: &Jobs,
     indices: JobIndices,
     contacts: &mut [Contact],
     made: usize,
+    times: Option<FrameTimes>,
     change: &mut dyn FnMut(u32, &Contact),
     mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> Touch<L>,
 ) -> usize {
@@ -282,7 +283,14 @@ fn run_kernel<L: Lanes>(
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
         let touch = kernel(bodies, shapes);
-        merge(&touch, bytemuck::cast_slice_mut(contacts), LaneIndex::new(&target));
+        let target_lanes = LaneIndex::new(&target);
+        merge(&touch, bytemuck::cast_slice_mut(contacts), target_lanes);
+        if let Some(times) = times {
+            let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
+            let mut last = L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, target_lanes);
+            last[3] = L::splat(times.unit) * touch.lead;
+            L::scatter_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, target_lanes, last);
+        }
         // Counts in memory once more, so that a batch without changes is one comparison.
         let mut count = [0.0_f32; MOST_LANES];
         count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);

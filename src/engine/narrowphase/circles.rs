@@ -13,6 +13,7 @@
 //! it is right at the end of the step, and those that do not touch are left alone. Those that graze each other less
 //! deep, and have passed by the end, may do so until the next step finds them.
 
+use super::frames::{FrameTimes, turned};
 use super::lanes::{Poses, ShapePair, Touch, rotate};
 use crate::engine::lanes::Lanes;
 use crate::engine::params::LINEAR_SLOP;
@@ -46,6 +47,33 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
     gap.min(closest + slop).select_positive(raised, gap)
 }
 
+/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad);
+/// `times`: of frames, if these are not of the beginning.
+#[inline(always)]
+pub fn in_step<L: Lanes>(
+    pair: &ShapePair<L>,
+    ways: [[L; 4]; 2],
+    times: Option<FrameTimes>,
+    speculative: f32,
+) -> Touch<L> {
+    let (touch, distance) = with_distance(pair, speculative);
+    let way = pair.way(ways);
+    let held = pair.poses.held[0];
+    let gap = passing(&touch, distance, way);
+    let Some(times) = times else { return touch.on_held(held).with_gap(gap) };
+    // Centres in one place have no direction to turn.
+    let curvature =
+        distance.select_positive(L::splat(1.0) / distance.max(L::splat(f32::MIN_POSITIVE)), L::zero());
+    let frame = times.frame(touch.normal, curvature, way, [touch.separation[0], gap]);
+    let center = |k: usize| {
+        let [x, y, ..] = pair.place[k];
+        turned(rotate(pair.poses.rotation[k], [x, y]), frame.time * ways[k][2])
+    };
+    let size = pair.size.map(|size| size[2]);
+    let touch = Touch { normal: frame.normal, lead: frame.time, ..touch };
+    touch.with_anchors(center(0), center(1), size).on_held(held).with_gap(frame.gap)
+}
+
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
@@ -55,7 +83,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
 /// The same, and the distances of the centres (m).
 #[inline(always)]
 pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<L>, L) {
-    let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
+    let (zero, one) = (L::zero(), L::splat(1.0));
     let Poses { centers, rotation, .. } = pair.poses;
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
     let center_a = rotate(rotation[0], [place_a[0], place_a[1]]);
@@ -66,19 +94,31 @@ pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<
     let inverse = one / apart.select_positive(distance, one);
     let normal = [apart.select_positive(d[0] * inverse, zero), apart.select_positive(d[1] * inverse, one)];
     let separation = distance - (size_a[2] + size_b[2]);
-    // From each centre by its own radius: for circles centred on their bodies both anchors are
-    // multiples of the normal, and friction is all that turns them.
-    let (r_a, r_b) = (half.mul_add(separation, size_a[2]), half.mul_add(separation, size_b[2]));
-    let anchor_a = [r_a.mul_add(normal[0], center_a[0]), r_a.mul_add(normal[1], center_a[1])];
-    let anchor_b = [r_b.neg_mul_add(normal[0], center_b[0]), r_b.neg_mul_add(normal[1], center_b[1])];
     let touch = Touch {
         normal,
         count: (separation - L::splat(speculative)).select_positive(zero, one),
-        anchor_a: [anchor_a; 2],
-        anchor_b: [anchor_b; 2],
+        anchor_a: [[zero; 2]; 2],
+        anchor_b: [[zero; 2]; 2],
         separation: [separation; 2],
         feature: [zero; 2],
         passes: zero,
+        lead: zero,
     };
-    (touch, distance)
+    (touch.with_anchors(center_a, center_b, [size_a[2], size_b[2]]), distance)
+}
+
+impl<L: Lanes> Touch<L> {
+    /// The same contact with its point between the surfaces of circles of radius `size` about these centres (m, from
+    /// the centres of mass).
+    ///
+    /// From each centre by its own radius: for circles centred on their bodies both anchors are multiples of the normal,
+    /// and friction is all that turns them.
+    #[inline(always)]
+    fn with_anchors(self, center_a: [L; 2], center_b: [L; 2], size: [L; 2]) -> Self {
+        let [r_a, r_b] = size.map(|size| L::splat(0.5).mul_add(self.separation[0], size));
+        let [nx, ny] = self.normal;
+        let anchor_a = [r_a.mul_add(nx, center_a[0]), r_a.mul_add(ny, center_a[1])];
+        let anchor_b = [r_b.neg_mul_add(nx, center_b[0]), r_b.neg_mul_add(ny, center_b[1])];
+        Touch { anchor_a: [anchor_a; 2], anchor_b: [anchor_b; 2], ..self }
+    }
 }

@@ -172,5 +172,6 @@ pub fn touch<L: Lanes>(
         separation: points.map(|p| p[2]),
         feature: points.map(|p| p[3]),
         passes,
+        lead: L::zero(),
     }
 }

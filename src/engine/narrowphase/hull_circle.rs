@@ -6,6 +6,7 @@
 //! that long segments round nothing, and inside the core.
 
 use super::circles::PASSING;
+use super::frames::{Frame, FrameTimes, turned};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
@@ -37,16 +38,23 @@ impl<L: Lanes> HullCircle<L> {
 
     /// How the circle's centre moves in the frame of the hull where bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
-    pub fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
+    fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = rotate(poses.rotation[1], self.circle.0);
         way_between(ways, [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center])
     }
 
-    /// Their contacts; those farther apart than `speculative` (m) are left out. And their gaps where the circle moves
-    /// by `way` against the hull in the coming step (m), at a corner that it passes as for two circles
-    /// ([`super::circles`]).
+    /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
+    /// than `speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
+    /// `times`: of frames, if these are not of the beginning. And their gaps, which points are not to be told by.
     #[inline(always)]
-    pub fn collide(&self, poses: &Poses<L>, way: [L; 2], speculative: f32) -> (Touch<L>, L) {
+    pub fn in_step(
+        &self,
+        poses: &Poses<L>,
+        ways: [[L; 4]; 2],
+        times: Option<FrameTimes>,
+        speculative: f32,
+    ) -> (Touch<L>, L) {
+        let way = self.way(poses, ways);
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
         let rotation_a = poses.rotation[0];
         let (center, radius) = (rotate(poses.rotation[1], self.circle.0), self.circle.1);
@@ -75,11 +83,10 @@ impl<L: Lanes> HullCircle<L> {
             corner.select_positive(height.mul_add(n[0], past * t[0]) * inverse, n[0]),
             corner.select_positive(height.mul_add(n[1], past * t[1]) * inverse, n[1]),
         ];
-        let normal = rotate(rotation_a, normal);
         let separation = distance - (self.hull.head[0] + radius);
+        let way = unrotate(rotation_a, way);
         let gap = {
             let slop = L::splat(LINEAR_SLOP);
-            let way = unrotate(rotation_a, way);
             let (up, aside) = (dot(n, way), dot(t, way));
             let toward = height.mul_add(up, past * aside);
             let length_of = |x: L, y: L| x.mul_add(x, y * y).sqrt();
@@ -100,11 +107,21 @@ impl<L: Lanes> HullCircle<L> {
             let passes = corner.min(separation).min(over).min(closest + slop);
             passes.select_positive(raised, separation)
         };
+        let mut frame = Frame { time: zero, normal, gap };
+        let mut normal = rotate(rotation_a, normal);
+        let (mut center, mut between) = (center, poses.centers);
+        if let Some(times) = times {
+            let curvature = corner.select_positive(inverse, zero);
+            frame = times.frame(frame.normal, curvature, way, [separation, gap]);
+            center = turned(center, frame.time * ways[1][2]);
+            between = [0, 1].map(|k| frame.time.mul_add(ways[1][k] - ways[0][k], between[k]));
+            normal = turned(rotate(rotation_a, frame.normal), frame.time * ways[0][2]);
+        }
         // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
         // normal, and friction is all that turns it. a's follows from the centres of mass.
         let arm = half.mul_add(separation, radius);
         let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
-        let anchor_a = [anchor_b[0] + poses.centers[0], anchor_b[1] + poses.centers[1]];
+        let anchor_a = [anchor_b[0] + between[0], anchor_b[1] + between[1]];
         let touch = Touch {
             normal,
             count: (separation - L::splat(speculative)).select_positive(zero, one),
@@ -113,8 +130,9 @@ impl<L: Lanes> HullCircle<L> {
             separation: [separation; 2],
             feature: [zero; 2],
             passes: zero,
+            lead: frame.time,
         };
-        (touch, gap)
+        (touch, frame.gap)
     }
 }
 

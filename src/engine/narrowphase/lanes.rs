@@ -194,6 +194,8 @@ pub struct Touch<L> {
     pub feature: [L; 2],
     /// Positive where flush faces are apart, and face each other by no more than a graze.
     pub passes: L,
+    /// Time of its frame from the beginning of the step, in the units of ways (1).
+    pub lead: L,
 }
 
 impl<L: Lanes> Touch<L> {

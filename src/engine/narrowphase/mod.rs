@@ -19,6 +19,7 @@ pub mod batch;
 pub mod circles;
 pub mod clip;
 pub mod epa;
+pub mod frames;
 pub mod gjk;
 pub mod hull;
 pub mod hull_circle;
@@ -87,9 +88,8 @@ fn touch(
     let touch = match kind {
         Kind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
         Kind::Circles => {
-            let (touch, distance) = circles::with_distance(&pair, speculative_distance);
-            let gap = circles::passing(&touch, distance, pair.way(ways));
-            touch.on_held(held).with_gap(gap)
+            let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
+            circles::in_step(&pair, ways, None, speculative_distance)
         }
         Kind::Hulls => {
             let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
@@ -97,13 +97,12 @@ fn touch(
         }
         Kind::HullCircle => {
             let pair = HullCircle::new(HullRow::new(a), row_b);
-            let (touch, gap) = pair.collide(&poses, pair.way(&poses, ways), speculative_distance);
+            let (touch, gap) = pair.in_step(&poses, ways, None, speculative_distance);
             touch.on_held(held).with_gap(gap)
         }
         Kind::CircleHull => {
             let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
-            let way = pair.way(&poses, [ways[1], ways[0]]);
-            let (touch, gap) = pair.collide(&poses, way, speculative_distance);
+            let (touch, gap) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
             touch.swapped().on_held(held).with_gap(gap)
         }
     };

@@ -66,6 +66,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),

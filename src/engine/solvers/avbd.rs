@@ -76,6 +76,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: PER_POINT, per_body: 0 },
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),

@@ -43,6 +43,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),

@@ -52,6 +52,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     step,

@@ -32,6 +32,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
     step,

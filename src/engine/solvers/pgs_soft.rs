@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
     step,

@@ -79,6 +79,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: true,
+    turning_frames: true,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     step,

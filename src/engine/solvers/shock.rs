@@ -38,6 +38,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: true,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Momentum, "in the last sweep bodies below do not answer"),

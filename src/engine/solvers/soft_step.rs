@@ -37,6 +37,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[],
     step,

@@ -49,6 +49,7 @@ pub static SOLVER: Variant = Variant {
     softness: None,
     by_levels: false,
     piles: false,
+    turning_frames: false,
     kept: KeptSize { per_point: 1, per_body: 0 },
     breaks: &[
         (Law::Cone, "a point may take its share of the whole manifold's load"),

@@ -6,6 +6,7 @@ use super::recycle::{Pairs, Recycled};
 use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::lanes::{Quad, held};
 use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
+use crate::engine::narrowphase::frames::FrameTimes;
 use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
@@ -102,7 +103,13 @@ impl World {
             };
             *is_changed = true;
         };
-        let input = Input { poses, ways, shapes, speculative: SPECULATIVE_DISTANCE };
+        let times = self.settings.solver.turning_frames.then(|| FrameTimes {
+            middle: 0.5 * (1.0 - 1.0 / self.settings.budget.substeps as f32) / AHEAD,
+            step: 1.0 / AHEAD,
+            unit: dt,
+        });
+        let times = if std::env::var("NOTURN").is_ok() { None } else { times };
+        let input = Input { poses, ways, times, shapes, speculative: SPECULATIVE_DISTANCE };
         for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
