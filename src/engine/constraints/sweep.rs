@@ -88,6 +88,7 @@ use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
 macro_rules! over_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        $crate::engine::lanes::align_frame();
         for i in 0..$batches.visits().len() {
             let segment = $batches.visits()[i];
             match segment.opposite {
