@@ -480,11 +480,10 @@ pub(super) fn arms<L: Lanes, N: KernelFeatures, O: Opposite>(
 
 /// Applies the accumulated impulses of a segment, as the first guess of a step.
 #[inline(always)]
-fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
-    is_turned: bool,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let pushes_a = segment.pushes_a();
@@ -497,7 +496,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
         for p in 0..N::POINTS {
             let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
             let mut arm_t = arms::<L, N, O>(record, &layout, p, 1);
-            if is_turned && N::ROTATION {
+            if TURNED && N::ROTATION {
                 let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
                 [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
             }
@@ -579,20 +578,22 @@ impl Pass for WarmStart {
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         if self.turned {
-            warm_start_turned::<L, F>(on.rows, on.batches);
+            warm_start_with::<L, F, true>(on.rows, on.batches);
         } else {
-            warm_start::<L, F>(on.rows, on.batches);
+            warm_start_with::<L, F, false>(on.rows, on.batches);
         }
     }
 }
 
-/// Applies all accumulated impulses.
-#[inline(never)]
+/// Applies all accumulated impulses, with the arms of the start of the step.
 pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
-    over_segments!(warm_start_segment, L, N; rows, batches, false);
+    warm_start_with::<L, N, false>(rows, batches);
 }
 
 #[inline(never)]
-fn warm_start_turned<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
-    over_segments!(warm_start_segment, L, N; rows, batches, true);
+fn warm_start_with<L: Lanes, N: KernelFeatures, const TURNED: bool>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+) {
+    over_segments!(warm_start_segment, L, N, TURNED; rows, batches);
 }

@@ -7,7 +7,7 @@ use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{
-    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, held, prefetch_records,
+    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, held, prefetch_records,
 };
 use crate::engine::shapes::Shape;
 use bytemuck::bytes_of;
@@ -205,6 +205,7 @@ fn run<L: Lanes>(
     change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
     let Input { poses, ways, shapes: Shapes { rows, hulls }, speculative } = input;
+    align_frame();
     match kind {
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
