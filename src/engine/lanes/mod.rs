@@ -12,6 +12,7 @@
 
 mod aligned;
 mod counted;
+mod frame;
 mod index;
 mod quads;
 mod rows;
@@ -23,6 +24,7 @@ mod width;
 
 pub use aligned::{Block, LaneVec, held};
 pub use counted::{Counted, Operations};
+pub use frame::align_frame;
 pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
 pub use quads::{Quad, prefetch, prefetch_quad, prefetch_records};
 pub use rows::BodyRow;

@@ -8,7 +8,7 @@ use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::{circles, rectangles};
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{
-    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, held, prefetch_records,
+    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, held, prefetch_records,
 };
 use crate::engine::shapes::Shape;
 use bytemuck::bytes_of;
@@ -207,6 +207,8 @@ fn run<L: Lanes>(
     made: usize,
     change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
+    // Vectors that spill do so within cache lines; see `align_frame`.
+    align_frame();
     let Input { poses, ways, times, shapes: Shapes { rows, hulls }, speculative } = input;
     match kind {
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
@@ -273,7 +275,11 @@ fn run_kernel<L: Lanes>(
         let shapes = [indices.shapes[0].batch_at(first, c), indices.shapes[1].batch_at(first, d)];
         let filled = (count - first).min(L::WIDTH);
         let mut known = [NO_CONTACT; MOST_LANES];
-        known[..filled].copy_from_slice(&jobs.contact[first..first + filled]);
+        match jobs.contact.get(first..first + L::WIDTH) {
+            // Of constant length: no call.
+            Some(whole) => known[..L::WIDTH].copy_from_slice(whole),
+            None => known[..filled].copy_from_slice(&jobs.contact[first..]),
+        }
         let mut target = [0; MOST_LANES];
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
@@ -293,10 +299,14 @@ fn run_kernel<L: Lanes>(
         }
         // Counts in memory once more, so that a batch without changes is one comparison.
         let mut count = [0.0_f32; MOST_LANES];
-        count[..filled].copy_from_slice(&bytemuck::cast_slice(&[touch.count])[..filled]);
+        count[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[touch.count]));
+        if filled < L::WIDTH {
+            count[filled..].fill(0.0);
+        }
         let mut is_changed = false;
-        for (&count, &known) in count.iter().zip(&known) {
-            points += count as u32;
+        for (&count, &known) in count[..L::WIDTH].iter().zip(&known) {
+            // Compared, not converted: before AVX-512 there are no lanes that become unsigned integers.
+            points += u32::from(count > 0.0) + u32::from(count > 1.0);
             is_changed |= (count > 0.0) != (known != NO_CONTACT);
         }
         if !is_changed {

@@ -108,7 +108,6 @@ impl World {
             step: 1.0 / AHEAD,
             unit: dt,
         });
-        let times = if std::env::var("NOTURN").is_ok() { None } else { times };
         let input = Input { poses, ways, times, shapes, speculative: SPECULATIVE_DISTANCE };
         for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
