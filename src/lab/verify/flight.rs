@@ -3,8 +3,9 @@
 use super::Required::{No, Yes};
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
+use crate::engine::world::World;
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
-use std::f64::consts::{FRAC_PI_3, TAU};
+use std::f64::consts::FRAC_PI_3;
 
 pub(super) static CASES: &[Case] = &[
     Case::new(
@@ -122,12 +123,11 @@ fn energy(lab: &Lab) -> Result<Finding, Failure> {
             .moving([0.0, -10.0], 0.0),
     ];
     let scene = Scene::new("energy", bodies);
-    let potential = |world: &crate::engine::world::World| -> f64 {
-        dynamic(world).map(|(i, m, _)| m * G * center(world, i)[1]).sum()
-    };
+    let potential =
+        |world: &World| -> f64 { dynamic(world).map(|(i, m, _)| m * G * center(world, i)[1]).sum() };
     let world = lab.world(scene.clone())?;
     let start = kinetic_energy(&world) + potential(&world);
     let mut most = start;
-    lab.run(scene, TAU / 60.0, |world| most = largest([most, kinetic_energy(world) + potential(world)]))?;
+    lab.run(scene, 0.1, |world| most = largest([most, kinetic_energy(world) + potential(world)]))?;
     Ok(Finding::new(most / start - 1.0, 0.0, 1e-3))
 }
