@@ -97,6 +97,9 @@ fn doubled_gravity_fails() {
             "A23.lift",
             "A23.slip",
             "A25.groove",
+            "A26.corner",
+            "A26.rollers",
+            "B24.shaft",
         ],
     );
 }
@@ -133,6 +136,9 @@ fn missing_friction_fails() {
             "A23.slip",
             "A24.belt",
             "A25.ladder",
+            "A26.corner",
+            "A26.rollers",
+            "B24.logs",
         ],
     );
 }

@@ -50,6 +50,12 @@
 //!   side of the next tile (A24.tiles).
 //! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or impacts that run far are not
 //!   rare, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
+//! - **Contacts that wander within a step.** Their points are those of its beginning: what rocks on a round contact is pushed half a step
+//!   late, which is a negative damping of ω² dt/4 (A26); what is carried round goes along tangents.
+//! - **Sudden loads.** The first substep begins with the impulses of the step before (B23), and joints of a pile near its limit of
+//!   friction slip before they have converged (B24).
+//! - **The moment of an impact.** The normal is that of the step in which it is found (A27.oblique); rough impacts that run through small
+//!   bodies may diverge (A27.energy).
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
@@ -57,16 +63,20 @@ mod balance;
 mod carried;
 mod columns;
 mod far;
+mod flight;
 mod impacts;
 mod lab;
+mod limits;
 mod motion;
 mod overlap;
 mod pairs;
 mod paradox;
 mod ratios;
+mod rocking;
 mod runner;
 mod sliding;
 mod stacks;
+mod sudden;
 mod table;
 
 pub use lab::Lab;

@@ -1,7 +1,8 @@
 //! The list of cases.
 
 use super::{
-    Case, balance, carried, columns, far, impacts, motion, overlap, pairs, paradox, ratios, sliding, stacks,
+    Case, balance, carried, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox, ratios,
+    rocking, sliding, stacks, sudden,
 };
 use std::sync::LazyLock;
 
@@ -24,14 +25,18 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
         carried::CASES,
         columns::CASES,
         far::CASES,
+        flight::CASES,
         impacts::CASES,
+        limits::CASES,
         motion::CASES,
         overlap::CASES,
         pairs::CASES,
         paradox::CASES,
         ratios::CASES,
+        rocking::CASES,
         sliding::CASES,
         stacks::CASES,
+        sudden::CASES,
     ];
     let mut cases: Vec<&Case> = groups.into_iter().flatten().collect();
     cases.sort_by_key(|case| family(case.id));

@@ -1,0 +1,133 @@
+//! A27: impacts of bodies that arrive in flight, and what they may not make.
+
+use super::Required::{No, Yes};
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::engine::world::World;
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+use std::f64::consts::FRAC_PI_3;
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A27.oblique",
+        "velocities after an oblique elastic collision of discs at 10 m/s, worst of ten times within a step, over the first",
+        "1",
+        "1 %: one law or the other",
+        oblique,
+        No("the normal is that of the step's beginning or of an overlap, not that of the impact"),
+    ),
+    Case::new(
+        "A27.rest",
+        "time until a ball with e = 1/2 that falls from 2 m has come to rest",
+        "s",
+        "flights shorter than two steps: 2 dt/(1 - e)",
+        rest,
+        No("arrivals below 3 g dt are not foreseen, and do not bounce"),
+    ),
+    Case::new(
+        "A27.edges",
+        "spin of a hexagon and of boxes that come down on their next edge, over the law, worst",
+        "1",
+        "1e-3, as for A19.flat",
+        edges,
+        Yes("both edges are looked at together, and the old one is free to leave"),
+    ),
+    Case::new(
+        "A27.energy",
+        "energy that a rough plastic impact through three bodies makes, over what there was",
+        "1",
+        "1e-3: none, as for A19.flat",
+        energy,
+        No(
+            "spins that take back D × λ at every visit are not in the mass of a row: visits need not converge",
+        ),
+    ),
+];
+
+/// A27. A disc at 10 m/s meets one at rest with an offset of its radius: n at 30° takes and gives v cos 30°.
+fn oblique(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, speed, e) = (0.5, 10.0, 1.0);
+    let (sin, cos): (f64, f64) = (0.5, 0.75f64.sqrt());
+    let mut worst = 0.0;
+    for k in 0..10 {
+        let start = -3.0 - speed / 60.0 * f64::from(k) / 10.0;
+        let disc = || SceneShape::disc(radius).friction(0.0).restitution(e);
+        let moving = SceneBody::dynamic([start, 2.0 * radius * sin], disc()).moving([speed, 0.0], 0.0);
+        let scene = Scene::new("oblique", vec![moving, SceneBody::dynamic([0.0, 0.0], disc())]).weightless();
+        let world = lab.run(scene, 1.0, |_| ())?;
+        let given = [speed * cos * cos, -speed * cos * sin];
+        let ([ax, ay], [bx, by]) = (velocity(&world, 0), velocity(&world, 1));
+        let off = [ax - speed + given[0], ay + given[1], bx - given[0], by - given[1]];
+        worst = largest(off.map(f64::abs).into_iter().chain([worst]));
+    }
+    Ok(Finding::new(worst / speed, 0.0, 0.01))
+}
+
+/// A27. Flights of √(2 h/g), then of 2 √(2 h/g) eᵏ: together √(2 h/g) (1 + e)/(1 − e).
+fn rest(lab: &Lab) -> Result<Finding, Failure> {
+    let (height, e, radius): (f64, f64, f64) = (2.0, 0.5, 0.5);
+    let ball = SceneShape::disc(radius).friction(0.0).restitution(e);
+    let scene = Scene::new("rest", vec![ground(20.0, 0.0), SceneBody::dynamic([0.0, height + radius], ball)]);
+    let (mut last, dt) = (0.0, scene.dt);
+    lab.run(scene, 4.0, |world| {
+        // Beyond what gravity gives in a step: what rests does not.
+        if velocity(world, 1)[1].abs() > G * dt {
+            last = time(world);
+        }
+    })?;
+    let truth = (2.0 * height / G).sqrt() * (1.0 + e) / (1.0 - e);
+    Ok(Finding::new(last, truth, 2.0 * dt / (1.0 - e)))
+}
+
+/// A27. A body turns about a corner A with ω until its next corner B meets the ground, which is rough: about B its angular momentum
+/// stays, and A is free to leave. With both at d left and right of below the centre and the centre h above the ground, it is
+/// I ω + m (h² − d²) ω before and (I + m (h² + d²)) ω' after: 11/17 of the spin for a hexagon, 1 − 3/2 sin² α for a box.
+fn edges(lab: &Lab) -> Result<Finding, Failure> {
+    let hexagon: Vec<[f64; 2]> =
+        (0..6).map(|k| f64::from(k) * FRAC_PI_3).map(|a| [a.cos(), a.sin()]).collect();
+    let of_box = |d: f64, h: f64| (SceneShape::rectangle(d, h), d, h, (d * d + h * h) / 3.0);
+    let shapes = [
+        (SceneShape::polygon(hexagon), 0.5, 0.75f64.sqrt(), 5.0 / 12.0),
+        of_box(0.5, 0.5),
+        of_box(0.5, 0.8),
+        of_box(0.25, 1.0),
+    ];
+    let (rate, lean) = (2.0, 1e-3f64);
+    let (mut worst, mut note) = (0.0, String::new());
+    for (shape, d, h, inertia) in shapes {
+        let truth = (inertia + h * h - d * d) / (inertia + h * h + d * d);
+        let (sin, cos) = lean.sin_cos();
+        // From A, the left corner at the origin, against the clock by `lean`; it turns with the clock.
+        let at = [d * cos - h * sin, d * sin + h * cos];
+        let body = SceneBody::dynamic(at, shape.friction(3.0))
+            .turned(lean)
+            .moving([rate * at[1], -rate * at[0]], -rate);
+        let mut world = lab.world(Scene::new("edges", vec![ground(20.0, 3.0), body]).weightless())?;
+        world.step()?;
+        let kept = spin(&world, 1) / -rate;
+        worst = largest([worst, (kept - truth).abs()]);
+        note += &format!("{kept:.5} for {truth:.5}; ");
+    }
+    Ok(Finding::new(worst, 0.0, 1e-3).note(note.trim_end_matches("; ")))
+}
+
+/// A27. A dense disc falls on the tip of a light triangle that stands on the tip of one that slides. Friction and contacts without
+/// restitution only take energy; each step adds at most what gravity does.
+fn energy(lab: &Lab) -> Result<Finding, Failure> {
+    let triangle = |d: f64, h: f64| SceneShape::polygon(vec![[-d, -h], [d, -h], [0.0, h]]);
+    let bodies = vec![
+        ground(20.0, 0.6),
+        SceneBody::dynamic([0.0, 0.05], triangle(0.057, 0.046)).moving([-2.41, 0.0], 0.0),
+        SceneBody::dynamic([0.0, 0.15], triangle(0.0413, 0.0496).density(0.1)),
+        SceneBody::dynamic([0.0, 0.23], SceneShape::disc(0.0307).friction(0.0).density(100.0))
+            .moving([0.0, -10.0], 0.0),
+    ];
+    let scene = Scene::new("energy", bodies);
+    let potential =
+        |world: &World| -> f64 { dynamic(world).map(|(i, m, _)| m * G * center(world, i)[1]).sum() };
+    let world = lab.world(scene.clone())?;
+    let start = kinetic_energy(&world) + potential(&world);
+    let mut most = start;
+    lab.run(scene, 0.1, |world| most = largest([most, kinetic_energy(world) + potential(world)]))?;
+    Ok(Finding::new(most / start - 1.0, 0.0, 1e-3))
+}

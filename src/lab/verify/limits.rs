@@ -1,0 +1,125 @@
+//! B24: piles that statics lets stand by little.
+
+use super::Required::{No, Yes};
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+use std::f64::consts::PI;
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B24.deck",
+        "slip in 10 s of twenty plates on an incline, µ 3 % above tan θ",
+        "m",
+        "A1.stick: 1e-4 m",
+        deck,
+        No("friction of many joints has not converged in the first steps, and what slips turns"),
+    ),
+    Case::new(
+        "B24.bricks",
+        "overhang of eight bricks at which they fall, over L/2 (1 + 1/2 + … + 1/8)",
+        "1",
+        "0.1 %, as for A1",
+        bricks,
+        No("preload has no moment on one contact: what sags at an edge turns the bricks above"),
+    ),
+    Case::new(
+        "B24.logs",
+        "least friction under three logs, and between them, over (2 − √3)/3 and 2 − √3, worse of two",
+        "1",
+        "1 %, as for B10",
+        logs,
+        Yes("Coulomb's law in the last sweep"),
+    ),
+    Case::new(
+        "B24.shaft",
+        "loads of two smooth discs in a shaft, on floor, walls and each other, worst",
+        "N",
+        "what the jitter limit of B5 does to momentum in a step",
+        shaft,
+        Yes("two bodies: their four rows converge in a few warm-started steps"),
+    ),
+];
+
+/// B24. Every joint needs tan θ of its load, and the weight acts 0.29 m off the middle of a half width of 0.5 m.
+fn deck(lab: &Lab) -> Result<Finding, Failure> {
+    let (friction, half) = (0.3, 0.05);
+    let slope = f64::atan(friction / 1.03);
+    let mut bodies = vec![ground(50.0, friction)];
+    bodies.extend((0..20).map(|i| {
+        let plate = SceneShape::rectangle(0.5, half).friction(friction);
+        SceneBody::dynamic([0.0, half * f64::from(2 * i + 1)], plate)
+    }));
+    let mut scene = Scene::new("deck", bodies);
+    scene.gravity = [G * slope.sin(), -G * slope.cos()];
+    let world = lab.run(scene, 10.0, |_| ())?;
+    let off = dynamic(&world).map(|(i, _, _)| {
+        let [x, y] = center(&world, i);
+        x.hypot(y - half * (2 * i - 1) as f64)
+    });
+    Ok(Finding::new(largest(off), 0.0, 1e-4))
+}
+
+/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their centre of mass over its edge.
+fn bricks(lab: &Lab) -> Result<Finding, Failure> {
+    let (count, half, high) = (8, 1.0, 0.25);
+    let found = bisect(0.9, 1.1, |part| {
+        let table = SceneBody::fixed([0.0, -0.5], SceneShape::rectangle(half, 0.5));
+        let (mut bodies, mut out) = (vec![table], 0.0);
+        for i in 0..count {
+            out += part * half / f64::from(count - i);
+            let brick = SceneShape::rectangle(half, high);
+            bodies.push(SceneBody::dynamic([out, high * f64::from(2 * i + 1)], brick));
+        }
+        let world = lab.run(Scene::new("bricks", bodies), 8.0, |_| ())?;
+        Ok((center(&world, count as usize)[0] - out).abs() > 0.1)
+    })?;
+    Ok(Finding::new(found, 1.0, 1e-3))
+}
+
+/// B24. Two logs that touch and a third on them: with N between them at 30° from the vertical, a lower one rests without rolling if
+/// the friction F at both its contacts is the same, and N sin 30° = F (1 + cos 30°), so F/N = tan 15° = 2 − √3. The third weighs
+/// 2 (N cos 30° + F sin 30°) = 2 N, so the ground bears 3 N with F.
+fn logs(lab: &Lab) -> Result<Finding, Failure> {
+    let radius = 0.5;
+    let between = 2.0 - 3f64.sqrt();
+    let stands = |on_ground: f64, between: f64| -> Result<bool, Failure> {
+        // Two surfaces mix as the root of their product.
+        let floor = ground(50.0, on_ground * on_ground / between);
+        let log = |x: f64, y: f64| SceneBody::dynamic([x, y], SceneShape::disc(radius).friction(between));
+        let top = radius * (1.0 + 3f64.sqrt());
+        let scene = Scene::new("logs", vec![floor, log(-radius, radius), log(radius, radius), log(0.0, top)]);
+        let world = lab.run(scene, 4.0, |_| ())?;
+        Ok((center(&world, 3)[1] - top).abs() < 0.02)
+    };
+    let below = bisect(0.8, 1.2, |part| stands(part * between / 3.0, 0.6))?;
+    let beside = bisect(0.8, 1.2, |part| stands(0.6, part * between))?;
+    let worst = if (below - 1.0).abs() > (beside - 1.0).abs() { below } else { beside };
+    Ok(Finding::new(worst, 1.0, 0.01).note(format!("{below:.5} under, {beside:.5} between")))
+}
+
+/// B24. Discs of radius r in a shaft of width w touch with their line of centres at sin β = (w − 2 r)/2 r from the vertical: the
+/// floor bears 2 m g, each wall m g tan β, and they bear m g/cos β from each other.
+fn shaft(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, width) = (0.5, 1.6);
+    let sin: f64 = (width - 2.0 * radius) / (2.0 * radius);
+    let cos = (1.0 - sin * sin).sqrt();
+    let wall = |x: f64| SceneBody::fixed([x, 0.0], SceneShape::line(20.0).friction(0.0)).turned(PI / 2.0);
+    let disc = |x: f64, y: f64| SceneBody::dynamic([x, y], SceneShape::disc(radius).friction(0.0));
+    let bodies = vec![
+        ground(20.0, 0.0),
+        wall(0.0),
+        wall(width),
+        disc(radius, radius),
+        disc(width - radius, radius + 2.0 * radius * cos),
+    ];
+    let world = lab.run(Scene::new("shaft", bodies), 4.0, |_| ())?;
+    let weight = 0.5 * mass(&world) * G;
+    let load = |a: u32| {
+        let of_a = world.contacts.iter().filter(|c| c.body_a == a);
+        of_a.map(normal_impulse).sum::<f64>() / f64::from(world.settings.dt)
+    };
+    let truths = [2.0 * weight, weight * sin / cos, weight * sin / cos, weight / cos];
+    let off = (0..4).map(|a| (load(a) - truths[a as usize]).abs());
+    Ok(Finding::new(largest(off), 0.0, load_tolerance(mass(&world), 1.0 / 60.0)))
+}

@@ -1,0 +1,165 @@
+//! A26: bodies that rock and roll where the place of their contact moves.
+
+use super::Required::{No, Yes};
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::engine::bodies::BodyKind;
+use crate::engine::world::World;
+use crate::lab::scenes::{Circle, Geometry, Scene, SceneBody, SceneShape};
+use std::f64::consts::{PI, TAU};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A26.plank",
+        "amplitude of a plank that rocks on a round support, the tenth second over the first",
+        "1",
+        "1 %: a peak between two steps is missed by (ω dt)²/8, a thousandth",
+        plank,
+        No("within a step a contact stays where it was at its beginning: its torque lags by half a step"),
+    ),
+    Case::new(
+        "A26.eccentric",
+        "the same of a disc whose heavy core is off its centre, and which rolls to and fro",
+        "1",
+        "1 %, as for A26.plank",
+        eccentric,
+        No("within a step a contact stays where it was at its beginning: its torque lags by half a step"),
+    ),
+    Case::new(
+        "A26.rollers",
+        "period of a plank on two rollers that turn towards each other",
+        "s",
+        "1 %, as for A1.slip",
+        rollers,
+        Yes("friction is µ times loads that are found together with it"),
+    ),
+    Case::new(
+        "A26.corner",
+        "spin of a disc that turns in a corner of floor and wall, after half a second",
+        "rad/s",
+        "0.5 %, as for A3",
+        corner,
+        Yes("two rows of one body converge in a few warm-started steps"),
+    ),
+    Case::new(
+        "A26.turntable",
+        "slip in 10 s of a box that a turning frame carries, farther from the axis than its friction needs",
+        "m",
+        "A1.stick: 1e-4 m",
+        turntable,
+        No(
+            "within a step bodies move along tangents, and what is carried outwards is pushed back along the wall's normal",
+        ),
+    ),
+];
+
+/// rad, of a body that turns by less than π.
+fn angle(world: &World, i: usize) -> f64 {
+    f64::from(world.bodies.rotation_sin[i]).atan2(f64::from(world.bodies.rotation_cos[i]))
+}
+
+/// The greatest angle of body 1 in the last `period` of 10 s, over that in the first. Rolling takes no energy, so it is 1.
+fn growth(lab: &Lab, scene: Scene, period: f64) -> Result<Finding, Failure> {
+    let seconds = 10.0;
+    let (mut first, mut last) = (0.0, 0.0);
+    lab.run(scene, seconds, |world| {
+        let (now, turned) = (time(world), angle(world, 1).abs());
+        if now <= period {
+            first = largest([first, turned]);
+        }
+        if now > seconds - period {
+            last = largest([last, turned]);
+        }
+    })?;
+    Ok(Finding::new(last / first, 1.0, 0.01))
+}
+
+/// A26. A plank of thickness 2 b on a fixed disc of radius R, rolled by φ from its middle: the contact is at R (sin φ, cos φ),
+/// and the middle of the plank's lower face R φ before it. T = 2π √((k² + b²)/(g (R − b))).
+fn plank(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, half, b, start) = (1.0, 1.0, 0.1, 0.05f64);
+    let (sin, cos) = start.sin_cos();
+    let across = (radius + b) * sin - radius * start * cos;
+    let up = (radius + b) * cos + radius * start * sin;
+    let support = SceneBody::fixed([0.0, 0.0], SceneShape::disc(radius).friction(1.0));
+    let plank = SceneBody::dynamic([across, up], SceneShape::rectangle(half, b).friction(1.0)).turned(-start);
+    let squared = (half * half + b * b) / 3.0;
+    let period = TAU * ((squared + b * b) / (G * (radius - b))).sqrt();
+    growth(lab, Scene::new("plank", vec![support, plank]), period)
+}
+
+/// A26. A light disc of radius R with a dense core of radius r, d below its centre; its centre of mass is e below it.
+/// T = 2π √((I + m (R − e)²)/(m g e)).
+fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, core, below, dense, start) = (0.5, 0.1, 0.3, 100.0, 0.1);
+    let heavy = Geometry::Circle(Circle { center: [0.0, -below], radius: core });
+    let mut disc =
+        SceneBody::dynamic([-radius * start, radius], SceneShape::disc(radius).friction(1.0)).turned(start);
+    disc.shapes.push(SceneShape::new(heavy).density(dense).friction(1.0));
+    let (light, heavy) = (PI * radius * radius, dense * PI * core * core);
+    let e = heavy * below / (light + heavy);
+    let inertia = light * (0.5 * radius * radius + e * e) + heavy * (0.5 * core * core + (below - e).powi(2));
+    let at_contact = inertia + (light + heavy) * (radius - e).powi(2);
+    let period = TAU * (at_contact / ((light + heavy) * G * e)).sqrt();
+    growth(lab, Scene::new("eccentric", vec![ground(50.0, 1.0), disc]), period)
+}
+
+/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its centre:
+/// N₁ − N₂ = −m g x/(d − µ b), so that T = 2π √((d − µ b)/(µ g)).
+fn rollers(lab: &Lab) -> Result<Finding, Failure> {
+    let (friction, d, b, radius, start) = (0.3, 1.0, 0.01, 0.25, 0.2);
+    let roller = |side: f64| {
+        let disc = SceneShape::disc(radius).friction(friction);
+        SceneBody::new(BodyKind::Kinematic, [side * d, -radius], disc).moving([0.0, 0.0], side * 40.0)
+    };
+    let plank = SceneBody::dynamic([start, b], SceneShape::rectangle(3.0, b).friction(friction));
+    let scene = Scene::new("rollers", vec![roller(-1.0), roller(1.0), plank]);
+    let (mut before, mut crossings) = ((0.0, start), Vec::new());
+    lab.run(scene, 8.0, |world| {
+        let now = (time(world), center(world, 2)[0]);
+        if (now.1 > 0.0) != (before.1 > 0.0) {
+            crossings.push(now.0 - now.1 * (now.0 - before.0) / (now.1 - before.1));
+        }
+        before = now;
+    })?;
+    let [first, .., last] = crossings[..] else {
+        return Err(Failure::Unmeasured("the plank does not swing".into()));
+    };
+    let period = 2.0 * (last - first) / (crossings.len() - 1) as f64;
+    let truth = TAU * ((d - friction * b) / (friction * G)).sqrt();
+    Ok(Finding::new(period, truth, 0.01 * truth))
+}
+
+/// A26. A disc that turns against the clock on the floor is pressed to the wall on its left by µ N, which carries µ² N of its weight:
+/// N = m g/(1 + µ²), and ω' = −2 µ (1 + µ) g/((1 + µ²) r).
+fn corner(lab: &Lab) -> Result<Finding, Failure> {
+    let (friction, radius, start, seconds) = (0.4, 0.5, 20.0, 0.5);
+    let wall = SceneBody::fixed([0.0, 0.0], SceneShape::line(20.0).friction(friction)).turned(PI / 2.0);
+    let disc = SceneBody::dynamic([radius, radius], SceneShape::disc(radius).friction(friction));
+    let scene = Scene::new("corner", vec![ground(20.0, friction), wall, disc.moving([0.0, 0.0], start)]);
+    let world = lab.run(scene, seconds, |_| ())?;
+    let slows = 2.0 * friction * (1.0 + friction) * G / ((1.0 + friction * friction) * radius);
+    let truth = start - slows * seconds;
+    Ok(Finding::new(spin(&world, 2), truth, 5e-3 * truth))
+}
+
+/// A26. A square frame turns at 3 rad/s without weight; a box lies on the inside of a wall, 1 m from its middle and 3.5 m from the
+/// axis along the normal. What it needs is µ = 1/3.5, what it has is 0.6.
+fn turntable(lab: &Lab) -> Result<Finding, Failure> {
+    let (rate, inner, half, aside) = (3.0, 4.0, 0.5, 1.0);
+    let mut frame = SceneBody::new(
+        BodyKind::Kinematic,
+        [0.0, 0.0],
+        SceneShape::rectangle_at([inner, 0.5], [0.0, -inner - 0.5]),
+    );
+    frame.shapes.push(SceneShape::rectangle_at([inner, 0.5], [0.0, inner + 0.5]));
+    frame.shapes.push(SceneShape::rectangle_at([0.5, inner], [-inner - 0.5, 0.0]));
+    frame.shapes.push(SceneShape::rectangle_at([0.5, inner], [inner + 0.5, 0.0]));
+    let height = half - inner;
+    let body = SceneBody::dynamic([aside, height], SceneShape::rectangle(half, half))
+        .moving([-rate * height, rate * aside], rate);
+    let scene = Scene::new("turntable", vec![frame.moving([0.0, 0.0], rate), body]).weightless();
+    let world = lab.run(scene, 10.0, |_| ())?;
+    let ([x, y], (sin, cos)) = (center(&world, 1), angle(&world, 0).sin_cos());
+    Ok(Finding::new((cos * x + sin * y - aside).abs(), 0.0, 1e-4))
+}

@@ -1,0 +1,93 @@
+//! B23: loads that come, go and wander within a step.
+
+use super::Required::No;
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::engine::bodies::BodyKind;
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+use std::f64::consts::PI;
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B23.release",
+        "spread of the velocities of ten boxes after the support of their column is gone",
+        "m/s",
+        "list, as for B9: 0.05 m/s",
+        release,
+        No(
+            "the first substep begins with the impulses of a load that is gone, and sweeps do not take all back",
+        ),
+    ),
+    Case::new(
+        "B23.rolling",
+        "speed of a disc of 100 kg that rolls over a floor of boxes of 0.25 kg, after 4 s",
+        "m/s",
+        "1 %, as for A1.slip",
+        rolling,
+        No("a box that comes under load sinks before preload follows, and the next edge is a step"),
+    ),
+    Case::new(
+        "B23.dropped",
+        "greatest upward speed of ten boxes of 0.1 m that fall on each other over gaps of 1 cm",
+        "m/s",
+        "g dt: the rounding of time to steps",
+        dropped,
+        No("approach below 3 a dt is no impact to the solver, and its overlap of v dt is pushed"),
+    ),
+];
+
+/// B23. Two smooth plates under a column of ten boxes go apart and leave both its corners at the same time, 1.99 s after the
+/// start. Nothing bears anything from then on: all boxes fall at the same speed.
+fn release(lab: &Lab) -> Result<Finding, Failure> {
+    let (speed, wait, count) = (5.0, 1.99, 10);
+    let end = speed * wait - 0.5;
+    let plate = |side: f64| {
+        let shape = SceneShape::rectangle(0.5 * (end + 2.0), 0.5).friction(0.0);
+        SceneBody::new(BodyKind::Kinematic, [-side * 0.5 * (end - 2.0), -0.5], shape)
+            .moving([side * speed, 0.0], 0.0)
+    };
+    let mut bodies = vec![plate(1.0), plate(-1.0)];
+    bodies.extend(
+        (0..count).map(|i| SceneBody::dynamic([0.0, f64::from(i) + 0.5], SceneShape::rectangle(0.5, 0.5))),
+    );
+    let world = lab.run(Scene::new("release", bodies), wait + 0.5, |_| ())?;
+    let speeds: Vec<f64> = dynamic(&world).map(|(i, _, _)| velocity(&world, i)[1]).collect();
+    let fastest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
+    let slowest = speeds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if fastest > -0.3 * G {
+        return Err(Failure::Unmeasured("the column does not fall".into()));
+    }
+    Ok(Finding::new(slowest - fastest, 0.0, 0.05))
+}
+
+/// B23. Boxes side by side are a flat floor: a disc that rolls keeps its speed, whatever it weighs.
+fn rolling(lab: &Lab) -> Result<Finding, Failure> {
+    let (radius, half, mass, speed, count) = (1.0, 0.25, 100.0, 5.0, 80);
+    let mut bodies = vec![ground(200.0, 0.6)];
+    bodies.extend(
+        (0..count).map(|i| {
+            SceneBody::dynamic([2.0 * half * f64::from(i), half], SceneShape::rectangle(half, half))
+        }),
+    );
+    let disc = SceneShape::disc(radius).density(mass / (PI * radius * radius));
+    bodies.push(
+        SceneBody::dynamic([6.0 * half, 2.0 * half + radius], disc).moving([speed, 0.0], -speed / radius),
+    );
+    let last = bodies.len() - 1;
+    let world = lab.run(Scene::new("rolling", bodies), 4.0, |_| ())?;
+    Ok(Finding::new(velocity(&world, last)[0], speed, 0.01 * speed))
+}
+
+/// B23. What falls on something without restitution never goes up.
+fn dropped(lab: &Lab) -> Result<Finding, Failure> {
+    let (half, gap) = (0.05, 0.01);
+    let mut bodies = vec![ground(20.0, 0.6)];
+    bodies.extend((0..10).map(|i| {
+        SceneBody::dynamic([0.0, half + f64::from(i) * (2.0 * half + gap)], SceneShape::rectangle(half, half))
+    }));
+    let mut fastest = 0.0;
+    let world = lab.run(Scene::new("dropped", bodies), 2.0, |world| {
+        fastest = largest(dynamic(world).map(|(i, _, _)| velocity(world, i)[1]).chain([fastest]));
+    })?;
+    Ok(Finding::new(fastest, 0.0, G * f64::from(world.settings.dt)))
+}
