@@ -44,6 +44,7 @@
 //!
 //! and the greater of both counts.
 
+use super::equilibrium::Equilibrium;
 use super::graph::{Graph, UNSUPPORTED};
 use super::statics::{self, Support};
 use crate::engine::bodies::{Bodies, BodyKind};
@@ -222,6 +223,7 @@ pub struct Piles {
     is_loaded: Vec<bool>,
     /// Of one body.
     supports: Vec<Support>,
+    equilibrium: Equilibrium,
 }
 
 impl Piles {
@@ -245,6 +247,7 @@ impl Piles {
         let vertical = self.slowness(&search);
         if g > 0.0 {
             self.weigh(bodies, contacts, gravity.as_dvec2(), still, h);
+            self.balance(bodies, contacts, gravity.as_dvec2(), still, h);
         }
         let search = Search { bodies, contacts, up: up.perp(), g, still, dt };
         self.build(&search);
@@ -417,6 +420,17 @@ impl Piles {
         }
     }
 
+    /// Balances the loads of bodies that begin; see [`super::equilibrium`].
+    fn balance(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
+        let begins =
+            |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !self.is_loaded[body as usize];
+        let rests = |contact: &Contact, p: usize| rests(bodies, contact, &contact.manifold.points[p], still);
+        self.equilibrium.balance(bodies, contacts, gravity, h, begins, rests);
+        for contact in contacts.iter_mut().filter(|c| begins(c.body_a) || begins(c.body_b)) {
+            contact.weight = contact.manifold.points().iter().map(|p| p.normal_impulse / h).sum();
+        }
+    }
+
     /// The greatest slowness of parts that nothing bears: n bodies of the mass M in a chain that is held in the
     /// middle have Σ_j M_j/m_p ≤ (n/2) (M/2)/2 at each end, over 2/5 of the least mass (two points of a box).
     fn unsupported(&mut self, search: &Search<'_>) -> f64 {
@@ -483,6 +497,7 @@ impl Piles {
             + held(&self.forces)
             + held(&self.is_loaded)
             + held(&self.supports)
+            + self.equilibrium.held_bytes()
     }
 }
 
@@ -497,9 +512,8 @@ fn supports<'c>(
     let contact = &contacts[index as usize];
     let is_b = contact.body_b == body;
     let normal = contact.manifold.normal.as_dvec2();
-    let rests =
-        move |p: &ManifoldPoint| p.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, p) <= still;
-    contact.manifold.points().iter().enumerate().filter(move |(_, p)| rests(p)).map(move |(point, p)| {
+    let points = contact.manifold.points().iter().enumerate();
+    points.filter(move |(_, p)| rests(bodies, contact, p, still)).map(move |(point, p)| {
         Support {
             contact: index,
             point,
@@ -509,6 +523,11 @@ fn supports<'c>(
             load: [0.0; 2],
         }
     })
+}
+
+/// A point touches, and moves by no more than `still` (m/s).
+fn rests(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint, still: f32) -> bool {
+    point.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, point) <= still
 }
 
 /// A load, now or before.

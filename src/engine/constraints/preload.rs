@@ -177,12 +177,24 @@ fn preload_segment<L: Lanes>(
             let sag = (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE));
             sag - (left * sag).min(most_left)
         };
-        let [_, mut last, weight, _] =
+        let [_, mut last, weight, mut tilt] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
         if weight.any_positive() {
             let borne = h * weight;
             let is_borne = L::splat(ROUNDED).mul_add(borne, impulse) - borne;
             let at_rest = goal(borne) + last.min(zero);
+            if layout.points == 2 {
+                let point = |p: usize| {
+                    let m = record[layout.at(p, layout.normal_mass)];
+                    let m = m.select_positive(m, L::splat(1.0));
+                    let sag = (compliance * record[layout.at(p, layout.normal_impulse)] / m).min(L::splat(SPECULATIVE_DISTANCE));
+                    sag
+                };
+                let second = record[layout.at(1, layout.normal_mass)];
+                let new = (zero - last).select_positive(zero, last.select_positive(zero, second.min(weight)));
+                let half = L::splat(0.5) * (point(1) - point(0));
+                tilt = new.select_positive(half, tilt);
+            }
             last = is_borne.select_positive(last.max(at_rest), last);
             filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
         }
@@ -197,10 +209,18 @@ fn preload_segment<L: Lanes>(
         let borne = rate.mul_add((held - borne).max(zero), borne);
         let preload = (borne + placed).min(most);
         let (placed, borne) = (preload.min(zero), preload.max(zero));
+        let tilt = if layout.points == 2 { { let most = borne.select_positive(borne + L::splat(LEFT), zero); second.select_positive(tilt.min(most).max(-most), zero) } } else { tilt };
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);
+            let borne = if layout.points == 2 { if p == 0 { borne - tilt } else { borne + tilt } } else { borne };
             let depth = L::splat(EARNED).mul_add(borne, deepest);
             record[at] = (record[at] - placed).max(-depth) - borne;
+        }
+        if layout.points == 2 {
+            let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&tilt));
+            for (&tilt, &contact) in floats.iter().zip(filled) {
+                contacts[contact as usize].lead = tilt;
+            }
         }
         let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&preload));
         for (&preload, &contact) in floats.iter().zip(filled) {

@@ -8,9 +8,10 @@
 //! ```
 //!
 //! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
-//! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = Aᵀ (A Aᵀ + ε)⁻¹ b. Points that would
-//! pull are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times. No point gets
-//! more than [`GREATEST`] times the force, as wedges would ask for.
+//! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = W Aᵀ (A W Aᵀ + ε)⁻¹ b, with the weight of a
+//! friction as large as the load of its point: points with one normal reach their cones together. Points that would pull
+//! are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times. No point gets more than
+//! [`GREATEST`] times the force, as wedges would ask for.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -46,6 +47,11 @@ impl Support {
         -self.normal.perp()
     }
 
+    /// Friction is at its bound.
+    fn slides(&self) -> bool {
+        self.load[1].abs() >= self.friction * self.load[0]
+    }
+
     /// What it pushes the body with (N).
     pub fn force(&self) -> DVec2 {
         self.load[0] * self.normal + self.load[1] * self.tangent()
@@ -62,23 +68,27 @@ pub(super) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
     let greatest = GREATEST * force.length();
     for round in 0..ROUNDS {
+        let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
         let (mut matrix, mut rest) = (DMat3::from_diagonal(DVec3::splat(RIDGE)), all);
         for support in supports.iter().filter(|s| s.load[0] > 0.0) {
             matrix += outer(column(support, support.normal));
             let tangent = column(support, support.tangent());
-            if round == 0 {
-                matrix += outer(tangent);
-            } else {
-                rest -= support.load[1] * tangent;
+            match support.slides() {
+                true => rest -= support.load[1] * tangent,
+                false => matrix += support.load[0] / most * outer(tangent),
             }
         }
         let solution = matrix.inverse() * rest;
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
             let normal = column(support, support.normal).dot(solution).clamp(0.0, greatest);
-            let tangent =
-                if round == 0 { column(support, support.tangent()).dot(solution) } else { support.load[1] };
+            let tangent = match support.slides() {
+                true => support.load[1],
+                false => support.load[0] / most * column(support, support.tangent()).dot(solution),
+            };
             let bound = support.friction * normal;
-            support.load = [normal, tangent.clamp(-bound, bound)];
+            // Before the first round nothing is known of how points share a load.
+            let tangent = if round == 0 { 0.0 } else { tangent.clamp(-bound, bound) };
+            support.load = [normal, tangent];
         }
     }
 }
