@@ -61,12 +61,11 @@ pub struct Contact {
     /// By how much the contact's springs are shortened (m), for solvers that do. Zero when it comes, but for the overlap
     /// that a body is put into the world with: negative.
     pub preload: f32,
-    /// What the contact bears in statics (N), until the solver has made use of it; see
-    /// [`crate::engine::constraints::piles`].
-    pub weight: f32,
-    /// Time from the beginning of the step to that of the contact's frame (s), see
-    /// [`crate::engine::narrowphase::frames`].
-    pub lead: f32,
+    /// Time for which `preload` is not raised (s), for solvers that have one.
+    pub wait: f32,
+    /// What turns its frame. Of a round shape the time from the beginning of the step to that of the frame (s), see
+    /// [`crate::engine::narrowphase::frames`]; of two points what the preload of the second is more than `preload` (m).
+    pub turn: f32,
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -83,7 +82,7 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
-    /// `[of the step's impulses, preload, weight, lead]`.
+    /// `[of the step's impulses, preload, wait, turn]`.
     pub const PRELOAD: usize = 7;
 }
 

@@ -48,7 +48,7 @@ pub(super) const MOST: usize = 32;
 
 /// How much faster than what forces make in a step something comes in (1). Slower impacts are left to soft contacts, as
 /// loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
-const FASTER: f32 = 3.0;
+const FASTER: f32 = 2.0;
 
 #[inline(never)]
 fn arrivals<L: Lanes>(

@@ -23,6 +23,8 @@ pub struct PassInput<'a> {
     pub bounces: &'a mut Bounces,
     /// All contacts.
     pub contacts: &'a mut [Contact],
+    /// What they bear in statics (N), where that has just been found; else empty.
+    pub weights: &'a [f32],
     /// Numbers that the solver keeps per contact point and per body.
     pub kept: &'a mut Kept,
     /// What the points of these batches keep within a step, as [`super::point_vector`] orders it; empty unless

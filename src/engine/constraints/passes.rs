@@ -66,6 +66,8 @@ pub struct Workspace {
     pub points: PointVector,
     /// Vectors that solvers have given back.
     pub vectors: Vec<PointVector>,
+    /// What contacts bear in statics (N), in the steps in which that has been found, else empty. `[contacts]`
+    pub weights: Vec<f32>,
     /// How impacts without restitution spread.
     pub plastic: PlasticImpacts,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
@@ -98,6 +100,7 @@ impl Workspace {
             + self.points.held_bytes()
             + vectors
             + self.plastic.held_bytes()
+            + held(&self.weights)
             + held(&self.masses)
     }
 }
@@ -848,7 +851,7 @@ impl<'a> Passes<'a> {
     fn over_part(&mut self, part: Part, pass: &dyn AnyPass) {
         let width = self.width_of(part);
         let Workspace {
-            rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, points, ..
+            rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, points, weights, ..
         } = &mut *self.work;
         let [lane_points, serial_points] =
             if points.is_empty() { [&mut [][..], &mut []] } else { points.parts([lanes, serial]) };
@@ -872,6 +875,7 @@ impl<'a> Passes<'a> {
             bounces,
             contacts: self.contacts,
             increments: motion.velocity_increments(),
+            weights,
             kept,
             points,
         };

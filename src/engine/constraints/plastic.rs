@@ -123,7 +123,7 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
-    /// Time of its frame (s); see [`Contact::lead`].
+    /// Time of its frame (s); see [`Contact::turn`].
     lead: f32,
     /// See [`Point::meet`].
     has_met: bool,
@@ -180,7 +180,7 @@ impl On<'_> {
             (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
             point.separation = at(layout.at(p, layout.separation));
-            point.lead = self.contacts[contact as usize].lead;
+            point.lead = self.contacts[contact as usize].turn;
             point
         })
     }

@@ -81,7 +81,7 @@ use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::rules::{Soft, Softness};
 use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{Lanes, prefetch_quad};
+use crate::engine::lanes::{Lanes, Quad, prefetch_quad};
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
 /// Follows the load and shortens the springs; see the [module](self).
@@ -115,6 +115,12 @@ const LEFT: f32 = 2e-5;
 /// second; shorter, it is thrown over at 240.
 const PLACED_TIME: f32 = 0.1;
 
+/// Part by which a load may fall without being one that comes and goes (1).
+const STEADY: f32 = 0.02;
+
+/// Time after the fall of a load in which preload is not raised (s).
+const WAIT: f32 = 1.0;
+
 /// Batches between asking for contacts and reading them.
 const AHEAD: usize = 3;
 
@@ -130,7 +136,7 @@ impl Pass for Preload {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            preload_segment::<L>(batches, segment, layout, on.contacts, self);
+            preload_segment::<L>(batches, segment, layout, on.contacts, on.weights, self);
         });
     }
 }
@@ -141,6 +147,7 @@ fn preload_segment<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     contacts: &mut [Contact],
+    weights: &[f32],
     &Preload { springs, share, rate, h, dt }: &Preload,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
@@ -171,60 +178,65 @@ fn preload_segment<L: Lanes>(
             impulse = impulse + record[layout.at(p, layout.normal_impulse)];
             mass = mass + record[layout.at(p, layout.normal_mass)];
         }
-        // A lane without a contact has no mass.
-        let mass = mass.select_positive(mass, L::splat(1.0));
+        // A lane without a contact has no mass, nor has a point that is not there.
+        let sag = |impulse: L, mass: L| {
+            let mass = mass.select_positive(mass, L::splat(1.0));
+            (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE))
+        };
         let goal = |impulse: L| {
-            let sag = (compliance * impulse / mass).min(L::splat(SPECULATIVE_DISTANCE));
+            let sag = sag(impulse, mass);
             sag - (left * sag).min(most_left)
         };
-        let [_, mut last, weight, mut tilt] =
-            L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(bytemuck::cast_slice(contacts), index);
-        if weight.any_positive() {
+        let second = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
+        let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
+        let [other, mut last, wait, mut tilt] =
+            L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, index);
+        if !weights.is_empty() {
+            let mut weight = zero;
+            let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut weight));
+            filled.iter().zip(lanes).for_each(|(&contact, lane)| *lane = weights[contact as usize]);
             let borne = h * weight;
             let is_borne = L::splat(ROUNDED).mul_add(borne, impulse) - borne;
             let at_rest = goal(borne) + last.min(zero);
             if layout.points == 2 {
-                let point = |p: usize| {
-                    let m = record[layout.at(p, layout.normal_mass)];
-                    let m = m.select_positive(m, L::splat(1.0));
-                    let sag = (compliance * record[layout.at(p, layout.normal_impulse)] / m).min(L::splat(SPECULATIVE_DISTANCE));
-                    sag
+                let of = |p: usize| {
+                    sag(record[layout.at(p, layout.normal_impulse)], record[layout.at(p, layout.normal_mass)])
                 };
-                let second = record[layout.at(1, layout.normal_mass)];
-                let new = (zero - last).select_positive(zero, last.select_positive(zero, second.min(weight)));
-                let half = L::splat(0.5) * (point(1) - point(0));
-                tilt = new.select_positive(half, tilt);
+                let begins = last.select_positive(zero, weight);
+                tilt = begins.select_positive(L::splat(0.5) * (of(1) - of(0)), tilt);
             }
+            let is_borne = weight.select_positive(is_borne, zero);
             last = is_borne.select_positive(last.max(at_rest), last);
-            filled.iter().for_each(|&contact| contacts[contact as usize].weight = 0.0);
         }
         last = last.max(lowest);
         let (placed, borne) = (last.min(zero), last.max(zero));
         let placed = kept.mul_add(placed, L::splat(LEFT)).min(zero);
         let most = goal(impulse);
-        // A point that is not there has no mass.
-        let second = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
+        let falls = second.select_positive(L::splat(1.0 - STEADY).mul_add(borne, -most), zero);
+        let wait = falls.select_positive(L::splat(WAIT), (wait - L::splat(dt)).max(zero));
         let held = second.select_positive(most, L::splat(HELD) * most);
-        let rate = second.select_positive(rate, quick);
+        let rate = second.select_positive(wait.select_positive(zero, rate), quick);
         let borne = rate.mul_add((held - borne).max(zero), borne);
         let preload = (borne + placed).min(most);
         let (placed, borne) = (preload.min(zero), preload.max(zero));
-        let tilt = if layout.points == 2 { { let most = borne.select_positive(borne + L::splat(LEFT), zero); second.select_positive(tilt.min(most).max(-most), zero) } } else { tilt };
+        let widest = second.select_positive(borne.select_positive(borne + L::splat(LEFT), zero), zero);
+        let tilt = tilt.min(widest).max(-widest);
         for p in 0..layout.points {
             let at = layout.at(p, layout.separation);
-            let borne = if layout.points == 2 { if p == 0 { borne - tilt } else { borne + tilt } } else { borne };
+            let borne = if p == 0 { borne - tilt } else { borne + tilt };
             let depth = L::splat(EARNED).mul_add(borne, deepest);
             record[at] = (record[at] - placed).max(-depth) - borne;
         }
-        if layout.points == 2 {
-            let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&tilt));
-            for (&tilt, &contact) in floats.iter().zip(filled) {
-                contacts[contact as usize].lead = tilt;
-            }
+        if filled.len() == L::WIDTH {
+            let values = [other, preload, wait, tilt];
+            L::scatter_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, index, values);
+            continue;
         }
-        let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&preload));
-        for (&preload, &contact) in floats.iter().zip(filled) {
-            contacts[contact as usize].preload = preload;
+        let [preload, wait, tilt] = &[preload, wait, tilt];
+        let lanes = |x| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x));
+        for (lane, &contact) in filled.iter().enumerate() {
+            let contact = &mut contacts[contact as usize];
+            [contact.preload, contact.wait, contact.turn] = [preload, wait, tilt].map(|x| lanes(x)[lane]);
         }
     }
 }
