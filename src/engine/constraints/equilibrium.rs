@@ -95,7 +95,8 @@ impl Equilibrium {
         }
         self.accelerations.clear();
         self.accelerations.extend((0..bodies.len()).map(|i| {
-            let free = if begins(i as u32) { f64::from(bodies.gravity_scale[i]) * gravity } else { DVec2::ZERO };
+            let free =
+                if begins(i as u32) { f64::from(bodies.gravity_scale[i]) * gravity } else { DVec2::ZERO };
             [free.x, free.y, 0.0]
         }));
         for point in &self.points {

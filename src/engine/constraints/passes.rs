@@ -851,7 +851,17 @@ impl<'a> Passes<'a> {
     fn over_part(&mut self, part: Part, pass: &dyn AnyPass) {
         let width = self.width_of(part);
         let Workspace {
-            rows, sums, motion, lanes, serial, lane_bounces, serial_bounces, kept, points, weights, ..
+            rows,
+            sums,
+            motion,
+            lanes,
+            serial,
+            lane_bounces,
+            serial_bounces,
+            kept,
+            points,
+            weights,
+            ..
         } = &mut *self.work;
         let [lane_points, serial_points] =
             if points.is_empty() { [&mut [][..], &mut []] } else { points.parts([lanes, serial]) };

@@ -223,23 +223,23 @@ pub struct Piles {
     is_loaded: Vec<bool>,
     /// Of one body.
     supports: Vec<Support>,
+    /// Of each contact (N).
+    weights: Vec<f32>,
     equilibrium: Equilibrium,
 }
 
 impl Piles {
     /// The modes under `gravity` (m/s²), in steps of `dt` (s); without gravity there is no vertical, and x and y are
-    /// searched. Tells what contacts bear in statics (N), and writes impulses per substep of `h` (s) where there have been
-    /// none.
+    /// searched. Finds [`Self::weights`], and writes impulses per substep of `h` (s) where there have been none.
     pub fn modes(
         &mut self,
         bodies: &Bodies,
         contacts: &mut [Contact],
         gravity: Vec2,
         [dt, h]: [f32; 2],
-        weights: &mut Vec<f32>,
     ) -> PileModes {
-        weights.clear();
-        weights.resize(contacts.len(), 0.0);
+        self.weights.clear();
+        self.weights.resize(contacts.len(), 0.0);
         let up = -gravity.try_normalize().unwrap_or(Vec2::NEG_Y);
         let g = f64::from(gravity.length());
         // What gravity does in a step is still.
@@ -249,8 +249,8 @@ impl Piles {
         let [buckling, rocking] = if g > 0.0 { self.joints(&search) } else { [0.0; 2] };
         let vertical = self.slowness(&search);
         if g > 0.0 {
-            self.weigh(bodies, contacts, gravity.as_dvec2(), still, h, weights);
-            self.balance(bodies, contacts, gravity.as_dvec2(), still, h, weights);
+            self.weigh(bodies, contacts, gravity.as_dvec2(), still, h);
+            self.balance(bodies, contacts, gravity.as_dvec2(), still, h);
         }
         let search = Search { bodies, contacts, up: up.perp(), g, still, dt };
         self.build(&search);
@@ -375,7 +375,7 @@ impl Piles {
     /// contacts with the level below. Bodies that have borne nothing yet get their impulses per substep of `h` (s), too:
     /// of others motion knows better what a contact that comes will bear. Nor is anything written there for contacts of one
     /// point, since discs in a pile share their loads in many ways.
-    fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32, weights: &mut [f32]) {
+    fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let up = -gravity.normalize();
         self.forces.clear();
         self.forces.resize(bodies.len(), [0.0; 2]);
@@ -406,7 +406,7 @@ impl Piles {
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];
                 if is_new || contact.manifold.count > 1 {
-                    weights[support.contact as usize] += support.load[0] as f32;
+                    self.weights[support.contact as usize] += support.load[0] as f32;
                 }
                 let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
                 let arm = center(bodies, b) + support.arm - center(bodies, other);
@@ -424,12 +424,12 @@ impl Piles {
     }
 
     /// Balances the loads of bodies that begin; see [`super::equilibrium`].
-    fn balance(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32, weights: &mut [f32]) {
+    fn balance(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let begins =
             |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !self.is_loaded[body as usize];
         let rests = |contact: &Contact, p: usize| rests(bodies, contact, &contact.manifold.points[p], still);
         self.equilibrium.balance(bodies, contacts, gravity, h, begins, rests);
-        for (weight, contact) in weights.iter_mut().zip(contacts) {
+        for (weight, contact) in self.weights.iter_mut().zip(contacts) {
             if begins(contact.body_a) || begins(contact.body_b) {
                 *weight = contact.manifold.points().iter().map(|p| p.normal_impulse / h).sum();
             }
@@ -492,6 +492,11 @@ impl Piles {
         self.parent[b as usize] = a;
     }
 
+    /// What contacts bear in statics (N), as of the last call of [`Self::modes`]. `[contacts]`
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         self.graph.held_bytes()
@@ -502,6 +507,7 @@ impl Piles {
             + held(&self.forces)
             + held(&self.is_loaded)
             + held(&self.supports)
+            + held(&self.weights)
             + self.equilibrium.held_bytes()
     }
 }
@@ -518,15 +524,13 @@ fn supports<'c>(
     let is_b = contact.body_b == body;
     let normal = contact.manifold.normal.as_dvec2();
     let points = contact.manifold.points().iter().enumerate();
-    points.filter(move |(_, p)| rests(bodies, contact, p, still)).map(move |(point, p)| {
-        Support {
-            contact: index,
-            point,
-            normal: if is_b { normal } else { -normal },
-            arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
-            friction: f64::from(contact.friction),
-            load: [0.0; 2],
-        }
+    points.filter(move |(_, p)| rests(bodies, contact, p, still)).map(move |(point, p)| Support {
+        contact: index,
+        point,
+        normal: if is_b { normal } else { -normal },
+        arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
+        friction: f64::from(contact.friction),
+        load: [0.0; 2],
     })
 }
 

@@ -20,13 +20,20 @@
 //! At the start of each step
 //!
 //! ```text
-//! d ← min(d + (goal − d) · rate, goal),    goal = sag − min((1 − φ) sag, 20 µm)
+//! d ← min(d + (goal − d) · rate, (1 + ε) goal),    goal = sag − min((1 − φ) sag, 20 µm)
 //! ```
 //!
 //! slowly upwards, and down at once: a preload that the load does not call for would push bodies apart. The
-//! part φ < 1 leaves some overlap, 20 µm at most, so that points at rest stay points.
+//! part φ < 1 leaves some overlap, 20 µm at most, so that points at rest stay points. Falls by less than ε, which loads of
+//! a pile make in its first steps, change nothing.
 //! A contact that comes has none, and none has more than the distance within which points are contacts:
 //! what sinks deeper is squeezed by more than its load.
+//!
+//! # Loads that come and go
+//!
+//! A body that rocks takes the load from one of its sides, and brings it back. A preload that falls with the load and
+//! is raised under it does the work F Δd in each period: a box of 300 times the mass went on rocking for minutes on a
+//! pyramid. So a contact of two points whose load has fallen waits for [`WAIT`] before its preload is raised again.
 //!
 //! # Contacts that roll
 //!
@@ -35,16 +42,26 @@
 //! of one point is left alone once it has [`HELD`] of its goal,
 //!
 //! ```text
-//! d ← min(d + max(0, 0.9 goal − d) · rate, goal)
+//! d ← min(d + max(0, ½ goal − d) · rate, (1 + ε) goal)
 //! ```
 //!
 //! What is held is a spring as others are, which makes nothing swing. The sooner it is held the better: its rate is
-//! [`QUICKER`] times as high.
+//! [`QUICKER`] times as high. Waiting does not help there, some load always falls.
 //!
 //! # Where it begins
 //!
-//! What statics says of the load ([`Contact::weight`], from time to time) follows no motion, so that a preload taken
+//! What statics says of the load ([`PassInput::weights`], from time to time) follows no motion, so that a preload taken
 //! from it makes nothing swing: a contact that bears as much at least has its sag at once.
+//!
+//! For the same reason two points may differ in it. Where a contact begins with impulses of statics, its points have
+//! d ∓ e with
+//!
+//! ```text
+//! e = (sag₁ − sag₀)/2,    |e| ≤ d + 20 µm
+//! ```
+//!
+//! of their own loads, from then on: else what stands beside its middle is turned by its own weight, and bricks that
+//! overhang to the limit fall ([`Contact::turn`]).
 //!
 //! # How slowly
 //!
@@ -102,8 +119,9 @@ pub(super) struct Preload {
 /// Depth that springs see beyond that of the push speed, per preload (1).
 const EARNED: f32 = 20.0;
 
-/// Part of its goal from which on the preload of a contact of one point stays as it is (1).
-const HELD: f32 = 0.9;
+/// Part of its goal from which on the preload of a contact of one point stays as it is (1). In a pile of 2000 discs 0.9
+/// leaves less overlap and twice the speed after 500 steps.
+const HELD: f32 = 0.5;
 
 /// Time in which preload follows the load on two points over that on one (1).
 const QUICKER: f32 = 4.0;
@@ -115,10 +133,10 @@ const LEFT: f32 = 2e-5;
 /// second; shorter, it is thrown over at 240.
 const PLACED_TIME: f32 = 0.1;
 
-/// Part by which a load may fall without being one that comes and goes (1).
-const STEADY: f32 = 0.02;
+/// ε: part by which a load may fall without being one that comes and goes (1).
+const STEADY: f32 = 0.005;
 
-/// Time after the fall of a load in which preload is not raised (s).
+/// Time after the fall of a load in which preload is not raised (s). Twice as long rests no sooner.
 const WAIT: f32 = 1.0;
 
 /// Batches between asking for contacts and reading them.
@@ -212,12 +230,13 @@ fn preload_segment<L: Lanes>(
         let (placed, borne) = (last.min(zero), last.max(zero));
         let placed = kept.mul_add(placed, L::splat(LEFT)).min(zero);
         let most = goal(impulse);
-        let falls = second.select_positive(L::splat(1.0 - STEADY).mul_add(borne, -most), zero);
+        let kept_at_most = L::splat(1.0 + STEADY) * most;
+        let falls = second.select_positive(borne - kept_at_most, zero);
         let wait = falls.select_positive(L::splat(WAIT), (wait - L::splat(dt)).max(zero));
         let held = second.select_positive(most, L::splat(HELD) * most);
         let rate = second.select_positive(wait.select_positive(zero, rate), quick);
         let borne = rate.mul_add((held - borne).max(zero), borne);
-        let preload = (borne + placed).min(most);
+        let preload = (borne + placed).min(kept_at_most);
         let (placed, borne) = (preload.min(zero), preload.max(zero));
         let widest = second.select_positive(borne.select_positive(borne + L::splat(LEFT), zero), zero);
         let tilt = tilt.min(widest).max(-widest);

@@ -28,8 +28,7 @@ impl World {
             return;
         }
         let found = &mut self.found;
-        let weights = &mut self.work.weights;
-        weights.clear();
+        self.work.weights.clear();
         found.contacts_changed = self.narrow.is_changed;
         found.is_stale |= found.contacts_changed;
         let grown = 4 * self.contacts.len() > 5 * found.contacts;
@@ -40,8 +39,8 @@ impl World {
                 &mut self.contacts,
                 gravity,
                 [self.settings.dt, self.settings.h()],
-                weights,
             );
+            self.work.weights.extend_from_slice(self.piles.weights());
             *found = Found { modes, contacts: self.contacts.len(), is_stale: false, ..*found };
         }
     }
