@@ -1,6 +1,6 @@
 //! B24: piles that statics lets stand by little.
 
-use super::Required::{No, Yes};
+use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -13,7 +13,9 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "A1.stick: 1e-4 m",
         deck,
-        No("friction of many joints has not converged in the first steps, and what slips turns"),
+        Yes(
+            "impulses begin with the loads of statics, whose friction has the part of its cone that it needs at all points",
+        ),
     ),
     Case::new(
         "B24.bricks",
@@ -21,7 +23,7 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "0.1 %, as for A1",
         bricks,
-        No("preload has no moment on one contact: what sags at an edge turns the bricks above"),
+        Yes("two points have the preload of their own loads, and no joint turns"),
     ),
     Case::new(
         "B24.logs",
@@ -41,7 +43,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B24. Every joint needs tan θ of its load, and the weight acts 0.29 m off the middle of a half width of 0.5 m.
+/// B24. Every joint needs tan θ of its load as friction, and the weight acts 0.29 m off the middle of a half width of 0.5 m.
 fn deck(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, half) = (0.3, 0.05);
     let slope = f64::atan(friction / 1.03);
@@ -53,10 +55,7 @@ fn deck(lab: &Lab) -> Result<Finding, Failure> {
     let mut scene = Scene::new("deck", bodies);
     scene.gravity = [G * slope.sin(), -G * slope.cos()];
     let world = lab.run(scene, 10.0, |_| ())?;
-    let off = dynamic(&world).map(|(i, _, _)| {
-        let [x, y] = center(&world, i);
-        x.hypot(y - half * (2 * i - 1) as f64)
-    });
+    let off = dynamic(&world).map(|(i, _, _)| center(&world, i)[0].abs());
     Ok(Finding::new(largest(off), 0.0, 1e-4))
 }
 

@@ -1,6 +1,6 @@
 //! B23: loads that come, go and wander within a step.
 
-use super::Required::No;
+use super::Required::{No, Yes};
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::engine::bodies::BodyKind;
@@ -32,7 +32,7 @@ pub(super) static CASES: &[Case] = &[
         "m/s",
         "g dt: the rounding of time to steps",
         dropped,
-        No("approach below 3 a dt is no impact to the solver, and its overlap of v dt is pushed"),
+        Yes("what comes in at twice a dt is stopped before the step, and moves no body apart"),
     ),
 ];
 
