@@ -32,7 +32,8 @@ pub struct Divergence {
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// Its speed (m/s), or NaN.
+    /// Its speed (m/s) or its spin (rad/s), whichever is out of bounds, or else the greater; NaN if it has no finite velocity
+    /// or place.
     pub speed: f32,
 }
 

@@ -27,6 +27,7 @@ mod candidates;
 mod collide;
 mod counts;
 mod held;
+mod jams;
 mod lanes;
 mod memory;
 mod pairs;
