@@ -107,7 +107,7 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
 #[test]
 fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
     let text = r#"{"name":"caught","dt":0.03333333333333333,"bodies":[
-        {"type":"static","shapes":[{"segment":{"a":[-10,0],"b":[10,0]},"friction":0}]},
+        {"type":"static","position":[0,0],"shapes":[{"segment":{"a":[-10,0],"b":[10,0]},"friction":0}]},
         {"type":"dynamic","position":[0.5,1.2],"velocity":[-7.7,-18.5],"shapes":[
             {"polygon":{"points":[[-0.483,-0.119],[0.483,-0.119],[0,0.119]]},"friction":0},
             {"circle":{"center":[0.055,0.159],"radius":0.232},"friction":0}]}]}"#;
