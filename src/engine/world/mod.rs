@@ -292,9 +292,10 @@ impl World {
         }
         let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
         let (speed, spin) = (b.velocity(body).length(), w[body].abs());
-        let (quantity, speed) = if !(speed <= DIVERGED_SPEED) {
+        let is_bounded = |speed: f32| (0.0..=DIVERGED_SPEED).contains(&speed);
+        let (quantity, speed) = if !is_bounded(speed) {
             (Quantity::Speed, speed)
-        } else if !(spin <= DIVERGED_SPEED) {
+        } else if !is_bounded(spin) {
             (Quantity::Spin, spin)
         } else if !(x[body] + y[body]).is_finite() {
             (Quantity::Position, f32::NAN)
