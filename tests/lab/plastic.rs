@@ -101,3 +101,33 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
         assert!((y - 0.5).abs() < 1e-6 && world.bodies.velocity_y[1].abs() < 1e-6, "{height}: {y}");
     }
 }
+
+/// A body that is thrown half through a line has one shape above it and one below, and slides to the line's end: contacts
+/// that push against each other hold nothing that could shoot it off there, with many times the energy it has.
+#[test]
+fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
+    let text = r#"{"name":"caught","dt":0.03333333333333333,"bodies":[
+        {"type":"static","position":[0,0],"shapes":[{"segment":{"a":[-10,0],"b":[10,0]},"friction":0}]},
+        {"type":"dynamic","position":[0.5,1.2],"velocity":[-7.7,-18.5],"shapes":[
+            {"polygon":{"points":[[-0.483,-0.119],[0.483,-0.119],[0,0.119]]},"friction":0},
+            {"circle":{"center":[0.055,0.159],"radius":0.232},"friction":0}]}]}"#;
+    let scene = Scene::from_json(text, "caught.json".as_ref()).unwrap();
+    let energy = |world: &World| {
+        let b = &world.bodies;
+        let (spin, [_, y]) = (f64::from(b.angular_velocity[1]), b.center(1));
+        let turning = f64::from(b.inv_mass[1]) / f64::from(b.inv_inertia[1]) * spin * spin;
+        0.5 * (f64::from(b.velocity(1).length_squared()) + turning) + 10.0 * y
+    };
+    for substeps in [14, 64] {
+        let mut settings = crate::common::settings(find(DEFAULT).unwrap());
+        settings.budget.substeps = substeps;
+        let mut world = scene.build(settings).unwrap();
+        let (before, mut most, mut was_caught) = (energy(&world), 0.0, false);
+        for _ in 0..120 {
+            world.step().unwrap();
+            most = energy(&world).max(most);
+            was_caught |= world.contacts.len() == 2;
+        }
+        assert!(was_caught && most <= 1.01 * before, "{substeps} substeps: {before} to {most} J/kg");
+    }
+}

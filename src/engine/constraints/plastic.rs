@@ -245,9 +245,9 @@ impl Point {
         // D/2 × n and D/2 × t.
         let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
         let inertia = [a.delta[3], b.delta[3]];
-        for axis in 0..2 {
-            self.arms[0][axis] += shift[axis];
-            self.arms[1][axis] -= shift[axis];
+        for (axis, shift) in shift.into_iter().enumerate() {
+            self.arms[0][axis] += shift;
+            self.arms[1][axis] -= shift;
         }
         let direct = a.velocity[3] + b.velocity[3];
         let turns = |i: usize, j: usize| {

@@ -2,6 +2,7 @@
 
 use super::World;
 use super::candidates::Candidate;
+use super::jams::Jams;
 use super::recycle::{Pairs, Recycled};
 use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::lanes::{Quad, held};
@@ -32,6 +33,7 @@ pub(super) struct Narrow {
     /// New contacts, in the order in which they were met.
     fresh: Vec<Contact>,
     last_contacts: Vec<Contact>,
+    jams: Jams,
     /// Contacts there were after the last update.
     count: usize,
 }
@@ -118,6 +120,10 @@ impl World {
         let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
         recycled.take_up(&Pairs { candidates, of_kind, poses }, &mut self.contacts);
         narrow.count = self.contacts.len();
+        // Two bodies of one shape each have one contact.
+        if self.settings.solver.piles && self.shapes.len() > self.bodies.len() {
+            narrow.jams.release(&mut self.contacts);
+        }
         self.counts.pairs = narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
         self.counts.points = points;
@@ -142,7 +148,7 @@ impl Narrow {
 
     /// Bytes held for contacts, besides the list itself.
     pub fn contact_bytes(&self) -> usize {
-        held(&self.fresh) + held(&self.last_contacts)
+        held(&self.fresh) + held(&self.last_contacts) + self.jams.held_bytes()
     }
 
     /// Lets candidates find their contacts in a list that was put in the place of the last one;

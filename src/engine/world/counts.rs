@@ -25,6 +25,22 @@ pub struct StepCounts {
     pub constraint_bytes: usize,
 }
 
+/// What of a body left all bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum Quantity {
+    /// Its speed (m/s).
+    #[default]
+    Speed,
+    /// Its spin (rad/s).
+    Spin,
+    /// Its position, which is not finite.
+    Position,
+    /// Its angle, which is not finite.
+    Angle,
+}
+
 /// Where and when a simulation left all bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
@@ -32,17 +48,23 @@ pub struct Divergence {
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// Its speed (m/s), or NaN.
+    /// What of it is out of bounds.
+    pub quantity: Quantity,
+    /// How large that is (m/s or rad/s); NaN if it is not finite.
     pub speed: f32,
 }
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
-        if self.speed.is_finite() {
-            write!(f, "moves at {:.3e} m/s", self.speed)
-        } else {
-            write!(f, "has no finite speed")
+        let Divergence { step, body, quantity, speed } = self;
+        write!(f, "diverged at step {step}: body {body} ")?;
+        match quantity {
+            Quantity::Speed if speed.is_finite() => write!(f, "moves at {speed:.3e} m/s"),
+            Quantity::Spin if speed.is_finite() => write!(f, "spins at {speed:.3e} rad/s"),
+            Quantity::Speed => write!(f, "has no finite speed"),
+            Quantity::Spin => write!(f, "has no finite spin"),
+            Quantity::Position => write!(f, "has no finite position"),
+            Quantity::Angle => write!(f, "has no finite angle"),
         }
     }
 }

@@ -27,6 +27,7 @@ mod candidates;
 mod collide;
 mod counts;
 mod held;
+mod jams;
 mod lanes;
 mod memory;
 mod pairs;
@@ -35,7 +36,7 @@ mod recycle;
 mod settings;
 mod traits;
 
-pub use counts::{Divergence, StepCounts};
+pub use counts::{Divergence, Quantity, StepCounts};
 pub use held::{HeldWorld, Probe};
 pub use memory::{Component, Memory};
 pub use settings::{Order, Settings};
@@ -290,8 +291,18 @@ impl World {
             return Ok(());
         }
         let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
-        let speed = b.velocity(body).length().max(b.angular_velocity[body].abs());
-        Err(Divergence { step: self.step_index, body, speed })
+        let (speed, spin) = (b.velocity(body).length(), w[body].abs());
+        let is_bounded = |speed: f32| (0.0..=DIVERGED_SPEED).contains(&speed);
+        let (quantity, speed) = if !is_bounded(speed) {
+            (Quantity::Speed, speed)
+        } else if !is_bounded(spin) {
+            (Quantity::Spin, spin)
+        } else if !(x[body] + y[body]).is_finite() {
+            (Quantity::Position, f32::NAN)
+        } else {
+            (Quantity::Angle, f32::NAN)
+        };
+        Err(Divergence { step: self.step_index, body, quantity, speed })
     }
 
     /// Hash (FNV-1a) of every bit of the body state.

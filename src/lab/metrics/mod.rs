@@ -33,7 +33,7 @@ pub mod violation;
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, pair_key};
-use crate::engine::world::{Divergence, World};
+use crate::engine::world::{Divergence, Quantity, World};
 use balance::{Balance, ratio, weight};
 use distribution::Distribution;
 use glam::{DVec2, Vec2};
@@ -316,9 +316,12 @@ impl Observation {
 
 /// The fastest body, as what a run failed by.
 fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
-    let speeds = bodies.iter().map(|b| b.velocity.length().max(b.angular_velocity.abs()));
-    let (body, speed) = speeds.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-    Divergence { step, body, speed: speed as f32 }
+    let speeds = bodies
+        .iter()
+        .flat_map(|b| [(Quantity::Speed, b.velocity.length()), (Quantity::Spin, b.angular_velocity.abs())]);
+    let (i, (quantity, speed)) =
+        speeds.enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1)).unwrap_or_default();
+    Divergence { step, body: i / 2, quantity, speed: speed as f32 }
 }
 
 /// Every body in double precision.

@@ -5,7 +5,7 @@ use super::interleave::Sample;
 use super::pareto::{self, Point};
 use super::sweep::Swept;
 use crate::engine::params::Budget;
-use crate::engine::world::{Divergence, Order};
+use crate::engine::world::{Divergence, Order, Quantity};
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::Truth;
@@ -129,23 +129,24 @@ pub struct Failure {
     pub step: u64,
     /// Body index.
     pub body: usize,
+    /// What of it is out of bounds.
+    #[serde(default)]
+    pub quantity: Quantity,
     /// m/s or rad/s; none where it is not a finite number.
     pub speed: Option<f32>,
 }
 
 impl From<Divergence> for Failure {
     fn from(d: Divergence) -> Self {
-        Failure { step: d.step, body: d.body, speed: Some(d.speed).filter(|s| s.is_finite()) }
+        let speed = Some(d.speed).filter(|s| s.is_finite());
+        Failure { step: d.step, body: d.body, quantity: d.quantity, speed }
     }
 }
 
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: body {} ", self.step, self.body)?;
-        match self.speed {
-            Some(speed) => write!(f, "moves at {speed:.3e} m/s"),
-            None => write!(f, "has no finite speed"),
-        }
+        let &Failure { step, body, quantity, speed } = self;
+        Divergence { step, body, quantity, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
     }
 }
 
@@ -223,7 +224,7 @@ pub(crate) mod tests {
     }
 
     pub fn failed(lanes: usize) -> Record {
-        let failure = Failure { step: 7, body: 2, speed: None };
+        let failure = Failure { step: 7, body: 2, quantity: Quantity::Speed, speed: None };
         Record { sample: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
@@ -275,8 +276,11 @@ pub(crate) mod tests {
 
     #[test]
     fn a_failure_without_a_finite_speed_says_so() {
-        let of = |speed| Failure::from(Divergence { step: 3, body: 1, speed }).to_string();
-        assert_eq!(of(f32::NAN), "diverged at step 3: body 1 has no finite speed");
-        assert_eq!(of(2e5), "diverged at step 3: body 1 moves at 2.000e5 m/s");
+        let of =
+            |quantity, speed| Failure::from(Divergence { step: 3, body: 1, quantity, speed }).to_string();
+        assert_eq!(of(Quantity::Speed, f32::NAN), "diverged at step 3: body 1 has no finite speed");
+        assert_eq!(of(Quantity::Speed, 2e5), "diverged at step 3: body 1 moves at 2.000e5 m/s");
+        assert_eq!(of(Quantity::Spin, 2e5), "diverged at step 3: body 1 spins at 2.000e5 rad/s");
+        assert_eq!(of(Quantity::Position, f32::NAN), "diverged at step 3: body 1 has no finite position");
     }
 }
