@@ -23,13 +23,15 @@
 //! # What comes in
 //!
 //! A point is an impact if it closes its gap within the step, and faster than what forces alone make
-//! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests.
+//! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests. Where something round
+//! comes in, n is that of the moment of touch ([`super::touch`]).
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::bounces::Bounces;
 use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::restitution::{largest, point, rebound};
+use super::touch::Round;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use glam::Vec2;
@@ -70,6 +72,9 @@ const PER_POINT: usize = 3;
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
 
+/// Round shapes that come in along the normal of the beginning, but touch later, have the frame of then up to so many steps (1).
+pub(super) const TURNED: f32 = 2.0;
+
 impl Pass for Load {
     fn traffic(&self, _: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane { halves: 0, ..PerLane::of_bodies(1, FIRST, opposite) }
@@ -91,7 +96,7 @@ impl Pass for Wave {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            wave::<L>(on.rows, batches, segment, layout, on.bounces, self);
+            wave::<L>(on.rows, batches, segment, layout, on.bounces, on.contacts, on.increments, self);
         });
     }
 }
@@ -136,6 +141,15 @@ impl Pass for Book {
     }
 }
 
+/// a, e and the threshold of a lane.
+fn side_of(contact: &Contact, increments: &[[f32; 4]], rows: [u32; 2], &Load { h, dt }: &Load) -> [f32; FIRST] {
+    let [a, b] = rows.map(|row| {
+        let [x, y, ..] = increments[row as usize];
+        contact.manifold.normal.dot(Vec2::new(x, y)) / h
+    });
+    [a - b, contact.restitution, dt * (a.abs() + b.abs())]
+}
+
 #[inline(never)]
 fn load<L: Lanes>(
     batches: &mut Batches,
@@ -144,7 +158,7 @@ fn load<L: Lanes>(
     bounces: &mut Bounces,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &Load { h, dt }: &Load,
+    times: &Load,
 ) {
     let SegmentRecords { contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
@@ -156,19 +170,16 @@ fn load<L: Lanes>(
         floats.fill(0.0);
         // Lanes without a contact have e = 0, and bounce as little as contacts that have.
         for (lane, &contact) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
-            let Contact { restitution, manifold, .. } = &contacts[contact as usize];
-            let along = |row: u32| {
-                let [x, y, ..] = increments[row as usize];
-                manifold.normal.dot(Vec2::new(x, y))
-            };
-            let (a, b) = (along(row_a.entries()[lane]) / h, along(row_b.entries()[lane]) / h);
-            floats[lane] = a - b;
-            floats[L::WIDTH + lane] = *restitution;
-            floats[2 * L::WIDTH + lane] = dt * (a.abs() + b.abs());
+            let rows = [row_a.entries()[lane], row_b.entries()[lane]];
+            let side = side_of(&contacts[contact as usize], increments, rows, times);
+            for (k, value) in side.into_iter().enumerate() {
+                floats[k * L::WIDTH + lane] = value;
+            }
         }
     }
 }
 
+#[allow(clippy::too_many_arguments)]
 #[inline(never)]
 fn wave<L: Lanes>(
     rows: &[BodyRow],
@@ -176,32 +187,78 @@ fn wave<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    Wave { h, dt, found }: &Wave,
+    contacts: &mut [Contact],
+    increments: &[[f32; 4]],
+    &Wave { h, dt, ref found }: &Wave,
 ) {
-    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
-    let (zero, dt_lanes) = (L::zero(), L::splat(*dt));
-    let mut most = zero;
-    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
-        let (a, e, threshold) = (side[0], side[1], side[2]);
-        for p in 0..layout.points {
-            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
-            // Where it would be at the end of the step, and further.
-            let fall = a * L::splat(0.5 * (dt + h));
-            let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
-            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
-            let target = rebound(e * e * energy, a, s, *h);
-            let is_fast = (-threshold - v).select_positive(target, zero);
-            let comes_in = (-closes).select_positive(is_fast, zero);
-            let target = e.select_positive(comes_in, zero);
-            // A point that is not there has no mass.
-            let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
-            let at = FIRST + PER_POINT * p;
-            (side[at], side[at + 1], side[at + 2]) = (target, zero, zero);
-            most = most.max(target);
+    let is_held = !segment.pushes_a();
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let records = records.zip(contact.batches::<L::Index>());
+    let mut most = L::zero();
+    for (batch, (side, ((record, (row_a, row_b)), contact))) in
+        bounces.of::<L>(segment, layout.points).zip(records).enumerate()
+    {
+        let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        let mut fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], [h, dt]);
+        if fastest.any_positive() {
+            let mut is_turned = false;
+            for (lane, &index) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+                let comes_in = bytemuck::cast_slice::<L, f32>(std::slice::from_ref(&fastest))[lane] > 0.0;
+                let contact = &mut contacts[index as usize];
+                let Some(round) = Round::of(contact, is_held).filter(|_| comes_in) else { continue };
+                let ends = [row_a, row_b].map(|row| row.entries()[lane]);
+                let bodies = ends.map(|row| &rows[row as usize]);
+                let Some(frame) = round.frame(bodies, [-AHEAD * dt, TURNED * dt]) else { continue };
+                frame.write_contact(contact);
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+                frame.write_record(layout, bodies, |vector, value| floats[vector * L::WIDTH + lane] = value);
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(side);
+                let values = side_of(contact, increments, ends, &Load { h, dt });
+                for (k, value) in values.into_iter().enumerate() {
+                    floats[k * L::WIDTH + lane] = value;
+                }
+                is_turned = true;
+            }
+            if is_turned {
+                fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], [h, dt]);
+            }
         }
+        most = most.max(fastest);
     }
     found.set(largest(most).max(found.get()));
+}
+
+/// Writes how fast each point of a batch shall leave, zero where nothing comes in; returns the fastest (m/s).
+#[inline(always)]
+fn targets<L: Lanes>(
+    rows: &[BodyRow],
+    record: &[L],
+    layout: &Layout,
+    side: &mut [L],
+    [row_a, row_b]: [LaneIndex<L::Index>; 2],
+    [h, dt]: [f32; 2],
+) -> L {
+    let (zero, dt_lanes) = (L::zero(), L::splat(dt));
+    let (a, e, threshold) = (side[0], side[1], side[2]);
+    let mut most = zero;
+    for p in 0..layout.points {
+        let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
+        // Where it would be at the end of the step, and further.
+        let fall = a * L::splat(0.5 * (dt + h));
+        let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
+        let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+        let target = rebound(e * e * energy, a, s, h);
+        let is_fast = (-threshold - v).select_positive(target, zero);
+        let comes_in = (-closes).select_positive(is_fast, zero);
+        let target = e.select_positive(comes_in, zero);
+        // A point that is not there has no mass.
+        let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
+        let at = FIRST + PER_POINT * p;
+        (side[at], side[at + 1], side[at + 2]) = (target, zero, zero);
+        most = most.max(target);
+    }
+    most
 }
 
 /// Accumulated impulses along n and t (N·s) after which a point has gained `wanted` (m/s), or as much of it along t
