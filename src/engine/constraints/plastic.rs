@@ -34,9 +34,10 @@
 
 use super::batches::Batches;
 use super::features::{Features, Layout};
-use super::impact::{AHEAD, rough_impulses};
+use super::impact::{AHEAD, TURNED, rough_impulses};
 use super::segment::Segment;
 use super::sweep::turn;
+use super::touch::{Frame, Round};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes, held};
 use std::collections::VecDeque;
@@ -103,6 +104,7 @@ const STILL: Body =
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Point {
+    lane: u32,
     index: u32,
     contact: u32,
     /// Rows of a and b.
@@ -123,10 +125,12 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
-    /// Time of its frame (s); see [`Contact::lead`].
-    lead: f32,
+    /// From a to b, as far as they have moved against each other when arms end at one point (m).
+    apart: [f32; 2],
     /// See [`Point::meet`].
     has_met: bool,
+    /// What is round, until it is hit.
+    round: Option<Round>,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -141,22 +145,49 @@ pub(super) struct On<'a> {
     pub record_impulses: bool,
 }
 
+/// Where the record of a lane is.
+struct Place {
+    /// Which batches.
+    part: usize,
+    /// Its lane in these, and how many there are in a batch.
+    of: usize,
+    width: usize,
+    /// Its first float; the next quantity is `width` floats further.
+    first: usize,
+    layout: Layout,
+    pushes_a: bool,
+}
+
 impl On<'_> {
     fn lanes(&self) -> usize {
         self.batches[0].lanes() + self.batches[1].lanes()
     }
 
-    /// The points of a lane.
-    fn points(&self, lane: u32) -> [Point; 2] {
+    fn place(&self, lane: u32) -> Place {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         let (batches, width) = (&self.batches[part], self.batches[part].width());
         let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
         let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
-        let (layout, pushes_a) = (Layout::for_features(self.features, segment.opposite), segment.pushes_a());
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
-        let first = vector * width + in_segment % width;
+        let layout = Layout::for_features(self.features, segment.opposite);
+        Place { part, of, width, first: vector * width + in_segment % width, layout, pushes_a: segment.pushes_a() }
+    }
+
+    /// A point has the frame of the moment of touch.
+    fn turn(&mut self, point: &Point, frame: &Frame) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let rows = point.rows.map(|row| &self.rows[row as usize]);
+        frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
+        frame.write_contact(&mut self.contacts[point.contact as usize]);
+    }
+
+    /// The points of a lane.
+    fn points(&self, lane: u32) -> [Point; 2] {
+        let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
+        let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
         let contact = batches.contact()[of];
         let bounces = self.contacts[contact as usize].restitution > 0.0;
@@ -165,7 +196,7 @@ impl On<'_> {
         std::array::from_fn(|p| {
             let is_there = p < layout.points && !bounces;
             let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
-            let mut point = Point { contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+            let mut point = Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
             if mass <= 0.0 {
                 return point;
             }
@@ -180,7 +211,7 @@ impl On<'_> {
             (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
             point.separation = at(layout.at(p, layout.separation));
-            point.lead = self.contacts[contact as usize].lead;
+            point.round = Round::of(&self.contacts[contact as usize], !pushes_a);
             point
         })
     }
@@ -229,17 +260,25 @@ impl Point {
         }
     }
 
+    /// Has the frame of the moment of touch from now on.
+    fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
+        let k = frame.masses(self.rows.map(|row| &rows[row as usize]));
+        (self.normal, self.arms) = (frame.normal.to_array(), frame.arms);
+        (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| frame.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+        self.apart = [apart(0), apart(1)];
+    }
+
     /// Puts its place between where both bodies are at its time; see the [module](self).
-    fn meet(&mut self, rows: &[BodyRow], bodies: &[Body]) {
+    fn meet(&mut self, rows: &[BodyRow]) {
         self.has_met = true;
         if !self.pushes_a || self.friction == 0.0 {
             return;
         }
         let [a, b] = self.rows.map(|row| rows[row as usize]);
-        let flown = self.rows.map(|row| bodies[row as usize].flown);
         let apart = |k: usize| {
-            let now = self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
-            self.lead.neg_mul_add(flown[1][k] - flown[0][k], now)
+            self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]) - self.apart[k]
         };
         let ([x, y], [nx, ny]) = ([0.5 * apart(0), 0.5 * apart(1)], self.normal);
         // D/2 × n and D/2 × t.
@@ -351,7 +390,14 @@ impl PlasticImpacts {
         let listed = &mut self.listed[lane as usize];
         if *listed == NONE {
             *listed = self.points.len() as u32;
-            self.points.extend(on.points(lane));
+            let mut points = on.points(lane);
+            for point in points.iter_mut().filter(|point| point.mass > 0.0) {
+                // Arms end at one point at the time of the frame, if nothing is hit.
+                let ([a, b], time) =
+                    (point.rows.map(|row| self.bodies[row as usize].flown), on.contacts[point.contact as usize].lead);
+                point.apart = std::array::from_fn(|k| time * (b[k] - a[k]));
+            }
+            self.points.extend(points);
         }
         *listed as usize
     }
@@ -363,23 +409,35 @@ impl PlasticImpacts {
         if point.mass <= 0.0 {
             return;
         }
+        let mut touch = None;
         if point.impulse[0] == 0.0 {
-            let [vn, _] = point.velocity(on.rows);
-            if vn >= -slowest {
-                return;
+            let arrival = |point: &Point, rows: &[BodyRow]| {
+                let ([vn, _], gap) = (point.velocity(rows), point.gap(rows));
+                (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
+            };
+            let Some(mut time) = arrival(point, on.rows) else { return };
+            if let Some(round) = point.round {
+                let ends = point.rows.map(|row| &on.rows[row as usize]);
+                touch = round.frame(ends, [-on.dt, TURNED * on.dt]);
             }
-            let gap = point.gap(on.rows);
-            if vn.mul_add(AHEAD * on.dt, gap) >= 0.0 {
-                return;
+            if let Some(frame) = &touch {
+                let mut turned = *point;
+                turned.turn(frame, on.rows);
+                let Some(then) = arrival(&turned, on.rows) else { return };
+                (*point, time) = (turned, then);
             }
-            let time = gap / -vn;
             point.time = if time < -on.dt { 0.0 } else { time };
         }
         for row in point.rows {
             point.time = point.time.max(self.bodies[row as usize].time);
         }
+        if let Some(frame) = &touch {
+            self.points[place].round = None;
+            on.turn(&self.points[place], frame);
+        }
+        let point = &mut self.points[place];
         if !point.has_met {
-            point.meet(on.rows, &self.bodies);
+            point.meet(on.rows);
         }
         let [vn, vt] = point.velocity(on.rows);
         let old = point.impulse;
