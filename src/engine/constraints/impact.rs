@@ -51,12 +51,18 @@ pub(super) struct Wave {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Nothing has bounced yet.
+    pub is_first: bool,
+    /// Impacts are at their times.
+    pub timed: bool,
     /// Whether something comes in: greater than zero.
     pub found: Cell<f32>,
 }
 
 /// One Gauss–Seidel sweep over the points of a wave.
 pub(super) struct Solve {
+    /// Impacts are at their times.
+    pub timed: bool,
     /// Greatest change of a velocity, as a part of what the wave asks for (1).
     pub change: Cell<f32>,
 }
@@ -64,10 +70,16 @@ pub(super) struct Solve {
 /// Adds the impulses of a wave to those of the step.
 pub(super) struct Book;
 
+/// Puts bodies back to where they come from, had they always flown as they leave.
+pub(super) struct PutBack;
+
+/// What has bounced leaves by itself: it is not pushed out as well.
+pub(super) struct Leave;
+
 /// Side record of an impact: a (m/s²), e (1), threshold (m/s); then per point target (m/s; zero where
-/// nothing comes in), N and T (N·s). See [`Bounces`].
+/// nothing comes in), N and T (N·s), its time (s), and whether it has bounced in any wave (1). See [`Bounces`].
 const FIRST: usize = 3;
-const PER_POINT: usize = 3;
+const PER_POINT: usize = 5;
 
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
@@ -110,7 +122,7 @@ impl Pass for Solve {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            solve::<L>(on.rows, batches, segment, layout, on.bounces, &self.change);
+            solve::<L>(on.rows, batches, segment, layout, on.bounces, self);
         });
     }
 }
@@ -148,6 +160,92 @@ fn side_of(contact: &Contact, increments: &[[f32; 4]], rows: [u32; 2], &Load { h
         contact.manifold.normal.dot(Vec2::new(x, y)) / h
     });
     [a - b, contact.restitution, dt * (a.abs() + b.abs())]
+}
+
+impl Pass for PutBack {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 4 + layout.points * (layout.arms() + PER_POINT);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            put_back::<L>(on.rows, batches, segment, layout, on.bounces);
+        });
+    }
+}
+
+impl Pass for Leave {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 2 + layout.points * (layout.arms() + 2);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+            let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+            for (side, (record, (row_a, row_b))) in on.bounces.of::<L>(segment, layout.points).zip(records) {
+                for p in 0..layout.points {
+                    let bounced = side[FIRST + PER_POINT * p + 4];
+                    if largest(bounced) > 0.0 {
+                        let [_, gap] = point::<L>(on.rows, record, layout, p, row_a, row_b);
+                        let raised = bounced.select_positive(gap.min(L::zero()), L::zero());
+                        let at = layout.at(p, layout.separation);
+                        record[at] = record[at] - raised;
+                    }
+                }
+            }
+        });
+    }
+}
+
+#[inline(never)]
+fn put_back<L: Lanes>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+) {
+    let pushes_a = segment.pushes_a();
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride);
+    let rows_of = row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());
+    for (side, (record, (row_a, row_b))) in
+        bounces.of::<L>(segment, layout.points).zip(records.zip(rows_of))
+    {
+        for p in 0..layout.points {
+            let at = FIRST + PER_POINT * p;
+            if largest(side[at]) == 0.0 {
+                continue;
+            }
+            side[at + 4] = side[at].select_positive(L::splat(1.0), side[at + 4]);
+            let (side, record): (&[f32], &[f32]) = (bytemuck::cast_slice(side), bytemuck::cast_slice(record));
+            for lane in 0..L::WIDTH {
+                let of = |vector: usize| side[vector * L::WIDTH + lane];
+                let [is_hit, n, t, time] = [0, 1, 2, 3].map(|k| of(at + k));
+                if is_hit == 0.0 || time == 0.0 {
+                    continue;
+                }
+                let of = |vector: usize| record[vector * L::WIDTH + lane];
+                let (x, y) = (of(0).mul_add(n, of(1) * t), of(1).mul_add(n, -(of(0) * t)));
+                let mut put = |row: u32, sign: f32, arm: usize, has_arm: bool| {
+                    let BodyRow { velocity, delta } = &mut rows[row as usize];
+                    let arm = |axis: usize| if has_arm { of(layout.at(p, arm) + axis) } else { 0.0 };
+                    let turn = arm(0).mul_add(n, arm(1) * t);
+                    let back = -sign * time;
+                    delta[0] += back * velocity[3] * x;
+                    delta[1] += back * velocity[3] * y;
+                    delta[2] += back * delta[3] * turn;
+                };
+                put(row_b.entries()[lane], 1.0, layout.arm_b, layout.has_arms[0]);
+                if pushes_a {
+                    put(row_a.entries()[lane], -1.0, layout.arm_a, layout.has_arms[1]);
+                }
+            }
+        }
+    }
 }
 
 #[inline(never)]
@@ -189,8 +287,9 @@ fn wave<L: Lanes>(
     bounces: &mut Bounces,
     contacts: &mut [Contact],
     increments: &[[f32; 4]],
-    &Wave { h, dt, ref found }: &Wave,
+    times: &Wave,
 ) {
+    let (h, dt) = (times.h, times.dt);
     let is_held = !segment.pushes_a();
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
@@ -200,7 +299,7 @@ fn wave<L: Lanes>(
         bounces.of::<L>(segment, layout.points).zip(records).enumerate()
     {
         let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
-        let mut fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], [h, dt]);
+        let mut fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], times);
         if fastest.any_positive() {
             let mut is_turned = false;
             for (lane, &index) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
@@ -221,12 +320,12 @@ fn wave<L: Lanes>(
                 is_turned = true;
             }
             if is_turned {
-                fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], [h, dt]);
+                fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], times);
             }
         }
         most = most.max(fastest);
     }
-    found.set(largest(most).max(found.get()));
+    times.found.set(largest(most).max(times.found.get()));
 }
 
 /// Writes how fast each point of a batch shall leave, zero where nothing comes in; returns the fastest (m/s).
@@ -237,9 +336,10 @@ fn targets<L: Lanes>(
     layout: &Layout,
     side: &mut [L],
     [row_a, row_b]: [LaneIndex<L::Index>; 2],
-    [h, dt]: [f32; 2],
+    &Wave { h, dt, is_first, timed, .. }: &Wave,
 ) -> L {
     let (zero, dt_lanes) = (L::zero(), L::splat(dt));
+    let earliest = L::splat(if is_first { -dt } else { 0.0 });
     let (a, e, threshold) = (side[0], side[1], side[2]);
     let mut most = zero;
     for p in 0..layout.points {
@@ -248,14 +348,29 @@ fn targets<L: Lanes>(
         let fall = a * L::splat(0.5 * (dt + h));
         let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
         let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
-        let target = rebound(e * e * energy, a, s, h);
+        let mut target = rebound(e * e * energy, a, s, h);
+        let mut time = zero;
+        if timed {
+            let w = v - a * L::splat(0.5 * h);
+            let square = w.mul_add(w, L::splat(2.0) * a * s);
+            let touch = L::splat(2.0) * s / (square.max(zero).sqrt() - w);
+            // What is deeper has been so before, or is hit because another was.
+            let touch = (touch - earliest).min(square).select_positive(touch, zero);
+            time = touch.min(dt_lanes);
+            let half = L::splat(0.5) * a * time;
+            let (gap, then) = ((w - half).mul_add(time, s), w - L::splat(2.0) * half);
+            let fall = L::splat(2.0) * a * gap;
+            let left = e * e * then.mul_add(then, fall) - fall;
+            let timed = left.max(zero).sqrt() + L::splat(2.0) * half + a * L::splat(0.5 * h);
+            target = (time * time).select_positive(timed, target);
+        }
         let is_fast = (-threshold - v).select_positive(target, zero);
         let comes_in = (-closes).select_positive(is_fast, zero);
         let target = e.select_positive(comes_in, zero);
         // A point that is not there has no mass.
         let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
         let at = FIRST + PER_POINT * p;
-        (side[at], side[at + 1], side[at + 2]) = (target, zero, zero);
+        (side[at], side[at + 1], side[at + 2], side[at + 3]) = (target, zero, zero, time);
         most = most.max(target);
     }
     most
@@ -301,7 +416,7 @@ fn solve<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    change: &Cell<f32>,
+    &Solve { timed, ref change }: &Solve,
 ) {
     let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
@@ -343,10 +458,12 @@ fn solve<L: Lanes>(
                 let k = [k_nn, k_tt, k_nt];
                 new = rough_impulses(k, mass, record[layout.friction], [old_n, old_t], [wanted, -vt]);
             }
-            // What bounces leaves by itself: it is not pushed out as well.
-            let at_surface = record[layout.at(p, layout.separation)];
-            record[layout.at(p, layout.separation)] =
-                target.select_positive(at_surface.max(zero), at_surface);
+            if !timed {
+                // As in [`Leave`].
+                let at_surface = record[layout.at(p, layout.separation)];
+                record[layout.at(p, layout.separation)] =
+                    target.select_positive(at_surface.max(zero), at_surface);
+            }
             let new = new.map(|impulse| target.select_positive(impulse, zero));
             (side[at + 1], side[at + 2]) = (new[0], new[1]);
             let delta = [new[0] - old_n, new[1] - old_t];
