@@ -43,6 +43,8 @@ pub(super) struct Load {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Impacts are at their times.
+    pub timed: bool,
 }
 
 /// Begins a wave: finds what comes in, and how fast it shall leave.
@@ -53,8 +55,6 @@ pub(super) struct Wave {
     pub dt: f32,
     /// Nothing has bounced yet.
     pub is_first: bool,
-    /// Impacts are at their times.
-    pub timed: bool,
     /// Whether something comes in: greater than zero.
     pub found: Cell<f32>,
 }
@@ -63,7 +63,9 @@ pub(super) struct Wave {
 pub(super) struct Solve {
     /// Impacts are at their times.
     pub timed: bool,
-    /// Greatest change of a velocity, as a part of what the wave asks for (1).
+    /// The fastest that something shall leave at (m/s).
+    pub fastest: f32,
+    /// Greatest change of a velocity, as a part of that (1).
     pub change: Cell<f32>,
 }
 
@@ -76,9 +78,9 @@ pub(super) struct PutBack;
 /// What has bounced leaves by itself: it is not pushed out as well.
 pub(super) struct Leave;
 
-/// Side record of an impact: a (m/s²), e (1), threshold (m/s); then per point target (m/s; zero where
+/// Side record of an impact: a (m/s²), e (1), threshold (m/s), whether it is at its time (1); then per point target (m/s; zero where
 /// nothing comes in), N and T (N·s), its time (s), and whether it has bounced in any wave (1). See [`Bounces`].
-const FIRST: usize = 3;
+const FIRST: usize = 4;
 const PER_POINT: usize = 5;
 
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
@@ -153,13 +155,18 @@ impl Pass for Book {
     }
 }
 
-/// a, e and the threshold of a lane.
-fn side_of(contact: &Contact, increments: &[[f32; 4]], rows: [u32; 2], &Load { h, dt }: &Load) -> [f32; FIRST] {
+/// The first quantities of a lane.
+fn side_of(
+    contact: &Contact,
+    increments: &[[f32; 4]],
+    rows: [u32; 2],
+    &Load { h, dt, timed }: &Load,
+) -> [f32; FIRST] {
     let [a, b] = rows.map(|row| {
         let [x, y, ..] = increments[row as usize];
         contact.manifold.normal.dot(Vec2::new(x, y)) / h
     });
-    [a - b, contact.restitution, dt * (a.abs() + b.abs())]
+    [a - b, contact.restitution, dt * (a.abs() + b.abs()), if timed { 1.0 } else { 0.0 }]
 }
 
 impl Pass for PutBack {
@@ -256,8 +263,10 @@ fn load<L: Lanes>(
     bounces: &mut Bounces,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    times: &Load,
+    load: &Load,
 ) {
+    // Between two bodies that move, arms would have to end at one point at that time.
+    let load = &Load { timed: load.timed && !segment.pushes_a(), ..*load };
     let SegmentRecords { contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
     for (batch, (side, (contact, (row_a, row_b)))) in
@@ -269,7 +278,7 @@ fn load<L: Lanes>(
         // Lanes without a contact have e = 0, and bounce as little as contacts that have.
         for (lane, &contact) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
             let rows = [row_a.entries()[lane], row_b.entries()[lane]];
-            let side = side_of(&contacts[contact as usize], increments, rows, times);
+            let side = side_of(&contacts[contact as usize], increments, rows, load);
             for (k, value) in side.into_iter().enumerate() {
                 floats[k * L::WIDTH + lane] = value;
             }
@@ -313,7 +322,7 @@ fn wave<L: Lanes>(
                 let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
                 frame.write_record(layout, bodies, |vector, value| floats[vector * L::WIDTH + lane] = value);
                 let floats: &mut [f32] = bytemuck::cast_slice_mut(side);
-                let values = side_of(contact, increments, ends, &Load { h, dt });
+                let values = side_of(contact, increments, ends, &Load { h, dt, timed: true });
                 for (k, value) in values.into_iter().enumerate() {
                     floats[k * L::WIDTH + lane] = value;
                 }
@@ -336,7 +345,7 @@ fn targets<L: Lanes>(
     layout: &Layout,
     side: &mut [L],
     [row_a, row_b]: [LaneIndex<L::Index>; 2],
-    &Wave { h, dt, is_first, timed, .. }: &Wave,
+    &Wave { h, dt, is_first, .. }: &Wave,
 ) -> L {
     let (zero, dt_lanes) = (L::zero(), L::splat(dt));
     let earliest = L::splat(if is_first { -dt } else { 0.0 });
@@ -350,12 +359,12 @@ fn targets<L: Lanes>(
         let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
         let mut target = rebound(e * e * energy, a, s, h);
         let mut time = zero;
-        if timed {
+        if side[3].any_positive() {
             let w = v - a * L::splat(0.5 * h);
             let square = w.mul_add(w, L::splat(2.0) * a * s);
             let touch = L::splat(2.0) * s / (square.max(zero).sqrt() - w);
             // What is deeper has been so before, or is hit because another was.
-            let touch = (touch - earliest).min(square).select_positive(touch, zero);
+            let touch = (touch - earliest).min(square).min(side[3]).select_positive(touch, zero);
             time = touch.min(dt_lanes);
             let half = L::splat(0.5) * a * time;
             let (gap, then) = ((w - half).mul_add(time, s), w - L::splat(2.0) * half);
@@ -409,6 +418,60 @@ pub(super) fn rough_impulses<L: Lanes>(
     std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]))
 }
 
+/// Accumulated impulses of both points of smooth contacts together, and where these are (positive): one after the other
+/// takes hundreds of sweeps where a face is hit beside the centre.
+#[inline(always)]
+fn pair_impulses<L: Lanes>(
+    rows: &[BodyRow],
+    record: &[L],
+    layout: &Layout,
+    side: &[L],
+    row_a: LaneIndex<L::Index>,
+    row_b: LaneIndex<L::Index>,
+) -> ([L; 2], L) {
+    /// Points that are nearly one are solved one after the other (1).
+    const APART: f32 = 1e-5;
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let b = L::gather(rows, row_b);
+    let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+    let arm = |p: usize, first: usize, has: bool| if has { record[layout.at(p, first)] } else { zero };
+    let arms = [0, 1].map(|p| {
+        [arm(p, layout.arm_a, layout.has_arms[1]), arm(p, layout.arm_b, layout.has_arms[0])]
+    });
+    let k = |p: usize, q: usize| {
+        let turn_a = a[7] * arms[p][0] * arms[q][0];
+        (b[7] * arms[p][1]).mul_add(arms[q][1], turn_a + (a[3] + b[3]))
+    };
+    let [k_00, k_11, k_01] = [k(0, 0), k(1, 1), k(0, 1)];
+    let of = |p: usize, quantity: usize| side[FIRST + PER_POINT * p + quantity];
+    let old = [of(0, 1), of(1, 1)];
+    let wanted = [0, 1].map(|p| of(p, 0) - point::<L>(rows, record, layout, p, row_a, row_b)[0]);
+    let w = [
+        k_00.mul_add(old[0], k_01.mul_add(old[1], wanted[0])),
+        k_01.mul_add(old[0], k_11.mul_add(old[1], wanted[1])),
+    ];
+    // Of k_pq = m + Σ i r_p r_q, as a sum of what is positive: none of it cancels.
+    let apart = [0, 1].map(|body| arms[0][body] - arms[1][body]);
+    let wedge = arms[0][0].mul_add(arms[1][1], -(arms[0][1] * arms[1][0]));
+    let bodies = (a[7] * apart[0]).mul_add(apart[0], b[7] * apart[1] * apart[1]);
+    let determinant = (a[3] + b[3]).mul_add(bodies, a[7] * b[7] * wedge * wedge);
+    let is_solved = determinant - L::splat(APART) * k_00 * k_11;
+    let safe = is_solved.select_positive(determinant, one);
+    let n = [
+        k_11.mul_add(w[0], -(k_01 * w[1])) / safe,
+        k_00.mul_add(w[1], -(k_01 * w[0])) / safe,
+    ];
+    let positive = |yes: L, value: L| yes.select_positive(value, zero);
+    let both = n[0].min(n[1]);
+    // Where one would have to pull, the other acts alone: the first, if that is enough for the second.
+    let alone = [w[0] / is_solved.select_positive(k_00, one), w[1] / is_solved.select_positive(k_11, one)];
+    let enough = alone[0].min(k_01.mul_add(alone[0], -w[1]));
+    let first = positive(enough, alone[0]);
+    let second = enough.select_positive(zero, alone[1].max(zero));
+    let pair = [both.select_positive(n[0], first), both.select_positive(n[1], second)];
+    (pair, is_solved)
+}
+
 #[inline(never)]
 fn solve<L: Lanes>(
     rows: &mut [BodyRow],
@@ -416,17 +479,30 @@ fn solve<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    &Solve { timed, ref change }: &Solve,
+    &Solve { timed, fastest, ref change }: &Solve,
 ) {
     let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
-    let (zero, one) = (L::zero(), L::splat(1.0));
+    let (zero, one, fastest) = (L::zero(), L::splat(1.0), L::splat(fastest));
     let mut most = zero;
     for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
+        let hit: [L; 2] =
+            std::array::from_fn(|p| if p < layout.points { side[FIRST + PER_POINT * p] } else { zero });
+        let mut both = hit[0].min(hit[1]);
+        if layout.has_friction {
+            both = record[layout.friction].select_positive(zero, both);
+        }
+        let pair = if both.any_positive() {
+            let (pair, is_solved) = pair_impulses::<L>(rows, record, layout, side, row_a, row_b);
+            both = is_solved.min(both);
+            pair
+        } else {
+            [zero; 2]
+        };
         for p in 0..layout.points {
             let at = FIRST + PER_POINT * p;
-            let target = side[at];
+            let target = hit[p];
             if largest(target) == 0.0 {
                 continue;
             }
@@ -458,6 +534,7 @@ fn solve<L: Lanes>(
                 let k = [k_nn, k_tt, k_nt];
                 new = rough_impulses(k, mass, record[layout.friction], [old_n, old_t], [wanted, -vt]);
             }
+            new[0] = both.select_positive(pair[p], new[0]);
             if !timed {
                 // As in [`Leave`].
                 let at_surface = record[layout.at(p, layout.separation)];
@@ -468,7 +545,7 @@ fn solve<L: Lanes>(
             (side[at + 1], side[at + 2]) = (new[0], new[1]);
             let delta = [new[0] - old_n, new[1] - old_t];
             let size = delta[0].max(-delta[0]) + delta[1].max(-delta[1]);
-            most = most.max(k_nn * size / target.select_positive(target, one));
+            most = most.max(k_nn * size / fastest);
             let x = n[0].mul_add(delta[0], n[1] * delta[1]);
             let y = n[1].mul_add(delta[0], -(n[0] * delta[1]));
             let turn = |arm: [L; 2]| arm[0].mul_add(delta[0], arm[1] * delta[1]);

@@ -637,17 +637,17 @@ impl<'a> Passes<'a> {
     /// Lets bounce what comes in, wave by wave; see [`super::impact`].
     fn bounce_before(&mut self) {
         let (h, dt, timed) = (self.h(), self.dt(), self.input.timed_impacts);
-        self.over_contacts(&impact::Load { h, dt });
+        self.over_contacts(&impact::Load { h, dt, timed });
         let mut has_bounced = false;
         for _ in 0..IMPACT_WAVES {
-            let wave = impact::Wave { h, dt, is_first: !has_bounced, timed, found: Cell::new(0.0) };
+            let wave = impact::Wave { h, dt, is_first: !has_bounced, found: Cell::new(0.0) };
             self.over_contacts(&wave);
             if wave.found.get() == 0.0 {
                 break;
             }
             has_bounced = true;
             for _ in 0..IMPACT_SWEEPS {
-                let solve = impact::Solve { timed, change: Cell::new(0.0) };
+                let solve = impact::Solve { timed, fastest: wave.found.get(), change: Cell::new(0.0) };
                 self.over_contacts(&solve);
                 self.count_sweep(if self.input.features.friction { 2 } else { 1 });
                 if solve.change.get() < IMPACT_TOLERANCE {
