@@ -18,7 +18,6 @@ use super::features::Layout;
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::frames::turned;
 use glam::Vec2;
 
 /// A contact whose frame is that of the beginning of the step, but may be another.
@@ -83,7 +82,8 @@ impl Round {
         }
         let touching = d + time * u;
         let normal = touching / touching.length();
-        let center = |k: usize| Vec2::from(turned(self.centers[k].to_array(), time * spins[k]));
+        // Along tangents, as u has it: both arms end at one point then, and angular momentum stays.
+        let center = |k: usize| self.centers[k] + (time * spins[k] + [a, b][k].delta[2]) * self.centers[k].perp();
         let anchors = [center(0) + self.radii[0] * normal, center(1) - self.radii[1] * normal];
         let arms = anchors.map(|r| [r.perp_dot(normal), -r.dot(normal)]);
         let approach = (straight(b) - straight(a)).dot(normal) + spins[1] * arms[1][0] - spins[0] * arms[0][0];

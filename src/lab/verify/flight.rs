@@ -14,7 +14,7 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "1 %: one law or the other",
         oblique,
-        No("the normal is that of the step's beginning or of an overlap, not that of the impact"),
+        Yes("round shapes have the frame of the moment of touch"),
     ),
     Case::new(
         "A27.rest",
@@ -22,7 +22,7 @@ pub(super) static CASES: &[Case] = &[
         "s",
         "flights shorter than two steps: 2 dt/(1 - e)",
         rest,
-        No("arrivals below 3 g dt are not foreseen, and do not bounce"),
+        Yes("bodies fly on to where they are hit, and from there"),
     ),
     Case::new(
         "A27.edges",
