@@ -47,7 +47,8 @@ impl Scene {
             (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
         });
         let ways = vec![Quad::default(); poses.len()];
-        let input = Input { poses: &poses, ways: &ways, shapes: &self.rows, speculative: SPECULATIVE };
+        let input =
+            Input { poses: &poses, ways: &ways, times: None, shapes: &self.rows, speculative: SPECULATIVE };
         let (mut changed, mut fresh) = (vec![], vec![]);
         let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
             changed.push(name);

@@ -443,8 +443,13 @@ fn collide(kind: Kind, width: LaneWidth, pairs: u32, contacts: usize, spoil: imp
     let names: Vec<u32> = (0..pairs).collect();
     jobs.list(&names, |_| (true, [0, 0], [0, 0], NO_CONTACT));
     spoil(&mut jobs);
-    let input =
-        Input { poses: &[PoseRow::default()], ways: &[Quad::default()], shapes: &shapes, speculative: 0.02 };
+    let input = Input {
+        poses: &[PoseRow::default()],
+        ways: &[Quad::default()],
+        times: None,
+        shapes: &shapes,
+        speculative: 0.02,
+    };
     let mut contacts = vec![Contact::default(); contacts];
     update(kind, width, &jobs, input, &mut contacts, &mut |_, _| {});
 }

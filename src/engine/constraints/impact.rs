@@ -14,6 +14,22 @@
 //!
 //! A disc has k_nt = 0; a corner does not, and is turned by both. Both rows are solved at once.
 //!
+//! # When in the step
+//!
+//! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 in the place of v. From the gap s it is at the surface
+//! after t, with the speed w₁, bounces, and is from then on on the parabola that has at the beginning of the step
+//!
+//! ```text
+//! w₁ = √(w² + 2 a s)   t = 2 s/(w₁ − w)   v⁺ = e w₁ + a t + a h/2   s⁺ = s − t (v⁺ − v)
+//! ```
+//!
+//! So bodies that are given v⁺ and put back by t Δv fly as if hit at t, in the coming step or (t < 0, an overlap) in the
+//! last one: a bounce is no shorter for being seen early, and none is too low to be one. Without it, a ball at 20 mm that
+//! rises to 8 does not bounce. Beyond the end of the step, and deeper than a step, it is at the end and at the beginning, with as
+//! much of the energy of height. Bodies that are both free would be put back by what arms of the beginning do not know of, which
+//! changes angular momentum: there only round shapes are hit at t, whose arms are those of that time. Solvers that find
+//! velocities from positions, or that are rivals, bounce at the beginning: `timed`.
+//!
 //! # Waves
 //!
 //! Which points bounce, and how fast, is decided at the beginning of a wave: those that come in. All of
@@ -219,8 +235,7 @@ fn put_back<L: Lanes>(
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride);
     let rows_of = row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());
-    for (side, (record, (row_a, row_b))) in
-        bounces.of::<L>(segment, layout.points).zip(records.zip(rows_of))
+    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records.zip(rows_of))
     {
         for p in 0..layout.points {
             let at = FIRST + PER_POINT * p;
@@ -435,9 +450,8 @@ fn pair_impulses<L: Lanes>(
     let b = L::gather(rows, row_b);
     let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
     let arm = |p: usize, first: usize, has: bool| if has { record[layout.at(p, first)] } else { zero };
-    let arms = [0, 1].map(|p| {
-        [arm(p, layout.arm_a, layout.has_arms[1]), arm(p, layout.arm_b, layout.has_arms[0])]
-    });
+    let arms =
+        [0, 1].map(|p| [arm(p, layout.arm_a, layout.has_arms[1]), arm(p, layout.arm_b, layout.has_arms[0])]);
     let k = |p: usize, q: usize| {
         let turn_a = a[7] * arms[p][0] * arms[q][0];
         (b[7] * arms[p][1]).mul_add(arms[q][1], turn_a + (a[3] + b[3]))
@@ -457,10 +471,7 @@ fn pair_impulses<L: Lanes>(
     let determinant = (a[3] + b[3]).mul_add(bodies, a[7] * b[7] * wedge * wedge);
     let is_solved = determinant - L::splat(APART) * k_00 * k_11;
     let safe = is_solved.select_positive(determinant, one);
-    let n = [
-        k_11.mul_add(w[0], -(k_01 * w[1])) / safe,
-        k_00.mul_add(w[1], -(k_01 * w[0])) / safe,
-    ];
+    let n = [k_11.mul_add(w[0], -(k_01 * w[1])) / safe, k_00.mul_add(w[1], -(k_01 * w[0])) / safe];
     let positive = |yes: L, value: L| yes.select_positive(value, zero);
     let both = n[0].min(n[1]);
     // Where one would have to pull, the other acts alone: the first, if that is enough for the second.

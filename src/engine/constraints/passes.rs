@@ -638,11 +638,12 @@ impl<'a> Passes<'a> {
     fn bounce_before(&mut self) {
         let (h, dt, timed) = (self.h(), self.dt(), self.input.timed_impacts);
         self.over_contacts(&impact::Load { h, dt, timed });
-        let mut has_bounced = false;
+        let (mut has_bounced, mut has_ended) = (false, false);
         for _ in 0..IMPACT_WAVES {
             let wave = impact::Wave { h, dt, is_first: !has_bounced, found: Cell::new(0.0) };
             self.over_contacts(&wave);
-            if wave.found.get() == 0.0 {
+            has_ended = wave.found.get() == 0.0;
+            if has_ended {
                 break;
             }
             has_bounced = true;
@@ -662,6 +663,10 @@ impl<'a> Passes<'a> {
             }
         }
         if has_bounced && timed {
+            if !has_ended {
+                // Bodies stay where they are: one might be in a third that nobody has looked at.
+                self.work.rows.iter_mut().for_each(|row| row.delta[..3].fill(0.0));
+            }
             self.work.motion.hide_turns(&mut self.work.rows);
             self.over_contacts(&impact::Leave);
         }

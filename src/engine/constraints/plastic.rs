@@ -172,7 +172,14 @@ impl On<'_> {
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
         let layout = Layout::for_features(self.features, segment.opposite);
-        Place { part, of, width, first: vector * width + in_segment % width, layout, pushes_a: segment.pushes_a() }
+        Place {
+            part,
+            of,
+            width,
+            first: vector * width + in_segment % width,
+            layout,
+            pushes_a: segment.pushes_a(),
+        }
     }
 
     /// A point has the frame of the moment of touch.
@@ -196,7 +203,8 @@ impl On<'_> {
         std::array::from_fn(|p| {
             let is_there = p < layout.points && !bounces;
             let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
-            let mut point = Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+            let mut point =
+                Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
             if mass <= 0.0 {
                 return point;
             }
@@ -284,9 +292,9 @@ impl Point {
         // D/2 × n and D/2 × t.
         let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
         let inertia = [a.delta[3], b.delta[3]];
-        for axis in 0..2 {
-            self.arms[0][axis] += shift[axis];
-            self.arms[1][axis] -= shift[axis];
+        for (axis, shift) in shift.into_iter().enumerate() {
+            self.arms[0][axis] += shift;
+            self.arms[1][axis] -= shift;
         }
         let direct = a.velocity[3] + b.velocity[3];
         let turns = |i: usize, j: usize| {
@@ -393,8 +401,10 @@ impl PlasticImpacts {
             let mut points = on.points(lane);
             for point in points.iter_mut().filter(|point| point.mass > 0.0) {
                 // Arms end at one point at the time of the frame, if nothing is hit.
-                let ([a, b], time) =
-                    (point.rows.map(|row| self.bodies[row as usize].flown), on.contacts[point.contact as usize].lead);
+                let ([a, b], time) = (
+                    point.rows.map(|row| self.bodies[row as usize].flown),
+                    on.contacts[point.contact as usize].lead,
+                );
                 point.apart = std::array::from_fn(|k| time * (b[k] - a[k]));
             }
             self.points.extend(points);

@@ -83,10 +83,12 @@ impl Round {
         let touching = d + time * u;
         let normal = touching / touching.length();
         // Along tangents, as u has it: both arms end at one point then, and angular momentum stays.
-        let center = |k: usize| self.centers[k] + (time * spins[k] + [a, b][k].delta[2]) * self.centers[k].perp();
+        let center =
+            |k: usize| self.centers[k] + (time * spins[k] + [a, b][k].delta[2]) * self.centers[k].perp();
         let anchors = [center(0) + self.radii[0] * normal, center(1) - self.radii[1] * normal];
         let arms = anchors.map(|r| [r.perp_dot(normal), -r.dot(normal)]);
-        let approach = (straight(b) - straight(a)).dot(normal) + spins[1] * arms[1][0] - spins[0] * arms[0][0];
+        let approach =
+            (straight(b) - straight(a)).dot(normal) + spins[1] * arms[1][0] - spins[0] * arms[0][0];
         let shifted = |row: &BodyRow, [n, t]: [f32; 2]| {
             let (sine, versine) = turn(row.delta[2]);
             Vec2::new(row.delta[0], row.delta[1]).dot(normal) + sine.mul_add(n, versine * t)
@@ -125,7 +127,9 @@ impl Frame {
         put(0, self.normal.x);
         put(1, self.normal.y);
         let point = |quantity: usize| layout.at(0, quantity);
-        for (k, (arm, has)) in [layout.arm_a, layout.arm_b].into_iter().zip([layout.has_arms[1], layout.has_arms[0]]).enumerate() {
+        for (k, (arm, has)) in
+            [layout.arm_a, layout.arm_b].into_iter().zip([layout.has_arms[1], layout.has_arms[0]]).enumerate()
+        {
             if has {
                 put(point(arm), self.arms[k][0]);
                 put(point(arm) + 1, self.arms[k][1]);
