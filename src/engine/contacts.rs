@@ -23,6 +23,9 @@ pub struct ManifoldPoint {
 }
 
 /// Up to two contact points that share a normal.
+///
+/// A round contact in flight, whose only point wanders with its bodies, keeps in the place of the second one what it is round
+/// about; see [`Self::centers`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Manifold {
@@ -99,6 +102,16 @@ pub fn pair_key(a: u32, b: u32) -> u64 {
 }
 
 impl Manifold {
+    /// Feature of the second point where it is no point but the centres of a round contact.
+    pub const CENTERS: u32 = 1 << 20;
+
+    /// What the contact is round about, if it is and its frame is that of the beginning of the step: the anchors are those of
+    /// two centres, which are `separation` apart when the shapes touch (m).
+    pub fn centers(&self) -> Option<&ManifoldPoint> {
+        let [_, second] = &self.points;
+        (self.count == 1 && second.feature_id == Self::CENTERS).then_some(second)
+    }
+
     /// The points in use.
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]

@@ -43,7 +43,7 @@ pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 pub const IMPACT_WAVES: u32 = 32;
 
 /// Most sweeps over a wave of impacts.
-pub const IMPACT_SWEEPS: u32 = 32;
+pub const IMPACT_SWEEPS: u32 = 256;
 
 /// A wave of impacts is solved when a sweep changes velocities by less than this part of what it asks for (1).
 pub const IMPACT_TOLERANCE: f32 = 1e-6;

@@ -415,6 +415,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         points: 0,
         pile_modes: PileModes::default(),
         contacts_changed: true,
+        timed_impacts: true,
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };

@@ -14,6 +14,22 @@
 //!
 //! A disc has k_nt = 0; a corner does not, and is turned by both. Both rows are solved at once.
 //!
+//! # When in the step
+//!
+//! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 in the place of v. From the gap s it is at the surface
+//! after t, with the speed w₁, bounces, and is from then on on the parabola that has at the beginning of the step
+//!
+//! ```text
+//! w₁ = √(w² + 2 a s)   t = 2 s/(w₁ − w)   v⁺ = e w₁ + a t + a h/2   s⁺ = s − t (v⁺ − v)
+//! ```
+//!
+//! So bodies that are given v⁺ and put back by t Δv fly as if hit at t, in the coming step or (t < 0, an overlap) in the
+//! last one: a bounce is no shorter for being seen early, and none is too low to be one. Without it, a ball at 20 mm that
+//! rises to 8 does not bounce. Beyond the end of the step, and deeper than a step, it is at the end and at the beginning, with as
+//! much of the energy of height. Bodies that are both free would be put back by what arms of the beginning do not know of, which
+//! changes angular momentum: there only round shapes are hit at t, whose arms are those of that time. Solvers that find
+//! velocities from positions, or that are rivals, bounce at the beginning: `timed`.
+//!
 //! # Waves
 //!
 //! Which points bounce, and how fast, is decided at the beginning of a wave: those that come in. All of
@@ -23,13 +39,15 @@
 //! # What comes in
 //!
 //! A point is an impact if it closes its gap within the step, and faster than what forces alone make
-//! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests.
+//! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests. Where something round
+//! comes in, n is that of the moment of touch ([`super::touch`]).
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::bounces::Bounces;
 use super::features::{KernelFeatures, Layout, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
 use super::restitution::{largest, point, rebound};
+use super::touch::Round;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use glam::Vec2;
@@ -41,6 +59,8 @@ pub(super) struct Load {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Impacts are at their times.
+    pub timed: bool,
 }
 
 /// Begins a wave: finds what comes in, and how fast it shall leave.
@@ -49,26 +69,41 @@ pub(super) struct Wave {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Nothing has bounced yet.
+    pub is_first: bool,
     /// Whether something comes in: greater than zero.
     pub found: Cell<f32>,
 }
 
 /// One Gauss–Seidel sweep over the points of a wave.
 pub(super) struct Solve {
-    /// Greatest change of a velocity, as a part of what the wave asks for (1).
+    /// Impacts are at their times.
+    pub timed: bool,
+    /// The fastest that something shall leave at (m/s).
+    pub fastest: f32,
+    /// Greatest change of a velocity, as a part of that (1).
     pub change: Cell<f32>,
 }
 
 /// Adds the impulses of a wave to those of the step.
 pub(super) struct Book;
 
-/// Side record of an impact: a (m/s²), e (1), threshold (m/s); then per point target (m/s; zero where
-/// nothing comes in), N and T (N·s). See [`Bounces`].
-const FIRST: usize = 3;
-const PER_POINT: usize = 3;
+/// Puts bodies back to where they come from, had they always flown as they leave.
+pub(super) struct PutBack;
+
+/// What has bounced leaves by itself: it is not pushed out as well.
+pub(super) struct Leave;
+
+/// Side record of an impact: a (m/s²), e (1), threshold (m/s), whether it is at its time (1); then per point target (m/s; zero where
+/// nothing comes in), N and T (N·s), its time (s), and whether it has bounced in any wave (1). See [`Bounces`].
+const FIRST: usize = 4;
+const PER_POINT: usize = 5;
 
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
+
+/// Round shapes that come in along the normal of the beginning, but touch later, have the frame of then up to so many steps (1).
+pub(super) const TURNED: f32 = 2.0;
 
 impl Pass for Load {
     fn traffic(&self, _: &Layout, opposite: OppositeKind) -> PerLane {
@@ -91,7 +126,7 @@ impl Pass for Wave {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            wave::<L>(on.rows, batches, segment, layout, on.bounces, self);
+            wave::<L>(on.rows, batches, segment, layout, on.bounces, on.contacts, on.increments, self);
         });
     }
 }
@@ -105,7 +140,7 @@ impl Pass for Solve {
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            solve::<L>(on.rows, batches, segment, layout, on.bounces, &self.change);
+            solve::<L>(on.rows, batches, segment, layout, on.bounces, self);
         });
     }
 }
@@ -136,6 +171,105 @@ impl Pass for Book {
     }
 }
 
+/// The first quantities of a lane.
+fn side_of(
+    contact: &Contact,
+    increments: &[[f32; 4]],
+    rows: [u32; 2],
+    &Load { h, dt, timed }: &Load,
+) -> [f32; FIRST] {
+    let [a, b] = rows.map(|row| {
+        let [x, y, ..] = increments[row as usize];
+        contact.manifold.normal.dot(Vec2::new(x, y)) / h
+    });
+    [a - b, contact.restitution, dt * (a.abs() + b.abs()), if timed { 1.0 } else { 0.0 }]
+}
+
+impl Pass for PutBack {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 4 + layout.points * (layout.arms() + PER_POINT);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            put_back::<L>(on.rows, batches, segment, layout, on.bounces);
+        });
+    }
+}
+
+impl Pass for Leave {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 2 + layout.points * (layout.arms() + 2);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+            let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+            for (side, (record, (row_a, row_b))) in on.bounces.of::<L>(segment, layout.points).zip(records) {
+                for p in 0..layout.points {
+                    let bounced = side[FIRST + PER_POINT * p + 4];
+                    if largest(bounced) > 0.0 {
+                        let [_, gap] = point::<L>(on.rows, record, layout, p, row_a, row_b);
+                        let raised = bounced.select_positive(gap.min(L::zero()), L::zero());
+                        let at = layout.at(p, layout.separation);
+                        record[at] = record[at] - raised;
+                    }
+                }
+            }
+        });
+    }
+}
+
+#[inline(never)]
+fn put_back<L: Lanes>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+) {
+    let pushes_a = segment.pushes_a();
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride);
+    let rows_of = row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());
+    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records.zip(rows_of))
+    {
+        for p in 0..layout.points {
+            let at = FIRST + PER_POINT * p;
+            if largest(side[at]) == 0.0 {
+                continue;
+            }
+            side[at + 4] = side[at].select_positive(L::splat(1.0), side[at + 4]);
+            let (side, record): (&[f32], &[f32]) = (bytemuck::cast_slice(side), bytemuck::cast_slice(record));
+            for lane in 0..L::WIDTH {
+                let of = |vector: usize| side[vector * L::WIDTH + lane];
+                let [is_hit, n, t, time] = [0, 1, 2, 3].map(|k| of(at + k));
+                if is_hit == 0.0 || time == 0.0 {
+                    continue;
+                }
+                let of = |vector: usize| record[vector * L::WIDTH + lane];
+                let (x, y) = (of(0).mul_add(n, of(1) * t), of(1).mul_add(n, -(of(0) * t)));
+                let mut put = |row: u32, sign: f32, arm: usize, has_arm: bool| {
+                    let BodyRow { velocity, delta } = &mut rows[row as usize];
+                    let arm = |axis: usize| if has_arm { of(layout.at(p, arm) + axis) } else { 0.0 };
+                    let turn = arm(0).mul_add(n, arm(1) * t);
+                    let back = -sign * time;
+                    delta[0] += back * velocity[3] * x;
+                    delta[1] += back * velocity[3] * y;
+                    delta[2] += back * delta[3] * turn;
+                };
+                put(row_b.entries()[lane], 1.0, layout.arm_b, layout.has_arms[0]);
+                if pushes_a {
+                    put(row_a.entries()[lane], -1.0, layout.arm_a, layout.has_arms[1]);
+                }
+            }
+        }
+    }
+}
+
 #[inline(never)]
 fn load<L: Lanes>(
     batches: &mut Batches,
@@ -144,8 +278,10 @@ fn load<L: Lanes>(
     bounces: &mut Bounces,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &Load { h, dt }: &Load,
+    load: &Load,
 ) {
+    // Between two bodies that move, arms would have to end at one point at that time.
+    let load = &Load { timed: load.timed && !segment.pushes_a(), ..*load };
     let SegmentRecords { contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
     for (batch, (side, (contact, (row_a, row_b)))) in
@@ -156,19 +292,16 @@ fn load<L: Lanes>(
         floats.fill(0.0);
         // Lanes without a contact have e = 0, and bounce as little as contacts that have.
         for (lane, &contact) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
-            let Contact { restitution, manifold, .. } = &contacts[contact as usize];
-            let along = |row: u32| {
-                let [x, y, ..] = increments[row as usize];
-                manifold.normal.dot(Vec2::new(x, y))
-            };
-            let (a, b) = (along(row_a.entries()[lane]) / h, along(row_b.entries()[lane]) / h);
-            floats[lane] = a - b;
-            floats[L::WIDTH + lane] = *restitution;
-            floats[2 * L::WIDTH + lane] = dt * (a.abs() + b.abs());
+            let rows = [row_a.entries()[lane], row_b.entries()[lane]];
+            let side = side_of(&contacts[contact as usize], increments, rows, load);
+            for (k, value) in side.into_iter().enumerate() {
+                floats[k * L::WIDTH + lane] = value;
+            }
         }
     }
 }
 
+#[allow(clippy::too_many_arguments)]
 #[inline(never)]
 fn wave<L: Lanes>(
     rows: &[BodyRow],
@@ -176,32 +309,95 @@ fn wave<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    Wave { h, dt, found }: &Wave,
+    contacts: &mut [Contact],
+    increments: &[[f32; 4]],
+    times: &Wave,
 ) {
-    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
-    let (zero, dt_lanes) = (L::zero(), L::splat(*dt));
-    let mut most = zero;
-    for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
-        let (a, e, threshold) = (side[0], side[1], side[2]);
-        for p in 0..layout.points {
-            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
-            // Where it would be at the end of the step, and further.
-            let fall = a * L::splat(0.5 * (dt + h));
-            let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
-            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
-            let target = rebound(e * e * energy, a, s, *h);
-            let is_fast = (-threshold - v).select_positive(target, zero);
-            let comes_in = (-closes).select_positive(is_fast, zero);
-            let target = e.select_positive(comes_in, zero);
-            // A point that is not there has no mass.
-            let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
-            let at = FIRST + PER_POINT * p;
-            (side[at], side[at + 1], side[at + 2]) = (target, zero, zero);
-            most = most.max(target);
+    let (h, dt) = (times.h, times.dt);
+    let is_held = !segment.pushes_a();
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let records = records.zip(contact.batches::<L::Index>());
+    let mut most = L::zero();
+    for (batch, (side, ((record, (row_a, row_b)), contact))) in
+        bounces.of::<L>(segment, layout.points).zip(records).enumerate()
+    {
+        let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        let mut fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], times);
+        if fastest.any_positive() {
+            let mut is_turned = false;
+            for (lane, &index) in contact.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+                let comes_in = bytemuck::cast_slice::<L, f32>(std::slice::from_ref(&fastest))[lane] > 0.0;
+                let contact = &mut contacts[index as usize];
+                let Some(round) = Round::of(contact, is_held).filter(|_| comes_in) else { continue };
+                let ends = [row_a, row_b].map(|row| row.entries()[lane]);
+                let bodies = ends.map(|row| &rows[row as usize]);
+                let Some(frame) = round.frame(bodies, [-AHEAD * dt, TURNED * dt]) else { continue };
+                frame.write_contact(contact);
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+                frame.write_record(layout, bodies, |vector, value| floats[vector * L::WIDTH + lane] = value);
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(side);
+                let values = side_of(contact, increments, ends, &Load { h, dt, timed: true });
+                for (k, value) in values.into_iter().enumerate() {
+                    floats[k * L::WIDTH + lane] = value;
+                }
+                is_turned = true;
+            }
+            if is_turned {
+                fastest = targets::<L>(rows, record, layout, side, [row_a, row_b], times);
+            }
         }
+        most = most.max(fastest);
     }
-    found.set(largest(most).max(found.get()));
+    times.found.set(largest(most).max(times.found.get()));
+}
+
+/// Writes how fast each point of a batch shall leave, zero where nothing comes in; returns the fastest (m/s).
+#[inline(always)]
+fn targets<L: Lanes>(
+    rows: &[BodyRow],
+    record: &[L],
+    layout: &Layout,
+    side: &mut [L],
+    [row_a, row_b]: [LaneIndex<L::Index>; 2],
+    &Wave { h, dt, is_first, .. }: &Wave,
+) -> L {
+    let (zero, dt_lanes) = (L::zero(), L::splat(dt));
+    let earliest = L::splat(if is_first { -dt } else { 0.0 });
+    let (a, e, threshold) = (side[0], side[1], side[2]);
+    let mut most = zero;
+    for p in 0..layout.points {
+        let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
+        // Where it would be at the end of the step, and further.
+        let fall = a * L::splat(0.5 * (dt + h));
+        let closes = (v - fall).mul_add(dt_lanes * L::splat(AHEAD), s);
+        let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+        let mut target = rebound(e * e * energy, a, s, h);
+        let mut time = zero;
+        if side[3].any_positive() {
+            let w = v - a * L::splat(0.5 * h);
+            let square = w.mul_add(w, L::splat(2.0) * a * s);
+            let touch = L::splat(2.0) * s / (square.max(zero).sqrt() - w);
+            // What is deeper has been so before, or is hit because another was.
+            let touch = (touch - earliest).min(square).min(side[3]).select_positive(touch, zero);
+            time = touch.min(dt_lanes);
+            let half = L::splat(0.5) * a * time;
+            let (gap, then) = ((w - half).mul_add(time, s), w - L::splat(2.0) * half);
+            let fall = L::splat(2.0) * a * gap;
+            let left = e * e * then.mul_add(then, fall) - fall;
+            let timed = left.max(zero).sqrt() + L::splat(2.0) * half + a * L::splat(0.5 * h);
+            target = (time * time).select_positive(timed, target);
+        }
+        let is_fast = (-threshold - v).select_positive(target, zero);
+        let comes_in = (-closes).select_positive(is_fast, zero);
+        let target = e.select_positive(comes_in, zero);
+        // A point that is not there has no mass.
+        let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
+        let at = FIRST + PER_POINT * p;
+        (side[at], side[at + 1], side[at + 2], side[at + 3]) = (target, zero, zero, time);
+        most = most.max(target);
+    }
+    most
 }
 
 /// Accumulated impulses along n and t (N·s) after which a point has gained `wanted` (m/s), or as much of it along t
@@ -237,6 +433,56 @@ pub(super) fn rough_impulses<L: Lanes>(
     std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]))
 }
 
+/// Accumulated impulses of both points of smooth contacts together, and where these are (positive): one after the other
+/// takes hundreds of sweeps where a face is hit beside the centre.
+#[inline(always)]
+fn pair_impulses<L: Lanes>(
+    rows: &[BodyRow],
+    record: &[L],
+    layout: &Layout,
+    side: &[L],
+    row_a: LaneIndex<L::Index>,
+    row_b: LaneIndex<L::Index>,
+) -> ([L; 2], L) {
+    /// Points that are nearly one are solved one after the other (1).
+    const APART: f32 = 1e-5;
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let b = L::gather(rows, row_b);
+    let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+    let arm = |p: usize, first: usize, has: bool| if has { record[layout.at(p, first)] } else { zero };
+    let arms =
+        [0, 1].map(|p| [arm(p, layout.arm_a, layout.has_arms[1]), arm(p, layout.arm_b, layout.has_arms[0])]);
+    let k = |p: usize, q: usize| {
+        let turn_a = a[7] * arms[p][0] * arms[q][0];
+        (b[7] * arms[p][1]).mul_add(arms[q][1], turn_a + (a[3] + b[3]))
+    };
+    let [k_00, k_11, k_01] = [k(0, 0), k(1, 1), k(0, 1)];
+    let of = |p: usize, quantity: usize| side[FIRST + PER_POINT * p + quantity];
+    let old = [of(0, 1), of(1, 1)];
+    let wanted = [0, 1].map(|p| of(p, 0) - point::<L>(rows, record, layout, p, row_a, row_b)[0]);
+    let w = [
+        k_00.mul_add(old[0], k_01.mul_add(old[1], wanted[0])),
+        k_01.mul_add(old[0], k_11.mul_add(old[1], wanted[1])),
+    ];
+    // Of k_pq = m + Σ i r_p r_q, as a sum of what is positive: none of it cancels.
+    let apart = [0, 1].map(|body| arms[0][body] - arms[1][body]);
+    let wedge = arms[0][0].mul_add(arms[1][1], -(arms[0][1] * arms[1][0]));
+    let bodies = (a[7] * apart[0]).mul_add(apart[0], b[7] * apart[1] * apart[1]);
+    let determinant = (a[3] + b[3]).mul_add(bodies, a[7] * b[7] * wedge * wedge);
+    let is_solved = determinant - L::splat(APART) * k_00 * k_11;
+    let safe = is_solved.select_positive(determinant, one);
+    let n = [k_11.mul_add(w[0], -(k_01 * w[1])) / safe, k_00.mul_add(w[1], -(k_01 * w[0])) / safe];
+    let positive = |yes: L, value: L| yes.select_positive(value, zero);
+    let both = n[0].min(n[1]);
+    // Where one would have to pull, the other acts alone: the first, if that is enough for the second.
+    let alone = [w[0] / is_solved.select_positive(k_00, one), w[1] / is_solved.select_positive(k_11, one)];
+    let enough = alone[0].min(k_01.mul_add(alone[0], -w[1]));
+    let first = positive(enough, alone[0]);
+    let second = enough.select_positive(zero, alone[1].max(zero));
+    let pair = [both.select_positive(n[0], first), both.select_positive(n[1], second)];
+    (pair, is_solved)
+}
+
 #[inline(never)]
 fn solve<L: Lanes>(
     rows: &mut [BodyRow],
@@ -244,17 +490,30 @@ fn solve<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    change: &Cell<f32>,
+    &Solve { timed, fastest, ref change }: &Solve,
 ) {
     let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
-    let (zero, one) = (L::zero(), L::splat(1.0));
+    let (zero, one, fastest) = (L::zero(), L::splat(1.0), L::splat(fastest));
     let mut most = zero;
     for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
+        let hit: [L; 2] =
+            std::array::from_fn(|p| if p < layout.points { side[FIRST + PER_POINT * p] } else { zero });
+        let mut both = hit[0].min(hit[1]);
+        if layout.has_friction {
+            both = record[layout.friction].select_positive(zero, both);
+        }
+        let pair = if both.any_positive() {
+            let (pair, is_solved) = pair_impulses::<L>(rows, record, layout, side, row_a, row_b);
+            both = is_solved.min(both);
+            pair
+        } else {
+            [zero; 2]
+        };
         for p in 0..layout.points {
             let at = FIRST + PER_POINT * p;
-            let target = side[at];
+            let target = hit[p];
             if largest(target) == 0.0 {
                 continue;
             }
@@ -286,15 +545,18 @@ fn solve<L: Lanes>(
                 let k = [k_nn, k_tt, k_nt];
                 new = rough_impulses(k, mass, record[layout.friction], [old_n, old_t], [wanted, -vt]);
             }
-            // What bounces leaves by itself: it is not pushed out as well.
-            let at_surface = record[layout.at(p, layout.separation)];
-            record[layout.at(p, layout.separation)] =
-                target.select_positive(at_surface.max(zero), at_surface);
+            new[0] = both.select_positive(pair[p], new[0]);
+            if !timed {
+                // As in [`Leave`].
+                let at_surface = record[layout.at(p, layout.separation)];
+                record[layout.at(p, layout.separation)] =
+                    target.select_positive(at_surface.max(zero), at_surface);
+            }
             let new = new.map(|impulse| target.select_positive(impulse, zero));
             (side[at + 1], side[at + 2]) = (new[0], new[1]);
             let delta = [new[0] - old_n, new[1] - old_t];
             let size = delta[0].max(-delta[0]) + delta[1].max(-delta[1]);
-            most = most.max(k_nn * size / target.select_positive(target, one));
+            most = most.max(k_nn * size / fastest);
             let x = n[0].mul_add(delta[0], n[1] * delta[1]);
             let y = n[1].mul_add(delta[0], -(n[0] * delta[1]));
             let turn = |arm: [L; 2]| arm[0].mul_add(delta[0], arm[1] * delta[1]);

@@ -46,6 +46,7 @@ mod statics;
 mod sticky;
 pub mod sweep;
 pub mod system;
+mod touch;
 pub mod types;
 
 pub use batches::Batches;

@@ -136,6 +136,8 @@ pub struct StepInput {
     pub pile_modes: PileModes,
     /// See [`Passes::contacts_changed`].
     pub contacts_changed: bool,
+    /// Bodies fly on to where they are hit, and from there; see [`super::impact`].
+    pub timed_impacts: bool,
 }
 
 /// One step's problem, prepared.
@@ -637,16 +639,19 @@ impl<'a> Passes<'a> {
 
     /// Lets bounce what comes in, wave by wave; see [`super::impact`].
     fn bounce_before(&mut self) {
-        let (h, dt) = (self.h(), self.dt());
-        self.over_contacts(&impact::Load { h, dt });
+        let (h, dt, timed) = (self.h(), self.dt(), self.input.timed_impacts);
+        self.over_contacts(&impact::Load { h, dt, timed });
+        let (mut has_bounced, mut has_ended) = (false, false);
         for _ in 0..IMPACT_WAVES {
-            let wave = impact::Wave { h, dt, found: Cell::new(0.0) };
+            let wave = impact::Wave { h, dt, is_first: !has_bounced, found: Cell::new(0.0) };
             self.over_contacts(&wave);
-            if wave.found.get() == 0.0 {
+            has_ended = wave.found.get() == 0.0;
+            if has_ended {
                 break;
             }
+            has_bounced = true;
             for _ in 0..IMPACT_SWEEPS {
-                let solve = impact::Solve { change: Cell::new(0.0) };
+                let solve = impact::Solve { timed, fastest: wave.found.get(), change: Cell::new(0.0) };
                 self.over_contacts(&solve);
                 self.count_sweep(if self.input.features.friction { 2 } else { 1 });
                 if solve.change.get() < IMPACT_TOLERANCE {
@@ -656,6 +661,17 @@ impl<'a> Passes<'a> {
             if self.input.record_impulses {
                 self.over_contacts(&impact::Book);
             }
+            if timed {
+                self.over_contacts(&impact::PutBack);
+            }
+        }
+        if has_bounced && timed {
+            if !has_ended {
+                // Bodies stay where they are: one might be in a third that nobody has looked at.
+                self.work.rows.iter_mut().for_each(|row| row.delta[..3].fill(0.0));
+            }
+            self.work.motion.hide_turns(&mut self.work.rows);
+            self.over_contacts(&impact::Leave);
         }
     }
 

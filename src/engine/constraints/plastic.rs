@@ -19,10 +19,11 @@
 //! most impacts are found after they have happened, with an overlap of |s| ≤ |v| dt: t is negative then, and bodies
 //! are put forward to where they would be.
 //!
-//! Arms are those of the contact's frame. When the two centres are displaced by D against each other at the time of the
-//! impulse, it adds D × λ to angular momentum, so that arms end at a point of both bodies then, r_a + D/2 and r_b − D/2, if
-//! there is friction. In the rows themselves and not beside them: what an impulse does that its row does not know of
-//! may add energy, and has shot bodies out of piles. D does not depend on impulses at that time.
+//! When the two centres are displaced by D against each other at the time of the impulse, it adds D × λ to angular
+//! momentum with the arms of the step's beginning. So arms end at a point of both bodies then, r_a + D/2 and r_b − D/2;
+//! round shapes have the frame of that moment ([`super::touch`]). In the rows themselves and not beside them: what an
+//! impulse does that its row does not know of may add energy, and has shot bodies out of piles. D does not depend on
+//! impulses at that time, only on those at others. The solver goes on with these arms.
 //!
 //! # How far
 //!
@@ -34,9 +35,10 @@
 
 use super::batches::Batches;
 use super::features::{Features, Layout};
-use super::impact::{AHEAD, rough_impulses};
+use super::impact::{AHEAD, TURNED, rough_impulses};
 use super::segment::Segment;
 use super::sweep::turn;
+use super::touch::{Frame, Round};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes, held};
 use std::collections::VecDeque;
@@ -103,6 +105,7 @@ const STILL: Body =
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Point {
+    lane: u32,
     index: u32,
     contact: u32,
     /// Rows of a and b.
@@ -110,8 +113,9 @@ struct Point {
     /// Impulses change a.
     pushes_a: bool,
     normal: [f32; 2],
-    /// r × n and r × t of a and b (m).
+    /// r × n and r × t of a and b (m), and the same of the contact's frame.
     arms: [[f32; 2]; 2],
+    own_arms: [[f32; 2]; 2],
     /// k_nn, k_tt, k_nt (1/kg).
     k: [f32; 3],
     /// 1/k_nn (kg).
@@ -123,10 +127,12 @@ struct Point {
     impulse: [f32; 2],
     /// When it is hit (s).
     time: f32,
-    /// Time of its frame (s); see [`Contact::turn`].
-    lead: f32,
-    /// See [`Point::meet`].
-    has_met: bool,
+    /// From a to b, as far as they have moved against each other when arms end at one point (m).
+    apart: [f32; 2],
+    /// What is round, until it is hit.
+    round: Option<Round>,
+    /// It is of a round shape.
+    is_round: bool,
 }
 
 /// What [`PlasticImpacts::spread`] works on.
@@ -141,22 +147,76 @@ pub(super) struct On<'a> {
     pub record_impulses: bool,
 }
 
+/// Where the record of a lane is.
+struct Place {
+    /// Which batches.
+    part: usize,
+    /// Its lane in these, and how many there are in a batch.
+    of: usize,
+    width: usize,
+    /// Its first float; the next quantity is `width` floats further.
+    first: usize,
+    layout: Layout,
+    pushes_a: bool,
+}
+
 impl On<'_> {
     fn lanes(&self) -> usize {
         self.batches[0].lanes() + self.batches[1].lanes()
     }
 
-    /// The points of a lane.
-    fn points(&self, lane: u32) -> [Point; 2] {
+    fn place(&self, lane: u32) -> Place {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         let (batches, width) = (&self.batches[part], self.batches[part].width());
         let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
         let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
-        let (layout, pushes_a) = (Layout::for_features(self.features, segment.opposite), segment.pushes_a());
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
-        let first = vector * width + in_segment % width;
+        let layout = Layout::for_features(self.features, segment.opposite);
+        Place {
+            part,
+            of,
+            width,
+            first: vector * width + in_segment % width,
+            layout,
+            pushes_a: segment.pushes_a(),
+        }
+    }
+
+    /// A point has the frame of the moment of touch.
+    fn turn(&mut self, point: &Point, frame: &Frame) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let rows = point.rows.map(|row| &self.rows[row as usize]);
+        frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
+        frame.write_contact(&mut self.contacts[point.contact as usize]);
+    }
+
+    /// What is left of the step is solved with the arms of the impact.
+    fn put(&mut self, point: &Point) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let mut put = |vector: usize, value: f32| floats[first + vector * width] = value;
+        let at = |quantity: usize| layout.at(point.index as usize, quantity);
+        for (k, (arm, has)) in
+            [layout.arm_a, layout.arm_b].into_iter().zip([layout.has_arms[1], layout.has_arms[0]]).enumerate()
+        {
+            if has {
+                put(at(arm), point.arms[k][0]);
+                put(at(arm) + 1, point.arms[k][1]);
+            }
+        }
+        put(at(layout.normal_mass), point.mass);
+        if layout.has_friction {
+            put(at(layout.tangent_mass), 1.0 / point.k[1]);
+        }
+    }
+
+    /// The points of a lane.
+    fn points(&self, lane: u32) -> [Point; 2] {
+        let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
+        let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
         let contact = batches.contact()[of];
         let bounces = self.contacts[contact as usize].restitution > 0.0;
@@ -165,7 +225,8 @@ impl On<'_> {
         std::array::from_fn(|p| {
             let is_there = p < layout.points && !bounces;
             let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
-            let mut point = Point { contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+            let mut point =
+                Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
             if mass <= 0.0 {
                 return point;
             }
@@ -177,10 +238,12 @@ impl On<'_> {
                 |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
             let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
             let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
-            (point.normal, point.arms, point.k) = ([at(0), at(1)], arms, [1.0 / mass, k_tt, k_nt]);
+            (point.normal, point.arms, point.own_arms) = ([at(0), at(1)], arms, arms);
+            point.k = [1.0 / mass, k_tt, k_nt];
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
             point.separation = at(layout.at(p, layout.separation));
-            point.lead = self.contacts[contact as usize].turn;
+            point.round = Round::of(&self.contacts[contact as usize], !pushes_a);
+            point.is_round = point.round.is_some();
             point
         })
     }
@@ -229,25 +292,33 @@ impl Point {
         }
     }
 
+    /// Has the frame of the moment of touch from now on.
+    fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
+        let k = frame.masses(self.rows.map(|row| &rows[row as usize]));
+        (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
+        (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| frame.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+        self.apart = [apart(0), apart(1)];
+    }
+
     /// Puts its place between where both bodies are at its time; see the [module](self).
-    fn meet(&mut self, rows: &[BodyRow], bodies: &[Body]) {
-        self.has_met = true;
-        if !self.pushes_a || self.friction == 0.0 {
+    fn meet(&mut self, rows: &[BodyRow]) {
+        // Nothing turns a smooth disc.
+        if !self.pushes_a || self.friction == 0.0 && self.is_round {
             return;
         }
         let [a, b] = self.rows.map(|row| rows[row as usize]);
-        let flown = self.rows.map(|row| bodies[row as usize].flown);
         let apart = |k: usize| {
-            let now = self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
-            self.lead.neg_mul_add(flown[1][k] - flown[0][k], now)
+            self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]) - self.apart[k]
         };
         let ([x, y], [nx, ny]) = ([0.5 * apart(0), 0.5 * apart(1)], self.normal);
         // D/2 × n and D/2 × t.
         let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
         let inertia = [a.delta[3], b.delta[3]];
         for (axis, shift) in shift.into_iter().enumerate() {
-            self.arms[0][axis] += shift;
-            self.arms[1][axis] -= shift;
+            self.arms[0][axis] = self.own_arms[0][axis] + shift;
+            self.arms[1][axis] = self.own_arms[1][axis] - shift;
         }
         let direct = a.velocity[3] + b.velocity[3];
         let turns = |i: usize, j: usize| {
@@ -306,6 +377,9 @@ impl PlasticImpacts {
             }
         }
         self.queue.clear();
+        for point in self.points.iter().filter(|point| point.impulse[0] > 0.0) {
+            on.put(point);
+        }
         self.spent += self.solved.saturating_sub(always);
         if on.record_impulses {
             for point in &self.points {
@@ -351,7 +425,16 @@ impl PlasticImpacts {
         let listed = &mut self.listed[lane as usize];
         if *listed == NONE {
             *listed = self.points.len() as u32;
-            self.points.extend(on.points(lane));
+            let mut points = on.points(lane);
+            for point in points.iter_mut().filter(|point| point.mass > 0.0) {
+                // Arms end at one point at the time of the frame, if nothing is hit.
+                let [a, b] = point.rows.map(|row| self.bodies[row as usize].flown);
+                let contact = &on.contacts[point.contact as usize];
+                let lead = if contact.manifold.count == 1 { contact.turn } else { 0.0 };
+                point.apart = std::array::from_fn(|k| lead * (b[k] - a[k]));
+                point.is_round |= lead != 0.0;
+            }
+            self.points.extend(points);
         }
         *listed as usize
     }
@@ -363,24 +446,34 @@ impl PlasticImpacts {
         if point.mass <= 0.0 {
             return;
         }
+        let mut touch = None;
         if point.impulse[0] == 0.0 {
-            let [vn, _] = point.velocity(on.rows);
-            if vn >= -slowest {
-                return;
+            let arrival = |point: &Point, rows: &[BodyRow]| {
+                let ([vn, _], gap) = (point.velocity(rows), point.gap(rows));
+                (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
+            };
+            let Some(mut time) = arrival(point, on.rows) else { return };
+            if let Some(round) = point.round {
+                let ends = point.rows.map(|row| &on.rows[row as usize]);
+                touch = round.frame(ends, [-on.dt, TURNED * on.dt]);
             }
-            let gap = point.gap(on.rows);
-            if vn.mul_add(AHEAD * on.dt, gap) >= 0.0 {
-                return;
+            if let Some(frame) = &touch {
+                let mut turned = *point;
+                turned.turn(frame, on.rows);
+                let Some(then) = arrival(&turned, on.rows) else { return };
+                (*point, time) = (turned, then);
             }
-            let time = gap / -vn;
             point.time = if time < -on.dt { 0.0 } else { time };
         }
         for row in point.rows {
             point.time = point.time.max(self.bodies[row as usize].time);
         }
-        if !point.has_met {
-            point.meet(on.rows, &self.bodies);
+        if let Some(frame) = &touch {
+            self.points[place].round = None;
+            on.turn(&self.points[place], frame);
         }
+        let point = &mut self.points[place];
+        point.meet(on.rows);
         let [vn, vt] = point.velocity(on.rows);
         let old = point.impulse;
         let new = rough_impulses(point.k, point.mass, point.friction, old, [-vn, -vt]);

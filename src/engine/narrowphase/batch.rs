@@ -262,8 +262,9 @@ fn run_kind<L: Lanes, const KIND: u8>(
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap) = pair.in_step(&poses, ways, times, speculative);
-                touch.on_held(poses.held[0]).with_gap(gap)
+                let (touch, round) = pair.in_step(&poses, ways, times, speculative);
+                let touch = touch.on_held(poses.held[0]).with_gap(round.gap);
+                if times.is_some() { touch.about(round.centers, round.reach, round.flies) } else { touch }
             })
         }
         Kind::CircleHull => {
@@ -272,8 +273,10 @@ fn run_kind<L: Lanes, const KIND: u8>(
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
                 let ways = [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap) = pair.in_step(&poses, ways, times, speculative);
-                touch.swapped().on_held(poses.held[1]).with_gap(gap)
+                let (touch, round) = pair.in_step(&poses, ways, times, speculative);
+                let touch = touch.swapped().on_held(poses.held[1]).with_gap(round.gap);
+                let [core, center] = round.centers;
+                if times.is_some() { touch.about([center, core], round.reach, round.flies) } else { touch }
             })
         }
     }

@@ -71,7 +71,10 @@ pub fn in_step<L: Lanes>(
     };
     let size = pair.size.map(|size| size[2]);
     let touch = Touch { normal: frame.normal, lead: frame.time, ..touch };
-    touch.with_anchors(center(0), center(1), size).on_held(held).with_gap(frame.gap)
+    let centers = [center(0), center(1)];
+    let touch = touch.with_anchors(centers[0], centers[1], size).on_held(held).with_gap(frame.gap);
+    let flies = frame.time.select_positive(L::zero(), curvature);
+    touch.about(centers, size[0] + size[1], flies)
 }
 
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.

@@ -45,7 +45,7 @@ impl<L: Lanes> HullCircle<L> {
 
     /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
     /// than `speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
-    /// `times`: of frames, if these are not of the beginning. And their gaps, which points are not to be told by.
+    /// `times`: of frames, if these are not of the beginning. And what points are not to be told by.
     #[inline(always)]
     pub fn in_step(
         &self,
@@ -53,7 +53,7 @@ impl<L: Lanes> HullCircle<L> {
         ways: [[L; 4]; 2],
         times: Option<FrameTimes>,
         speculative: f32,
-    ) -> (Touch<L>, L) {
+    ) -> (Touch<L>, Round<L>) {
         let way = self.way(poses, ways);
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
         let rotation_a = poses.rotation[0];
@@ -110,12 +110,22 @@ impl<L: Lanes> HullCircle<L> {
         let mut frame = Frame { time: zero, normal, gap };
         let mut normal = rotate(rotation_a, normal);
         let (mut center, mut between) = (center, poses.centers);
+        let reach = distance - separation;
+        let core = [0, 1].map(|k| distance.neg_mul_add(normal[k], center[k] + between[k]));
+        let mut round = Round { gap, centers: [core, center], reach, flies: zero };
         if let Some(times) = times {
             let curvature = corner.select_positive(inverse, zero);
             frame = times.frame(frame.normal, curvature, way, [separation, gap]);
             center = turned(center, frame.time * ways[1][2]);
             between = [0, 1].map(|k| frame.time.mul_add(ways[1][k] - ways[0][k], between[k]));
             normal = turned(rotate(rotation_a, frame.normal), frame.time * ways[0][2]);
+            round.gap = frame.gap;
+            // When it is as far away as it is when it touches, it still has to be past the same end, and above the face.
+            let part = arrival(dot(frame.normal, way) * distance, dot(way, way), [distance, reach]);
+            let (up, aside) = (dot(n, way), dot(t, way));
+            let outside = past * part.mul_add(aside, past);
+            let stays = part.mul_add(up, height).min(outside);
+            round.flies = frame.time.select_positive(zero, corner.min(stays));
         }
         // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
         // normal, and friction is all that turns it. a's follows from the centres of mass.
@@ -132,8 +142,31 @@ impl<L: Lanes> HullCircle<L> {
             passes: zero,
             lead: frame.time,
         };
-        (touch, frame.gap)
+        (touch, round)
     }
+}
+
+/// What a contact of a hull and a circle is beside its point.
+pub struct Round<L> {
+    /// Signed gap, for a circle that passes by (m).
+    pub gap: L,
+    /// From the centres of mass: the nearest point of the hull's core, and the centre of the circle (m).
+    pub centers: [[L; 2]; 2],
+    /// Distance of these at which the shapes touch (m).
+    pub reach: L,
+    /// Positive where that point of the core is a corner, and the frame that of the beginning of the step.
+    pub flies: L,
+}
+
+/// When two centres that are `distance` apart are `reach` apart, as a part of their way: `toward` is the product of the vector
+/// between them and the way, `squared` that of the way with itself. Zero if they come no closer.
+#[inline(always)]
+fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> L {
+    let product = (distance - reach) * (distance + reach);
+    let root = toward.mul_add(toward, -(squared * product));
+    let both = root.max(L::zero()).sqrt() - toward;
+    let comes = root.min(-toward);
+    comes.select_positive(product / comes.select_positive(both, L::splat(1.0)), L::zero())
 }
 
 impl HullCircle<f32> {

@@ -97,13 +97,13 @@ fn touch(
         }
         Kind::HullCircle => {
             let pair = HullCircle::new(HullRow::new(a), row_b);
-            let (touch, gap) = pair.in_step(&poses, ways, None, speculative_distance);
-            touch.on_held(held).with_gap(gap)
+            let (touch, round) = pair.in_step(&poses, ways, None, speculative_distance);
+            touch.on_held(held).with_gap(round.gap)
         }
         Kind::CircleHull => {
             let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
-            let (touch, gap) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
-            touch.swapped().on_held(held).with_gap(gap)
+            let (touch, round) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
+            touch.swapped().on_held(held).with_gap(round.gap)
         }
     };
     Some(touch)

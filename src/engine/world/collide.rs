@@ -100,7 +100,8 @@ impl World {
                 } else {
                     0.0
                 };
-                fresh.push(Contact { manifold: contact.manifold, preload, ..candidate.without_manifold() });
+                let Contact { manifold, turn, .. } = *contact;
+                fresh.push(Contact { manifold, preload, turn, ..candidate.without_manifold() });
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;

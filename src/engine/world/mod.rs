@@ -253,6 +253,7 @@ impl World {
             points: self.counts.points,
             pile_modes: self.found.modes,
             contacts_changed: self.found.contacts_changed,
+            timed_impacts: self.settings.solver.turning_frames,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
         self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());

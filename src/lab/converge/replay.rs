@@ -149,6 +149,7 @@ impl<'a> Replay<'a> {
             points,
             pile_modes,
             contacts_changed,
+            timed_impacts: false,
         };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {

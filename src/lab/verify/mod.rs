@@ -54,8 +54,8 @@
 //!   late, which is a negative damping of ω² dt/4 (A26); what is carried round goes along tangents.
 //! - **Sudden loads.** The first substep begins with the impulses of the step before (B23), and joints of a pile near its limit of
 //!   friction slip before they have converged (B24).
-//! - **The moment of an impact.** The normal is that of the step in which it is found (A27.oblique); rough impacts that run through small
-//!   bodies may diverge (A27.energy).
+//! - **The moment of an impact.** Between free bodies that are no discs it is the beginning of the step, with restitution; rough impacts that run
+//!   through small bodies may diverge (A27.energy).
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
