@@ -5,6 +5,7 @@ mod broadphase;
 mod common;
 mod contacts;
 mod converge;
+mod elastic;
 mod features;
 mod impulses;
 mod metrics;

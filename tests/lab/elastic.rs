@@ -1,0 +1,106 @@
+//! Laws of impacts with restitution, under the solver that has them at their time.
+
+use proptest::prelude::*;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::{DEFAULT, find};
+use simpulse::engine::world::World;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+
+/// Linear momentum (N·s), angular momentum (N·m·s) and kinetic energy (J) of dynamic bodies.
+fn totals(world: &World) -> [f64; 4] {
+    let b = &world.bodies;
+    (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0).fold([0.0; 4], |[px, py, spin, energy], i| {
+        let (m, inertia) = (1.0 / f64::from(b.inv_mass[i]), 1.0 / f64::from(b.inv_inertia[i]));
+        let [x, y] = b.center(i);
+        let [vx, vy, w] = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+        [
+            px + m * vx,
+            py + m * vy,
+            spin + m * (x * vy - y * vx) + inertia * w,
+            energy + 0.5 * (m * (vx * vx + vy * vy) + inertia * w * w),
+        ]
+    })
+}
+
+/// Smooth elastic boxes in a closed one, without weight.
+fn gas() -> Scene {
+    let smooth = |shape: SceneShape| shape.friction(0.0).restitution(1.0);
+    let wall =
+        |at: [f64; 2], half: [f64; 2]| SceneBody::fixed(at, smooth(SceneShape::rectangle(half[0], half[1])));
+    let mut bodies = vec![
+        wall([0.0, -9.0], [8.0, 1.0]),
+        wall([0.0, 9.0], [8.0, 1.0]),
+        wall([-9.0, 0.0], [1.0, 8.0]),
+        wall([9.0, 0.0], [1.0, 8.0]),
+    ];
+    for k in 0..25 {
+        // Parts of the golden section: anything that does not repeat.
+        let any = |n: u32| (f64::from(25 * n + k) * 0.618_034).fract() * 2.0 - 1.0;
+        let at = [f64::from(k % 5), f64::from(k / 5)].map(|i| 2.5 * (i - 2.0));
+        let body = SceneBody::dynamic(at, smooth(SceneShape::rectangle(0.5, 0.3)));
+        bodies.push(body.turned(3.0 * any(1)).moving([4.0 * any(2), 4.0 * any(3)], 3.0 * any(4)));
+    }
+    Scene::new("gas", bodies).weightless()
+}
+
+#[test]
+fn a_gas_of_smooth_elastic_boxes_keeps_its_energy() {
+    let mut world = gas().build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+    let [.., before] = totals(&world);
+    for _ in 0..1200 {
+        world.step().unwrap();
+    }
+    let [.., after] = totals(&world);
+    // Impulses of one point after the other had made 6e-3.
+    assert!((after / before - 1.0).abs() < 1e-4, "{before} J, then {after}");
+}
+
+#[test]
+fn its_bits_are_the_same_at_every_width() {
+    let run = |width: LaneWidth| {
+        let mut world = gas().build(crate::common::with_width(find(DEFAULT).unwrap(), width)).unwrap();
+        for _ in 0..300 {
+            world.step().unwrap();
+        }
+        (0..world.bodies.len()).map(|i| world.bodies.center(i).map(f64::to_bits)).collect::<Vec<_>>()
+    };
+    let all = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8, LaneWidth::W16].map(run);
+    assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+proptest! {
+    /// Two discs that meet anywhere, at any time within a step, keep both momenta; smooth ones leave as Newton's law has it.
+    #[test]
+    fn discs_meet_where_they_touch(
+        offset in -0.9f64..0.9,
+        start in 2.0f64..2.5,
+        speed in 4f64..12.0,
+        spins in [-4f64..4.0, -4.0..4.0],
+        rough in any::<bool>(),
+        e in 0f64..1.0,
+    ) {
+        let disc = || SceneShape::disc(0.5).friction(if rough { 0.5 } else { 0.0 }).restitution(e);
+        let bodies = vec![
+            SceneBody::dynamic([-start, offset], disc()).moving([speed, 0.0], spins[0]),
+            SceneBody::dynamic([0.0, 0.0], disc()).moving([0.0, 0.0], spins[1]),
+        ];
+        let scene = Scene::new("discs", bodies).weightless();
+        let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+        let before = totals(&world);
+        for _ in 0..60 {
+            world.step().unwrap();
+        }
+        let after = totals(&world);
+        for k in 0..3 {
+            prop_assert!((after[k] - before[k]).abs() < 2e-5 * speed, "{before:?}, then {after:?}");
+        }
+        prop_assert!(after[3] < before[3] * (1.0 + 1e-5), "{before:?}, then {after:?}");
+        if !rough {
+            let sin = offset;
+            let given = 0.5 * (1.0 + e) * speed * (1.0 - sin * sin).sqrt();
+            let [x, y] = [world.bodies.velocity_x[1], world.bodies.velocity_y[1]].map(f64::from);
+            let off = (x - given * (1.0 - sin * sin).sqrt()).hypot(y + given * sin);
+            prop_assert!(off < 1e-4 * speed, "({x}, {y}) m/s with e = {e}");
+        }
+    }
+}
