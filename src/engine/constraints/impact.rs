@@ -40,7 +40,7 @@
 //!
 //! A point is an impact if it closes its gap within the step, and faster than what forces alone make
 //! of rest in one step, dt (|n·a_a| + |n·a_b|): a slower one cannot be told from one that rests. Where something round
-//! comes in, n is that of the moment of touch ([`super::touch`]).
+//! comes in, n is that of the moment of touch (`touch.rs`).
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::bounces::Bounces;

@@ -17,7 +17,7 @@ pub mod bounces;
 pub mod cone;
 pub mod coulomb_lcp;
 pub mod descent;
-pub mod equilibrium;
+mod equilibrium;
 pub mod features;
 pub mod graph;
 pub mod impact;

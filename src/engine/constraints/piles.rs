@@ -423,7 +423,7 @@ impl Piles {
         }
     }
 
-    /// Balances the loads of bodies that begin; see [`super::equilibrium`].
+    /// Balances the loads of bodies that begin; see `equilibrium.rs`.
     fn balance(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let begins =
             |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !self.is_loaded[body as usize];

@@ -21,7 +21,7 @@
 //!
 //! When the two centres are displaced by D against each other at the time of the impulse, it adds D × λ to angular
 //! momentum with the arms of the step's beginning. So arms end at a point of both bodies then, r_a + D/2 and r_b − D/2;
-//! round shapes have the frame of that moment ([`super::touch`]). In the rows themselves and not beside them: what an
+//! round shapes have the frame of that moment (`touch.rs`). In the rows themselves and not beside them: what an
 //! impulse does that its row does not know of may add energy, and has shot bodies out of piles. D does not depend on
 //! impulses at that time, only on those at others. The solver goes on with these arms.
 //!
