@@ -6,9 +6,10 @@
 //! **Departures.** Other than in [`super::soft_step`], springs are as stiff as the substep rate allows, a
 //! fixed part of it; each contact has a preload that follows its load
 //! ([`crate::engine::constraints::Passes::preload`]), as fast as the slowest mode of the pile allows; contacts at
-//! rest begin with what statics says they bear, and a column that would buckle gets stiffer springs and the
-//! sweeps that these need (both [`crate::engine::constraints::piles`]); springs bear a load however deep its contact
-//! is; the two normal rows of a contact are solved together, friction rows after them; where contacts have come or
+//! rest begin with what statics says they bear, each point with the preload of its own load, and a column that would
+//! buckle gets stiffer springs and the sweeps that these need (both [`crate::engine::constraints::piles`]); springs
+//! bear a load however deep its contact is; what rolls or is carried has the frame of the middle of the step
+//! ([`crate::engine::narrowphase::frames`]); the two normal rows of a contact are solved together, friction rows after them; where contacts have come or
 //! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago; what comes
 //! in without restitution is stopped before the step ([`crate::engine::constraints::Passes::plastic_impacts`]); and
 //! relaxing takes the angular momentum that pushing bodies apart has made from their spins
@@ -22,7 +23,9 @@
 //! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies
 //! slide past each other, angular momentum is conserved to rounding only in impacts that are seen before the step: arms
 //! are those of its beginning, which matters to impacts within it. And where impacts without restitution are many: only
-//! 32 contacts at once are followed, and the sweeps of a substep spread what is left by two bodies each.
+//! 32 contacts at once are followed, and the sweeps of a substep spread what is left by two bodies each. A load that
+//! goes or wanders to a new contact within a step is followed by one sweep more: what stood on it comes apart a little
+//! (B23.release), and what bears hundreds of times its mass sinks (B23.rolling).
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
