@@ -136,7 +136,7 @@ const PLACED_TIME: f32 = 0.1;
 /// ε: part by which a load may fall without being one that comes and goes (1).
 const STEADY: f32 = 0.005;
 
-/// Time after the fall of a load in which preload is not raised (s). Twice as long rests no sooner.
+/// Time after the fall of a load in which preload is not raised (s). Twice as long overlaps more, and rests little sooner.
 const WAIT: f32 = 1.0;
 
 /// Batches between asking for contacts and reading them.
