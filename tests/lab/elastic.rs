@@ -1,26 +1,10 @@
 //! Laws of impacts with restitution, under the solver that has them at their time.
 
+use super::common::totals;
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{DEFAULT, find};
-use simpulse::engine::world::World;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
-
-/// Linear momentum (N·s), angular momentum (N·m·s) and kinetic energy (J) of dynamic bodies.
-fn totals(world: &World) -> [f64; 4] {
-    let b = &world.bodies;
-    (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0).fold([0.0; 4], |[px, py, spin, energy], i| {
-        let (m, inertia) = (1.0 / f64::from(b.inv_mass[i]), 1.0 / f64::from(b.inv_inertia[i]));
-        let [x, y] = b.center(i);
-        let [vx, vy, w] = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
-        [
-            px + m * vx,
-            py + m * vy,
-            spin + m * (x * vy - y * vx) + inertia * w,
-            energy + 0.5 * (m * (vx * vx + vy * vy) + inertia * w * w),
-        ]
-    })
-}
 
 /// Smooth elastic boxes in a closed one, without weight.
 fn gas() -> Scene {

@@ -1,26 +1,11 @@
 //! Laws of impacts without restitution, under the solver that stops them before the step.
 
+use super::common::totals;
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{DEFAULT, find};
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
-
-/// Linear momentum (N·s), angular momentum (N·m·s) and kinetic energy (J).
-fn totals(world: &World) -> [f64; 4] {
-    let b = &world.bodies;
-    (0..b.len()).fold([0.0; 4], |[px, py, spin, energy], i| {
-        let (m, inertia) = (1.0 / f64::from(b.inv_mass[i]), 1.0 / f64::from(b.inv_inertia[i]));
-        let [x, y] = b.center(i);
-        let [vx, vy, w] = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
-        [
-            px + m * vx,
-            py + m * vy,
-            spin + m * (x * vy - y * vx) + inertia * w,
-            energy + 0.5 * (m * (vx * vx + vy * vy) + inertia * w * w),
-        ]
-    })
-}
 
 fn pair(
     angles: [f64; 2],

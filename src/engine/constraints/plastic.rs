@@ -38,7 +38,7 @@ use super::features::{Features, Layout};
 use super::impact::{AHEAD, TURNED, rough_impulses};
 use super::segment::Segment;
 use super::sweep::turn;
-use super::touch::{Frame, Round};
+use super::touch::{Frame, Round, couplings, write_arms};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes, held};
 use std::collections::VecDeque;
@@ -197,20 +197,8 @@ impl On<'_> {
     fn put(&mut self, point: &Point) {
         let Place { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        let mut put = |vector: usize, value: f32| floats[first + vector * width] = value;
-        let at = |quantity: usize| layout.at(point.index as usize, quantity);
-        for (k, (arm, has)) in
-            [layout.arm_a, layout.arm_b].into_iter().zip([layout.has_arms[1], layout.has_arms[0]]).enumerate()
-        {
-            if has {
-                put(at(arm), point.arms[k][0]);
-                put(at(arm) + 1, point.arms[k][1]);
-            }
-        }
-        put(at(layout.normal_mass), point.mass);
-        if layout.has_friction {
-            put(at(layout.tangent_mass), 1.0 / point.k[1]);
-        }
+        let put = |vector: usize, value: f32| floats[first + vector * width] = value;
+        write_arms(&layout, point.index as usize, point.arms, [point.mass, 1.0 / point.k[1]], put);
     }
 
     /// The points of a lane.
@@ -294,7 +282,7 @@ impl Point {
 
     /// Has the frame of the moment of touch from now on.
     fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
-        let k = frame.masses(self.rows.map(|row| &rows[row as usize]));
+        let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
         (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
         let [a, b] = self.rows.map(|row| rows[row as usize]);
@@ -315,17 +303,11 @@ impl Point {
         let ([x, y], [nx, ny]) = ([0.5 * apart(0), 0.5 * apart(1)], self.normal);
         // D/2 × n and D/2 × t.
         let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
-        let inertia = [a.delta[3], b.delta[3]];
         for (axis, shift) in shift.into_iter().enumerate() {
             self.arms[0][axis] = self.own_arms[0][axis] + shift;
             self.arms[1][axis] = self.own_arms[1][axis] - shift;
         }
-        let direct = a.velocity[3] + b.velocity[3];
-        let turns = |i: usize, j: usize| {
-            let of = |body: usize| inertia[body] * self.arms[body][i] * self.arms[body][j];
-            of(0) + of(1)
-        };
-        self.k = [direct + turns(0, 0), direct + turns(1, 1), turns(0, 1)];
+        self.k = couplings([&a, &b], self.arms);
         self.mass = 1.0 / self.k[0];
     }
 }

@@ -18,6 +18,7 @@ use super::features::Layout;
 use super::sweep::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
+use crate::engine::narrowphase::circles::arrival;
 use glam::Vec2;
 
 /// A contact whose frame is that of the beginning of the step, but may be another.
@@ -70,13 +71,10 @@ impl Round {
         };
         let ([at_a, with_a], [at_b, with_b]) = (moved(0), moved(1));
         let (d, u) = (self.between + (at_b - at_a), with_b - with_a);
-        let (toward, distance) = (d.dot(u), d.length());
-        let product = (distance - self.reach) * (distance + self.reach);
-        let root = toward.mul_add(toward, -(u.length_squared() * product));
-        if toward >= 0.0 || root <= 0.0 {
+        let [time, comes] = arrival(d.dot(u), u.length_squared(), [d.length(), self.reach]);
+        if comes <= 0.0 {
             return None;
         }
-        let time = product / (root.sqrt() - toward);
         if !(from..=to).contains(&time) {
             return None;
         }
@@ -103,16 +101,6 @@ fn straight(row: &BodyRow) -> Vec2 {
 }
 
 impl Frame {
-    /// k_nn, k_tt and k_nt of the row between these bodies (1/kg).
-    pub fn masses(&self, rows: [&BodyRow; 2]) -> [f32; 3] {
-        let direct = rows[0].velocity[3] + rows[1].velocity[3];
-        let turns = |i: usize, j: usize| {
-            let of = |k: usize| rows[k].delta[3] * self.arms[k][i] * self.arms[k][j];
-            of(0) + of(1)
-        };
-        [direct + turns(0, 0), direct + turns(1, 1), turns(0, 1)]
-    }
-
     /// Takes the place of the frame in the contact, which has no centres from now on.
     pub fn write_contact(&self, contact: &mut Contact) {
         contact.manifold.normal = self.normal;
@@ -123,22 +111,41 @@ impl Frame {
 
     /// The same in the record of its lane, by `put(vector, value)`.
     pub fn write_record(&self, layout: &Layout, rows: [&BodyRow; 2], mut put: impl FnMut(usize, f32)) {
-        let [k_nn, k_tt, _] = self.masses(rows);
+        let [k_nn, k_tt, _] = couplings(rows, self.arms);
         put(0, self.normal.x);
         put(1, self.normal.y);
-        let point = |quantity: usize| layout.at(0, quantity);
-        for (k, (arm, has)) in
-            [layout.arm_a, layout.arm_b].into_iter().zip([layout.has_arms[1], layout.has_arms[0]]).enumerate()
-        {
-            if has {
-                put(point(arm), self.arms[k][0]);
-                put(point(arm) + 1, self.arms[k][1]);
-            }
+        put(layout.at(0, layout.separation), self.separation);
+        write_arms(layout, 0, self.arms, [1.0 / k_nn, 1.0 / k_tt], put);
+    }
+}
+
+/// k_nn, k_tt and k_nt of a row between two bodies with these arms (1/kg).
+pub(super) fn couplings([a, b]: [&BodyRow; 2], arms: [[f32; 2]; 2]) -> [f32; 3] {
+    let direct = a.velocity[3] + b.velocity[3];
+    let turns = |i: usize, j: usize| {
+        let of = |row: &BodyRow, arm: [f32; 2]| row.delta[3] * arm[i] * arm[j];
+        of(a, arms[0]) + of(b, arms[1])
+    };
+    [direct + turns(0, 0), direct + turns(1, 1), turns(0, 1)]
+}
+
+/// Writes arms (m) and the effective masses 1/k_nn and 1/k_tt (kg) of point `p` into a record, by `put(vector, value)`.
+pub(super) fn write_arms(
+    layout: &Layout,
+    p: usize,
+    arms: [[f32; 2]; 2],
+    [normal_mass, tangent_mass]: [f32; 2],
+    mut put: impl FnMut(usize, f32),
+) {
+    let ends = [(layout.arm_a, layout.has_arms[1]), (layout.arm_b, layout.has_arms[0])];
+    for ((first, has), [n, t]) in ends.into_iter().zip(arms) {
+        if has {
+            put(layout.at(p, first), n);
+            put(layout.at(p, first) + 1, t);
         }
-        put(point(layout.separation), self.separation);
-        put(point(layout.normal_mass), 1.0 / k_nn);
-        if layout.has_friction {
-            put(point(layout.tangent_mass), 1.0 / k_tt);
-        }
+    }
+    put(layout.at(p, layout.normal_mass), normal_mass);
+    if layout.has_friction {
+        put(layout.at(p, layout.tangent_mass), tangent_mass);
     }
 }

@@ -181,12 +181,12 @@ pub fn update(
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
     contacts.resize(made + width.lanes(), Contact::default());
     let run = match width {
-        LaneWidth::W1 => run::<f32>,
-        LaneWidth::W4 => run::<f32x4>,
-        LaneWidth::W8 => run::<f32x8>,
-        LaneWidth::W16 => run::<f32x16>,
+        LaneWidth::W1 => run_of::<f32>(kind),
+        LaneWidth::W4 => run_of::<f32x4>(kind),
+        LaneWidth::W8 => run_of::<f32x8>(kind),
+        LaneWidth::W16 => run_of::<f32x16>(kind),
     };
-    let points = run(kind, jobs, indices, input, contacts, made, change);
+    let points = run(jobs, indices, input, contacts, made, change);
     contacts.truncate(made);
     points
 }
@@ -198,30 +198,24 @@ struct JobIndices<'a> {
     shapes: [IndexList<'a>; 2],
 }
 
-fn run<L: Lanes>(
-    kind: Kind,
-    jobs: &Jobs,
-    indices: JobIndices,
-    input: Input,
-    contacts: &mut [Contact],
-    made: usize,
-    change: &mut dyn FnMut(u32, &Contact),
-) -> usize {
-    let run = match kind {
-        Kind::Rectangles => run_kind::<L, { Kind::Rectangles as u8 }>,
-        Kind::Circles => run_kind::<L, { Kind::Circles as u8 }>,
-        Kind::Hulls => run_kind::<L, { Kind::Hulls as u8 }>,
-        Kind::HullCircle => run_kind::<L, { Kind::HullCircle as u8 }>,
-        Kind::CircleHull => run_kind::<L, { Kind::CircleHull as u8 }>,
-    };
-    run(kind, jobs, indices, input, contacts, made, change)
+/// Collides the pairs of one kind; as [`update`], with room for a batch of new manifolds from a place on.
+type Run = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
+
+/// A function for each kind: in one for all, what one kernel needs of the stack makes others spill, and frames of circles
+/// that turn made rectangles 18 % slower.
+fn run_of<L: Lanes>(kind: Kind) -> Run {
+    match kind {
+        Kind::Rectangles => run::<L, { Kind::Rectangles as usize }>,
+        Kind::Circles => run::<L, { Kind::Circles as usize }>,
+        Kind::Hulls => run::<L, { Kind::Hulls as usize }>,
+        Kind::HullCircle => run::<L, { Kind::HullCircle as usize }>,
+        Kind::CircleHull => run::<L, { Kind::CircleHull as usize }>,
+    }
 }
 
-/// The pairs of one kind. A function for each: in one for all, what one kernel needs of the stack makes others spill, and
-/// frames of circles that turn made rectangles 18 % slower.
+/// `KIND`: the place of the kind in [`Kind::ALL`].
 #[inline(never)]
-fn run_kind<L: Lanes, const KIND: u8>(
-    kind: Kind,
+fn run<L: Lanes, const KIND: usize>(
     jobs: &Jobs,
     indices: JobIndices,
     input: Input,
@@ -232,11 +226,7 @@ fn run_kind<L: Lanes, const KIND: u8>(
     // Vectors that spill do so within cache lines; see `align_frame`.
     align_frame();
     let Input { poses, ways, times, shapes: Shapes { rows, hulls }, speculative } = input;
-    // Known where this is compiled.
-    if kind as u8 != KIND {
-        return 0;
-    }
-    match kind {
+    match const { Kind::ALL[KIND] } {
         Kind::Rectangles => run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);

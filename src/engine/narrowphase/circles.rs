@@ -47,6 +47,17 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
     gap.min(closest + slop).select_positive(raised, gap)
 }
 
+/// When two centres that are `distance` apart (m) are `reach` apart, as a part of their way, and positive if they come so
+/// close: |d + u t| = R. `toward` is the product d·u, `squared` u².
+#[inline(always)]
+pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L; 2] {
+    let product = (distance - reach) * (distance + reach);
+    let root = toward.mul_add(toward, -(squared * product));
+    let sum = root.max(L::zero()).sqrt() - toward;
+    let comes = root.min(-toward);
+    [product / comes.select_positive(sum, L::splat(1.0)), comes]
+}
+
 /// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad);
 /// `times`: of frames, if these are not of the beginning.
 #[inline(always)]

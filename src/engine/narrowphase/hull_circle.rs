@@ -5,7 +5,7 @@
 //! is past one of its ends, the centre is h n + o n⊥ from it: along n itself over the face, so
 //! that long segments round nothing, and inside the core.
 
-use super::circles::PASSING;
+use super::circles::{PASSING, arrival};
 use super::frames::{Frame, FrameTimes, turned};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
@@ -121,7 +121,9 @@ impl<L: Lanes> HullCircle<L> {
             normal = turned(rotate(rotation_a, frame.normal), frame.time * ways[0][2]);
             round.gap = frame.gap;
             // When it is as far away as it is when it touches, it still has to be past the same end, and above the face.
-            let part = arrival(dot(frame.normal, way) * distance, dot(way, way), [distance, reach]);
+            let toward = dot(frame.normal, way) * distance;
+            let [part, comes] = arrival(toward, dot(way, way), [distance, reach]);
+            let part = comes.select_positive(part, zero);
             let (up, aside) = (dot(n, way), dot(t, way));
             let outside = past * part.mul_add(aside, past);
             let stays = part.mul_add(up, height).min(outside);
@@ -156,17 +158,6 @@ pub struct Round<L> {
     pub reach: L,
     /// Positive where that point of the core is a corner, and the frame that of the beginning of the step.
     pub flies: L,
-}
-
-/// When two centres that are `distance` apart are `reach` apart, as a part of their way: `toward` is the product of the vector
-/// between them and the way, `squared` that of the way with itself. Zero if they come no closer.
-#[inline(always)]
-fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> L {
-    let product = (distance - reach) * (distance + reach);
-    let root = toward.mul_add(toward, -(squared * product));
-    let both = root.max(L::zero()).sqrt() - toward;
-    let comes = root.min(-toward);
-    comes.select_positive(product / comes.select_positive(both, L::splat(1.0)), L::zero())
 }
 
 impl HullCircle<f32> {

@@ -139,7 +139,8 @@ pub struct Variant {
     pub by_levels: bool,
     /// It is told what piles ask of soft contacts, see [`crate::engine::constraints::Passes::pile_modes`].
     pub piles: bool,
-    /// Frames of round contacts turn within a step, see [`crate::engine::narrowphase::frames`].
+    /// Impacts have their time within a step, and round contacts the frame of theirs; see
+    /// [`crate::engine::narrowphase::frames`].
     pub turning_frames: bool,
     /// What it keeps from step to step beside impulses.
     pub kept: KeptSize,

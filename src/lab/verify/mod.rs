@@ -50,12 +50,10 @@
 //!   side of the next tile (A24.tiles).
 //! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or impacts that run far are not
 //!   rare, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
-//! - **Contacts that wander within a step.** Their points are those of its beginning: what rocks on a round contact is pushed half a step
-//!   late, which is a negative damping of ω² dt/4 (A26); what is carried round goes along tangents.
-//! - **Sudden loads.** The first substep begins with the impulses of the step before (B23), and joints of a pile near its limit of
-//!   friction slip before they have converged (B24).
-//! - **The moment of an impact.** Between free bodies that are no discs it is the beginning of the step, with restitution; rough impacts that run
-//!   through small bodies may diverge (A27.energy).
+//! - **What is carried round.** Within a step bodies move along tangents and contacts keep their normals: what a turning frame carries
+//!   creeps outwards (A26.turntable). What rolls on a round contact does so without lag under `shim` alone.
+//! - **Sudden loads.** The first substep begins with the impulses of the step before, of a load that has gone or wandered on (B23).
+//! - **The moment of an impact.** Between free bodies that are no discs it is the beginning of the step, with restitution.
 //! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
