@@ -46,6 +46,7 @@
 
 use super::equilibrium::Equilibrium;
 use super::graph::{Graph, UNSUPPORTED};
+use super::preload::{GIVING, LEFT};
 use super::statics::{self, Support};
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::{Contact, ManifoldPoint};
@@ -86,6 +87,8 @@ struct Part {
     buckling: f64,
     /// The same of what makes preload rock them (1).
     rocking: f64,
+    /// Bodies of it were placed in each other.
+    is_placed: bool,
     /// Its joint to the level below.
     joint: Joint,
 }
@@ -425,13 +428,36 @@ impl Piles {
 
     /// Balances the loads of bodies that begin; see `equilibrium.rs`.
     fn balance(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
-        let begins =
-            |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !self.is_loaded[body as usize];
+        let is_loaded = &self.is_loaded;
+        let begins = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !is_loaded[body as usize];
         let rests = |contact: &Contact, p: usize| rests(bodies, contact, &contact.manifold.points[p], still);
         self.equilibrium.balance(bodies, contacts, gravity, h, begins, rests);
-        for (weight, contact) in self.weights.iter_mut().zip(contacts) {
+        for (weight, contact) in self.weights.iter_mut().zip(contacts.iter_mut()) {
             if begins(contact.body_a) || begins(contact.body_b) {
                 *weight = contact.manifold.points().iter().map(|p| p.normal_impulse / h).sum();
+                contact.wait = -GIVING;
+            }
+        }
+        self.spare_placed(bodies, contacts);
+    }
+
+    /// Where bodies were placed in each other, no contact of the pile begins with all of its sag.
+    fn spare_placed(&mut self, bodies: &Bodies, contacts: &mut [Contact]) {
+        let ends = |contact: &Contact| {
+            [contact.body_a, contact.body_b].into_iter().filter(|&b| bodies.kind[b as usize] == BodyKind::Dynamic)
+        };
+        for contact in contacts.iter().filter(|contact| contact.preload < -LEFT) {
+            for body in ends(contact) {
+                let root = self.root(body) as usize;
+                self.parts[root].is_placed = true;
+            }
+        }
+        for contact in contacts.iter_mut().filter(|contact| contact.wait < 0.0) {
+            if ends(contact).any(|body| {
+                let root = self.root(body) as usize;
+                self.parts[root].is_placed
+            }) {
+                contact.wait = 0.0;
             }
         }
     }

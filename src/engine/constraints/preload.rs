@@ -127,7 +127,10 @@ const HELD: f32 = 0.5;
 const QUICKER: f32 = 4.0;
 
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
-const LEFT: f32 = 2e-5;
+pub(super) const LEFT: f32 = 2e-5;
+
+/// Time in which 20 µm of overlap come back where preload began with all of the sag (s).
+pub(super) const GIVING: f32 = 1.0;
 
 /// τ: time in which overlap goes that a contact was placed with (s). Longer, the card house falls at 30 steps a
 /// second; shorter, it is thrown over at 240.
@@ -207,7 +210,7 @@ fn preload_segment<L: Lanes>(
         };
         let second = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
-        let [other, mut last, wait, mut tilt] =
+        let [other, mut last, mut wait, mut tilt] =
             L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, index);
         if !weights.is_empty() {
             let mut weight = zero;
@@ -215,7 +218,8 @@ fn preload_segment<L: Lanes>(
             filled.iter().zip(lanes).for_each(|(&contact, lane)| *lane = weights[contact as usize]);
             let borne = h * weight;
             let is_borne = L::splat(ROUNDED).mul_add(borne, impulse) - borne;
-            let at_rest = goal(borne) + last.min(zero);
+            let begins_with = (-wait).select_positive(sag(borne, mass), goal(borne));
+            let at_rest = begins_with + last.min(zero);
             if layout.points == 2 {
                 let of = |p: usize| {
                     sag(record[layout.at(p, layout.normal_impulse)], record[layout.at(p, layout.normal_mass)])
@@ -225,16 +229,21 @@ fn preload_segment<L: Lanes>(
             }
             let is_borne = weight.select_positive(is_borne, zero);
             last = is_borne.select_positive(last.max(at_rest), last);
+            wait = is_borne.select_positive(wait, wait.max(zero));
         }
         last = last.max(lowest);
         let (placed, borne) = (last.min(zero), last.max(zero));
         let placed = kept.mul_add(placed, L::splat(LEFT)).min(zero);
         let most = goal(impulse);
-        let kept_at_most = L::splat(1.0 + STEADY) * most;
-        let falls = second.select_positive(borne - kept_at_most, zero);
-        let wait = falls.select_positive(L::splat(WAIT), (wait - L::splat(dt)).max(zero));
+        let gives = -wait;
+        let given = gives.select_positive((borne - L::splat(LEFT * dt / GIVING)).min(sag(impulse, mass)), zero);
+        let kept_at_most = (L::splat(1.0 + STEADY) * most).max(given);
+        let falls = gives.select_positive(zero, second.select_positive(borne - kept_at_most, zero));
+        let less = gives.select_positive((wait + L::splat(dt)).min(zero), (wait - L::splat(dt)).max(zero));
+        let wait = falls.select_positive(L::splat(WAIT), less);
         let held = second.select_positive(most, L::splat(HELD) * most);
-        let rate = second.select_positive(wait.select_positive(zero, rate), quick);
+        let raised = gives.select_positive(zero, rate);
+        let rate = second.select_positive(wait.select_positive(zero, raised), quick);
         let borne = rate.mul_add((held - borne).max(zero), borne);
         let preload = (borne + placed).min(kept_at_most);
         let (placed, borne) = (preload.min(zero), preload.max(zero));
