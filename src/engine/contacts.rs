@@ -64,7 +64,8 @@ pub struct Contact {
     /// By how much the contact's springs are shortened (m), for solvers that do. Zero when it comes, but for the overlap
     /// that a body is put into the world with: negative.
     pub preload: f32,
-    /// Time for which `preload` is not raised (s), for solvers that have one.
+    /// Time for which `preload` is not raised (s), for solvers that have one; negative while it gives back what it had
+    /// more than it keeps.
     pub wait: f32,
     /// What turns its frame. Of a round shape the time from the beginning of the step to that of the frame (s), see
     /// [`crate::engine::narrowphase::frames`]; of two points what the preload of the second is more than `preload` (m).
