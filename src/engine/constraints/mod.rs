@@ -14,6 +14,7 @@ pub mod batches;
 pub mod block;
 mod body_lanes;
 pub mod bounces;
+mod carried;
 pub mod cone;
 pub mod coulomb_lcp;
 pub mod descent;

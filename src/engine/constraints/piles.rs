@@ -444,7 +444,9 @@ impl Piles {
     /// Where bodies were placed in each other, no contact of the pile begins with all of its sag.
     fn spare_placed(&mut self, bodies: &Bodies, contacts: &mut [Contact]) {
         let ends = |contact: &Contact| {
-            [contact.body_a, contact.body_b].into_iter().filter(|&b| bodies.kind[b as usize] == BodyKind::Dynamic)
+            [contact.body_a, contact.body_b]
+                .into_iter()
+                .filter(|&b| bodies.kind[b as usize] == BodyKind::Dynamic)
         };
         for contact in contacts.iter().filter(|contact| contact.preload < -LEFT) {
             for body in ends(contact) {

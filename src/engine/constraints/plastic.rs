@@ -34,13 +34,17 @@
 //! solver, and no body is displaced: one might be into a third that nobody has looked at.
 
 use super::batches::Batches;
+use super::carried::{Bearing, Carried, Pile};
 use super::features::{Features, Layout};
 use super::impact::{AHEAD, TURNED, rough_impulses};
 use super::segment::Segment;
+use super::statics::Support;
 use super::sweep::turn;
 use super::touch::{Frame, Round, couplings, write_arms};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes, held};
+use crate::engine::params::LINEAR_SLOP;
+use glam::DVec2;
 use std::collections::VecDeque;
 
 /// No lane, no point.
@@ -58,6 +62,12 @@ const MOST_SPENT: usize = 1 << 18;
 /// How often of these a point is: heavy on light needs some thousands, a pair between whose edges friction runs to and
 /// fro without an end has enough then.
 const PER_POINT: usize = 8192;
+
+/// Visits of each point after which what is left is sent down the pile, and again after twice as many (1).
+const PATIENCE: usize = 16;
+
+/// Least −n·d of a normal that bears against momentum in the direction d.
+const BEARS: f64 = 0.5;
 
 /// Contacts of a step that earn one visit (1).
 const EARNING: usize = 8;
@@ -78,6 +88,12 @@ pub struct PlasticImpacts {
     points: Vec<Point>,
     /// Bodies that were pushed since their points were looked at.
     queue: VecDeque<u32>,
+    /// What carries the momentum of an impact, the rows of its bodies, and the points of its bearings.
+    pile: Pile,
+    carried_rows: Vec<u32>,
+    bearing: Vec<u32>,
+    /// Where a row is in these. `[rows]`
+    carried: Vec<u32>,
     /// How often a point was solved in this step.
     solved: usize,
     /// How often points were solved in the last steps beyond what any step may, less what has been earned since.
@@ -92,15 +108,23 @@ struct Body {
     /// When it was last pushed (s); −∞ for never.
     time: f32,
     is_queued: bool,
-    /// Its velocity before anything pushed it (m/s).
-    flown: [f32; 2],
+    /// `time` when only what arrives had been solved (s).
+    begun: f32,
+    /// Its velocity before anything pushed it (m/s, m/s, rad/s).
+    flown: [f32; 3],
     /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
     rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-const STILL: Body =
-    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 2], rounded: [0.0; 3] };
+const STILL: Body = Body {
+    first: NONE,
+    time: f32::NEG_INFINITY,
+    is_queued: false,
+    flown: [0.0; 3],
+    begun: f32::NEG_INFINITY,
+    rounded: [0.0; 3],
+};
 
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -280,6 +304,26 @@ impl Point {
         }
     }
 
+    /// What bears body b, or body a, against `direction`: the other one, its arm (m), and the support.
+    fn supports(&self, is_b: bool, direction: DVec2, rows: &[BodyRow]) -> Option<(u32, DVec2, Support)> {
+        let [nx, ny] = self.normal.map(f64::from);
+        let n = DVec2::new(nx, ny);
+        let normal = if is_b { n } else { -n };
+        let touches = || self.impulse[0] > 0.0 || self.gap(rows) <= LINEAR_SLOP;
+        if self.mass <= 0.0 || normal.dot(direction) > -BEARS || !touches() {
+            return None;
+        }
+        // With t = (n_y, −n_x), r = (r × n) t − (r × t) n.
+        let arm = |k: usize| {
+            let [with_n, with_t] = self.arms[k].map(f64::from);
+            with_n * DVec2::new(ny, -nx) - with_t * n
+        };
+        let (above, below) = if is_b { (1, 0) } else { (0, 1) };
+        let (contact, point, friction) = (self.contact, self.index as usize, f64::from(self.friction));
+        let support = Support { contact, point, normal, arm: arm(above), friction, load: [0.0; 2] };
+        Some((self.rows[below], arm(below), support))
+    }
+
     /// Has the frame of the moment of touch from now on.
     fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
@@ -315,8 +359,8 @@ impl Point {
 impl PlasticImpacts {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.next, &self.listed];
-        let queue = self.queue.capacity() * size_of::<u32>();
+        let lists = [&self.next, &self.listed, &self.carried, &self.carried_rows, &self.bearing];
+        let queue = self.queue.capacity() * size_of::<u32>() + self.pile.held_bytes();
         let found = held(&self.found[0]) + held(&self.found[1]);
         lists.map(held).iter().sum::<usize>() + held(&self.points) + held(&self.bodies) + queue + found
     }
@@ -343,6 +387,8 @@ impl PlasticImpacts {
         for i in 0..arrived {
             self.visit(on, i, slowest);
         }
+        self.bodies.iter_mut().for_each(|body| body.begun = body.time);
+        let mut patience = PATIENCE;
         while let Some(body) = self.queue.pop_front() {
             self.bodies[body as usize].is_queued = false;
             let mut end = self.bodies[body as usize].first;
@@ -352,6 +398,10 @@ impl PlasticImpacts {
                 let first = self.list(on, lane);
                 self.visit(on, first, slowest);
                 self.visit(on, first + 1, slowest);
+            }
+            if self.solved > patience * self.points.len() {
+                patience *= 2;
+                self.carry(on);
             }
             if self.solved > always + left.min(PER_POINT * self.points.len()) {
                 self.put_back(on.rows);
@@ -371,6 +421,92 @@ impl PlasticImpacts {
         }
     }
 
+    /// Sends what momentum pushed bodies have left down to what does not move, if that stops them better; see `carried.rs`.
+    fn carry(&mut self, on: &mut On<'_>) {
+        if !self.find_bearings(on) || !self.pile.stop() {
+            return;
+        }
+        for (&place, carried) in self.carried_rows.iter().zip(&self.pile.bodies) {
+            if carried.time > STILL.time {
+                self.bodies[place as usize].time = carried.time;
+            }
+        }
+        for i in 0..self.bearing.len() {
+            let Bearing { above, support, .. } = self.pile.bearings[i];
+            let load = support.load.map(|load| load as f32);
+            if load == [0.0; 2] {
+                continue;
+            }
+            let point = &mut self.points[self.bearing[i] as usize];
+            point.time = self.bodies[self.carried_rows[above as usize] as usize].time;
+            point.meet(on.rows);
+            point.impulse = [point.impulse[0] + load[0], point.impulse[1] + load[1]];
+            self.push(on, self.bearing[i] as usize, load);
+        }
+        // As if all that pushed them had done so then: momentum that only goes through a body does not displace it.
+        for &place in &self.carried_rows {
+            let (row, body) = (&mut on.rows[place as usize], &self.bodies[place as usize]);
+            for k in 0..3 {
+                row.delta[k] = -body.time * (row.velocity[k] - body.flown[k]);
+            }
+        }
+    }
+
+    /// Lists bodies with momentum and what bears them; false if something that bears moves, but nothing moves it.
+    fn find_bearings(&mut self, on: &On<'_>) -> bool {
+        self.pile.clear();
+        self.bearing.clear();
+        self.carried.clear();
+        self.carried.resize(on.rows.len(), NONE);
+        self.carried_rows.clear();
+        let mut momentum = DVec2::ZERO;
+        for (place, (row, body)) in (0..).zip(on.rows.iter().zip(&self.bodies)) {
+            if body.time > STILL.time {
+                self.carried[place as usize] = self.carried_rows.len() as u32;
+                self.carried_rows.push(place);
+                let [x, y, _, inv_mass] = row.velocity.map(f64::from);
+                momentum += DVec2::new(x, y) / inv_mass;
+            }
+        }
+        let Some(direction) = momentum.try_normalize() else { return false };
+        let mut next = 0;
+        while let Some(&place) = self.carried_rows.get(next) {
+            next += 1;
+            let row = &on.rows[place as usize];
+            let [x, y, turn, inv_mass] = row.velocity.map(f64::from);
+            let inverse = [inv_mass, f64::from(row.delta[3])];
+            let time = self.bodies[place as usize].begun;
+            self.pile.bodies.push(Carried { velocity: [x, y, turn], inverse, time });
+            let mut end = self.bodies[place as usize].first;
+            while end != NONE {
+                // Ends of a are even.
+                let (lane, is_b) = (end / 2, end % 2 == 1);
+                end = self.next[end as usize];
+                let first = self.list(on, lane);
+                for point in first..first + 2 {
+                    let Some((below, arm_below, support)) =
+                        self.points[point].supports(is_b, direction, on.rows)
+                    else {
+                        continue;
+                    };
+                    let moves = !is_b || self.points[point].pushes_a;
+                    if !moves && on.rows[below as usize].velocity[..3] != [0.0; 3] {
+                        return false;
+                    }
+                    let local = &mut self.carried[below as usize];
+                    if moves && *local == NONE {
+                        *local = self.carried_rows.len() as u32;
+                        self.carried_rows.push(below);
+                    }
+                    let below = moves.then_some(*local);
+                    self.bearing.push(point as u32);
+                    self.pile.bearings.push(Bearing { above: next as u32 - 1, below, arm_below, support });
+                }
+            }
+        }
+        true
+    }
+
     /// Bodies stay where they are: nothing has looked yet at what they were displaced into.
     fn put_back(&self, rows: &mut [BodyRow]) {
         for (row, _) in rows.iter_mut().zip(&self.bodies).filter(|(_, body)| body.time > STILL.time) {
@@ -382,8 +518,9 @@ impl PlasticImpacts {
     fn link(&mut self, on: &On<'_>) {
         let (count, lanes) = (on.rows.len(), on.lanes());
         self.bodies.clear();
-        self.bodies
-            .extend(on.rows.iter().map(|row| Body { flown: [row.velocity[0], row.velocity[1]], ..STILL }));
+        self.bodies.extend(
+            on.rows.iter().map(|row| Body { flown: std::array::from_fn(|k| row.velocity[k]), ..STILL }),
+        );
         self.next.resize(2 * lanes, NONE);
         self.listed.clear();
         self.listed.resize(lanes, NONE);
@@ -465,7 +602,14 @@ impl PlasticImpacts {
             return;
         }
         point.impulse = new;
-        point.push(on.rows, &mut self.bodies, delta);
+        self.push(on, place, delta);
+    }
+
+    /// Pushes both bodies of a point with an impulse, and has their points looked at.
+    #[inline(always)]
+    fn push(&mut self, on: &mut On<'_>, place: usize, impulse: [f32; 2]) {
+        let point = &self.points[place];
+        point.push(on.rows, &mut self.bodies, impulse);
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             let body = &mut self.bodies[row as usize];
             if !is_pushed {

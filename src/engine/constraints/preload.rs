@@ -242,7 +242,8 @@ fn preload_segment<L: Lanes>(
         let placed = kept.mul_add(placed, L::splat(LEFT)).min(zero);
         let most = goal(impulse);
         let gives = -wait;
-        let given = gives.select_positive((borne - L::splat(LEFT * dt / GIVING)).min(sag(impulse, mass)), zero);
+        let given =
+            gives.select_positive((borne - L::splat(LEFT * dt / GIVING)).min(sag(impulse, mass)), zero);
         let kept_at_most = (L::splat(1.0 + STEADY) * most).max(given);
         let falls = gives.select_positive(zero, second.select_positive(borne - kept_at_most, zero));
         let less = gives.select_positive((wait + L::splat(dt)).min(zero), (wait - L::splat(dt)).max(zero));
