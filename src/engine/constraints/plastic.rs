@@ -34,9 +34,9 @@
 //! solver, and no body is displaced: one might be into a third that nobody has looked at.
 
 use super::batches::Batches;
-use super::carried::{Bearing, Carried, Pile};
 use super::features::{Features, Layout};
 use super::impact::{AHEAD, TURNED, rough_impulses};
+use super::impact_statics::{Bearing, Carried, Pile};
 use super::segment::Segment;
 use super::statics::Support;
 use super::sweep::turn;
@@ -64,10 +64,13 @@ const MOST_SPENT: usize = 1 << 18;
 const PER_POINT: usize = 8192;
 
 /// Visits of each point after which what is left is sent down the pile, and again after twice as many (1).
-const PATIENCE: usize = 16;
+const PATIENCE: usize = 64;
 
 /// Least −n·d of a normal that bears against momentum in the direction d.
 const BEARS: f64 = 0.5;
+
+/// Greatest gap of a contact that hands momentum on at once (m).
+const CLOSED: f32 = 0.02 * LINEAR_SLOP;
 
 /// Contacts of a step that earn one visit (1).
 const EARNING: usize = 8;
@@ -94,6 +97,8 @@ pub struct PlasticImpacts {
     bearing: Vec<u32>,
     /// Where a row is in these. `[rows]`
     carried: Vec<u32>,
+    /// Points that arrive, the first ones.
+    arrived: usize,
     /// How often a point was solved in this step.
     solved: usize,
     /// How often points were solved in the last steps beyond what any step may, less what has been earned since.
@@ -305,11 +310,11 @@ impl Point {
     }
 
     /// What bears body b, or body a, against `direction`: the other one, its arm (m), and the support.
-    fn supports(&self, is_b: bool, direction: DVec2, rows: &[BodyRow]) -> Option<(u32, DVec2, Support)> {
+    fn supports(&self, is_b: bool, direction: DVec2, has_arrived: bool) -> Option<(u32, DVec2, Support)> {
         let [nx, ny] = self.normal.map(f64::from);
         let n = DVec2::new(nx, ny);
         let normal = if is_b { n } else { -n };
-        let touches = || self.impulse[0] > 0.0 || self.gap(rows) <= LINEAR_SLOP;
+        let touches = || self.separation <= CLOSED || has_arrived && self.impulse[0] > 0.0;
         if self.mass <= 0.0 || normal.dot(direction) > -BEARS || !touches() {
             return None;
         }
@@ -379,6 +384,7 @@ impl PlasticImpacts {
             }
         }
         let arrived = self.points.len();
+        self.arrived = arrived;
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
         let slowest = TOLERANCE * fastest;
         let always = SOLVES[0] + SOLVES[1] / arrived.max(1);
@@ -421,7 +427,7 @@ impl PlasticImpacts {
         }
     }
 
-    /// Sends what momentum pushed bodies have left down to what does not move, if that stops them better; see `carried.rs`.
+    /// Sends what momentum pushed bodies have left down to what does not move, if that stops them better; see `impact_statics.rs`.
     fn carry(&mut self, on: &mut On<'_>) {
         if !self.find_bearings(on) || !self.pile.stop() {
             return;
@@ -485,7 +491,7 @@ impl PlasticImpacts {
                 let first = self.list(on, lane);
                 for point in first..first + 2 {
                     let Some((below, arm_below, support)) =
-                        self.points[point].supports(is_b, direction, on.rows)
+                        self.points[point].supports(is_b, direction, point < self.arrived)
                     else {
                         continue;
                     };

@@ -34,6 +34,14 @@ pub(super) static CASES: &[Case] = &[
         dropped,
         Yes("what comes in at twice a dt is stopped before the step, and moves no body apart"),
     ),
+    Case::new(
+        "B23.heavy",
+        "greatest upward speed of a box of 300 times the mass that falls from 2 m on ten boxes, and on a pyramid of 55",
+        "m/s",
+        "g dt: the rounding of time to steps",
+        heavy,
+        Yes("momentum goes down a pile as loads do"),
+    ),
 ];
 
 /// B23. Two smooth plates under a column of ten boxes go apart and leave both its corners at the same time, 1.99 s after the
@@ -58,6 +66,32 @@ fn release(lab: &Lab) -> Result<Finding, Failure> {
         return Err(Failure::Unmeasured("the column does not fall".into()));
     }
     Ok(Finding::new(slowest - fastest, 0.0, 0.05))
+}
+
+/// B23. Without restitution it stays where it falls, on what stays standing.
+fn heavy(lab: &Lab) -> Result<Finding, Failure> {
+    let boxed = |x: f64, y: f64| SceneBody::dynamic([x, y], SceneShape::rectangle(0.5, 0.5));
+    let (mut fastest, mut dt) = (0.0, 0.0);
+    for base in [1, 10] {
+        let mut bodies = vec![ground(20.0, 0.6)];
+        for row in 0..10 {
+            let count = if base == 1 { 1 } else { base - row };
+            bodies.extend(
+                (0..count).map(|i| boxed(f64::from(i) - 0.5 * f64::from(count - 1), f64::from(row) + 0.5)),
+            );
+        }
+        let top = bodies.len();
+        bodies.push(SceneBody::dynamic([0.0, 12.5], SceneShape::rectangle(0.5, 0.5).density(300.0)));
+        let world = lab.run(Scene::new("heavy", bodies), 3.0, |world| {
+            fastest = largest([velocity(world, top)[1], fastest]);
+        })?;
+        let height = world.bodies.center(top)[1];
+        if (height - 10.5).abs() > 0.1 {
+            return Err(Failure::Unmeasured(format!("the heavy box is at {height:.3} m")));
+        }
+        dt = f64::from(world.settings.dt);
+    }
+    Ok(Finding::new(fastest, 0.0, G * dt))
 }
 
 /// B23. Boxes side by side are a flat floor: a disc that rolls keeps its speed, whatever it weighs.

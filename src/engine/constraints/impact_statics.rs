@@ -56,7 +56,12 @@ pub(super) struct Pile {
 impl Carried {
     fn energy(&self) -> f64 {
         let [x, y, turn] = self.velocity;
-        0.5 * ((x * x + y * y) / self.inverse[0] + turn * turn / self.inverse[1])
+        0.5 * ((x * x + y * y) / self.inverse[0] + self.spin() * turn)
+    }
+
+    /// Angular momentum about its centre (N·m·s); of what cannot turn none.
+    fn spin(&self) -> f64 {
+        if self.inverse[1] > 0.0 { self.velocity[2] / self.inverse[1] } else { 0.0 }
     }
 
     fn push(&mut self, impulse: DVec2, arm: DVec2) {
@@ -105,12 +110,13 @@ impl Pile {
     }
 
     fn stop_body(&mut self, body: u32, range: std::ops::Range<usize>) {
-        let Carried { velocity: [x, y, turn], inverse: [inv_mass, inv_inertia], time } =
-            self.bodies[body as usize];
+        let carried = &self.bodies[body as usize];
+        let (Carried { velocity: [x, y, _], inverse: [inv_mass, inv_inertia], time }, spin) =
+            (*carried, carried.spin());
         self.supports.clear();
         self.supports.extend(self.bearings[range.clone()].iter().map(|bearing| bearing.support));
         let gyration = (inv_mass / inv_inertia).sqrt();
-        statics::load(&mut self.supports, DVec2::new(x, y) / inv_mass, turn / inv_inertia, gyration);
+        statics::load(&mut self.supports, DVec2::new(x, y) / inv_mass, spin, gyration);
         for (bearing, support) in self.bearings[range].iter_mut().zip(&self.supports) {
             bearing.support = *support;
             self.bodies[body as usize].push(support.force(), support.arm);
