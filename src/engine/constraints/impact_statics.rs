@@ -78,8 +78,9 @@ impl Pile {
         self.bearings.clear();
     }
 
-    /// Finds the impulses of its supports. False if some body has none, or if they leave more energy than there was.
-    pub fn stop(&mut self) -> bool {
+    /// Finds the impulses of its supports, and the part of the kinetic energy that they leave; none if some body has no
+    /// support.
+    pub fn stop(&mut self) -> Option<f64> {
         self.link();
         let energy = |bodies: &[Carried]| bodies.iter().map(Carried::energy).sum::<f64>();
         let before = energy(&self.bodies);
@@ -88,11 +89,11 @@ impl Pile {
             next += 1;
             let ([first, end], _) = self.links[body as usize];
             if first == end {
-                return false;
+                return None;
             }
             self.stop_body(body, first as usize..end as usize);
         }
-        next == self.bodies.len() && energy(&self.bodies) < before
+        (next == self.bodies.len()).then(|| energy(&self.bodies) / before)
     }
 
     fn link(&mut self) {
@@ -175,7 +176,7 @@ mod tests {
     #[test]
     fn a_column_on_the_ground_stops() {
         let mut pile = column(&[300.0, 1.0, 2.0, 1.0], true);
-        assert!(pile.stop());
+        assert!(pile.stop().unwrap() < 1e-4);
         for Carried { velocity, .. } in &pile.bodies {
             assert!(velocity.iter().all(|v| v.abs() < 1e-3), "{velocity:?}");
         }
@@ -186,6 +187,6 @@ mod tests {
 
     #[test]
     fn one_in_the_air_is_left_alone() {
-        assert!(!column(&[300.0, 1.0, 2.0, 1.0], false).stop());
+        assert!(column(&[300.0, 1.0, 2.0, 1.0], false).stop().is_none());
     }
 }

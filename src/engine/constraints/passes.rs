@@ -703,7 +703,7 @@ impl<'a> Passes<'a> {
             let count: usize = found.iter().map(Vec::len).sum();
             self.work.plastic.found = found;
             if (1..=arrivals::MOST).contains(&count) {
-                let Workspace { rows, lanes, serial, plastic, .. } = &mut *self.work;
+                let Workspace { rows, lanes, serial, plastic, motion, weights, .. } = &mut *self.work;
                 let (features, record_impulses) = (&self.input.features, self.input.record_impulses);
                 let batches = [lanes, serial];
                 plastic.spread(&mut plastic::On {
@@ -711,7 +711,10 @@ impl<'a> Passes<'a> {
                     batches,
                     contacts: self.contacts,
                     features,
+                    increments: motion.velocity_increments(),
+                    weights,
                     dt,
+                    h,
                     record_impulses,
                 });
                 self.work.motion.hide_turns(&mut self.work.rows);

@@ -72,6 +72,9 @@ const BEARS: f64 = 0.5;
 /// Greatest gap of a contact that hands momentum on at once (m).
 const CLOSED: f32 = 0.02 * LINEAR_SLOP;
 
+/// Most energy that loads of a pile may leave of what forces make in a substep, if it rests on them (1).
+const AT_REST: f64 = 1e-3;
+
 /// Contacts of a step that earn one visit (1).
 const EARNING: usize = 8;
 
@@ -171,8 +174,13 @@ pub(super) struct On<'a> {
     pub batches: [&'a mut Batches; 2],
     pub contacts: &'a mut [Contact],
     pub features: &'a Features,
-    /// Step (s).
+    /// What forces add to the velocities of rows in a substep (m/s).
+    pub increments: &'a [[f32; 4]],
+    /// See [`super::pass::PassInput::weights`].
+    pub weights: &'a mut Vec<f32>,
+    /// Step and substep (s).
     pub dt: f32,
+    pub h: f32,
     pub record_impulses: bool,
 }
 
@@ -419,6 +427,7 @@ impl PlasticImpacts {
             on.put(point);
         }
         self.spent += self.solved.saturating_sub(always);
+        self.rest(on);
         if on.record_impulses {
             for point in &self.points {
                 let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
@@ -429,7 +438,8 @@ impl PlasticImpacts {
 
     /// Sends what momentum pushed bodies have left down to what does not move, if that stops them better; see `impact_statics.rs`.
     fn carry(&mut self, on: &mut On<'_>) {
-        if !self.find_bearings(on) || !self.pile.stop() {
+        let found = self.find_bearings(on, |place| on.rows[place].velocity);
+        if !found || self.pile.stop().is_none_or(|left| left >= 1.0) {
             return;
         }
         for (&place, carried) in self.carried_rows.iter().zip(&self.pile.bodies) {
@@ -459,7 +469,7 @@ impl PlasticImpacts {
     }
 
     /// Lists bodies with momentum and what bears them; false if something that bears moves, but nothing moves it.
-    fn find_bearings(&mut self, on: &On<'_>) -> bool {
+    fn find_bearings(&mut self, on: &On<'_>, velocity: impl Fn(usize) -> [f32; 4]) -> bool {
         self.pile.clear();
         self.bearing.clear();
         self.carried.clear();
@@ -470,8 +480,8 @@ impl PlasticImpacts {
             if body.time > STILL.time {
                 self.carried[place as usize] = self.carried_rows.len() as u32;
                 self.carried_rows.push(place);
-                let [x, y, _, inv_mass] = row.velocity.map(f64::from);
-                momentum += DVec2::new(x, y) / inv_mass;
+                let [x, y, ..] = velocity(place as usize).map(f64::from);
+                momentum += DVec2::new(x, y) / f64::from(row.velocity[3]);
             }
         }
         let Some(direction) = momentum.try_normalize() else { return false };
@@ -479,8 +489,8 @@ impl PlasticImpacts {
         while let Some(&place) = self.carried_rows.get(next) {
             next += 1;
             let row = &on.rows[place as usize];
-            let [x, y, turn, inv_mass] = row.velocity.map(f64::from);
-            let inverse = [inv_mass, f64::from(row.delta[3])];
+            let [x, y, turn, _] = velocity(place as usize).map(f64::from);
+            let inverse = [row.velocity[3], row.delta[3]].map(f64::from);
             let time = self.bodies[place as usize].begun;
             self.pile.bodies.push(Carried { velocity: [x, y, turn], inverse, time });
             let mut end = self.bodies[place as usize].first;
@@ -511,6 +521,53 @@ impl PlasticImpacts {
             }
         }
         true
+    }
+
+    /// What has been stopped rests from now on: contacts that will bear more than twice what they bore begin with it.
+    fn rest(&mut self, on: &mut On<'_>) {
+        let found = self.find_bearings(on, |place| {
+            let [x, y, ..] = on.increments[place];
+            [x, y, 0.0, 0.0]
+        });
+        let still = |&place: &u32| {
+            let ([x, y, ..], [gx, gy, ..]) =
+                (on.rows[place as usize].velocity, on.increments[place as usize]);
+            x.hypot(y) * on.h <= gx.hypot(gy) * on.dt
+        };
+        if !found
+            || !self.carried_rows.iter().all(still)
+            || self.pile.stop().is_none_or(|left| left > AT_REST)
+        {
+            return;
+        }
+        let mut i = 0;
+        while i < self.bearing.len() {
+            let lane = self.points[self.bearing[i] as usize].lane;
+            let end = (i..self.bearing.len())
+                .find(|&k| self.points[self.bearing[k] as usize].lane != lane)
+                .unwrap_or(self.bearing.len());
+            let Place { part, width, first, layout, .. } = on.place(lane);
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(on.batches[part].records_mut());
+            let load: f64 = self.pile.bearings[i..end].iter().map(|bearing| bearing.support.load[0]).sum();
+            let at = |p: usize, quantity: usize| first + layout.at(p, quantity) * width;
+            let borne: f32 = (0..layout.points).map(|p| floats[at(p, layout.normal_impulse)]).sum();
+            if load > 2.0 * f64::from(borne) {
+                for k in i..end {
+                    let (p, load) =
+                        (self.points[self.bearing[k] as usize].index, self.pile.bearings[k].support.load);
+                    floats[at(p as usize, layout.normal_impulse)] = load[0] as f32;
+                    if layout.has_friction {
+                        floats[at(p as usize, layout.tangent_impulse)] = load[1] as f32;
+                    }
+                }
+                let contact = self.points[self.bearing[i] as usize].contact as usize;
+                if on.weights.is_empty() {
+                    on.weights.resize(on.contacts.len(), 0.0);
+                }
+                on.weights[contact] = load as f32 / on.h;
+            }
+            i = end;
+        }
     }
 
     /// Bodies stay where they are: nothing has looked yet at what they were displaced into.
