@@ -715,6 +715,7 @@ impl<'a> Passes<'a> {
                     weights,
                     dt,
                     h,
+                    slowest,
                     record_impulses,
                 });
                 self.work.motion.hide_turns(&mut self.work.rows);

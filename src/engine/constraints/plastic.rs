@@ -181,6 +181,8 @@ pub(super) struct On<'a> {
     /// Step and substep (s).
     pub dt: f32,
     pub h: f32,
+    /// Slower is rest (m/s).
+    pub slowest: f32,
     pub record_impulses: bool,
 }
 
@@ -394,7 +396,7 @@ impl PlasticImpacts {
         let arrived = self.points.len();
         self.arrived = arrived;
         let fastest = self.points.iter().map(|p| -p.velocity(on.rows)[0]).fold(0.0, f32::max);
-        let slowest = TOLERANCE * fastest;
+        let mut slowest = TOLERANCE * fastest;
         let always = SOLVES[0] + SOLVES[1] / arrived.max(1);
         let left = MOST_SPENT.saturating_sub(self.spent);
         self.solved = 0;
@@ -402,7 +404,7 @@ impl PlasticImpacts {
             self.visit(on, i, slowest);
         }
         self.bodies.iter_mut().for_each(|body| body.begun = body.time);
-        let mut patience = PATIENCE;
+        let (mut patience, mut is_carried) = (PATIENCE, false);
         while let Some(body) = self.queue.pop_front() {
             self.bodies[body as usize].is_queued = false;
             let mut end = self.bodies[body as usize].first;
@@ -413,14 +415,20 @@ impl PlasticImpacts {
                 self.visit(on, first, slowest);
                 self.visit(on, first + 1, slowest);
             }
-            if self.solved > patience * self.points.len() {
+            if !is_carried && self.solved > patience * self.points.len() {
                 patience *= 2;
-                self.carry(on);
+                is_carried = self.carry(on);
+                if is_carried {
+                    slowest = slowest.max(on.slowest);
+                }
             }
             if self.solved > always + left.min(PER_POINT * self.points.len()) {
                 self.put_back(on.rows);
                 break;
             }
+        }
+        if is_carried {
+            self.displace(on.rows);
         }
         self.queue.clear();
         for point in self.points.iter().filter(|point| point.impulse[0] > 0.0) {
@@ -437,15 +445,17 @@ impl PlasticImpacts {
     }
 
     /// Sends what momentum pushed bodies have left down to what does not move, if that stops them better; see `impact_statics.rs`.
-    fn carry(&mut self, on: &mut On<'_>) {
+    fn carry(&mut self, on: &mut On<'_>) -> bool {
         let found = self.find_bearings(on, |place| on.rows[place].velocity);
         if !found || self.pile.stop().is_none_or(|left| left >= 1.0) {
-            return;
+            return false;
         }
         for (&place, carried) in self.carried_rows.iter().zip(&self.pile.bodies) {
+            let body = &mut self.bodies[place as usize];
             if carried.time > STILL.time {
-                self.bodies[place as usize].time = carried.time;
+                body.time = carried.time;
             }
+            body.begun = body.time;
         }
         for i in 0..self.bearing.len() {
             let Bearing { above, support, .. } = self.pile.bearings[i];
@@ -459,11 +469,17 @@ impl PlasticImpacts {
             point.impulse = [point.impulse[0] + load[0], point.impulse[1] + load[1]];
             self.push(on, self.bearing[i] as usize, load);
         }
-        // As if all that pushed them had done so then: momentum that only goes through a body does not displace it.
+        self.displace(on.rows);
+        true
+    }
+
+    /// Puts what momentum went through where it would be if all of that had happened at the time at which it began: what only
+    /// goes through a body does not displace it.
+    fn displace(&self, rows: &mut [BodyRow]) {
         for &place in &self.carried_rows {
-            let (row, body) = (&mut on.rows[place as usize], &self.bodies[place as usize]);
+            let (row, body) = (&mut rows[place as usize], &self.bodies[place as usize]);
             for k in 0..3 {
-                row.delta[k] = -body.time * (row.velocity[k] - body.flown[k]);
+                row.delta[k] = -body.begun * (row.velocity[k] - body.flown[k]);
             }
         }
     }
