@@ -435,7 +435,9 @@ impl Piles {
         for (weight, contact) in self.weights.iter_mut().zip(contacts.iter_mut()) {
             if begins(contact.body_a) || begins(contact.body_b) {
                 *weight = contact.manifold.points().iter().map(|p| p.normal_impulse / h).sum();
-                contact.wait = -GIVING;
+                if contact.manifold.count > 1 {
+                    contact.wait = -GIVING;
+                }
             }
         }
         self.spare_placed(bodies, contacts);

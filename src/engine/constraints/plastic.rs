@@ -567,7 +567,7 @@ impl PlasticImpacts {
             let load: f64 = self.pile.bearings[i..end].iter().map(|bearing| bearing.support.load[0]).sum();
             let at = |p: usize, quantity: usize| first + layout.at(p, quantity) * width;
             let borne: f32 = (0..layout.points).map(|p| floats[at(p, layout.normal_impulse)]).sum();
-            if load > 2.0 * f64::from(borne) {
+            if layout.points == 2 && load > 2.0 * f64::from(borne) {
                 for k in i..end {
                     let (p, load) =
                         (self.points[self.bearing[k] as usize].index, self.pile.bearings[k].support.load);
