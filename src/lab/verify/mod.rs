@@ -59,6 +59,7 @@
 
 mod balance;
 mod carried;
+mod changes;
 mod columns;
 mod far;
 mod flight;

@@ -1,8 +1,8 @@
 //! The list of cases.
 
 use super::{
-    Case, balance, carried, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox, ratios,
-    rocking, sliding, stacks, sudden,
+    Case, balance, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox,
+    ratios, rocking, sliding, stacks, sudden,
 };
 use std::sync::LazyLock;
 
@@ -23,6 +23,7 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
         balance::CASES,
         carried::CASES,
+        changes::CASES,
         columns::CASES,
         far::CASES,
         flight::CASES,
