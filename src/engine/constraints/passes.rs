@@ -712,6 +712,7 @@ impl<'a> Passes<'a> {
                     contacts: self.contacts,
                     features,
                     dt,
+                    h,
                     record_impulses,
                 });
                 self.work.motion.hide_turns(&mut self.work.rows);
