@@ -2,7 +2,7 @@
 
 use super::{
     Case, balance, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox,
-    ratios, rocking, sliding, stacks, sudden,
+    ratios, rocking, slender, sliding, stacks, sudden, together,
 };
 use std::sync::LazyLock;
 
@@ -35,9 +35,11 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
         paradox::CASES,
         ratios::CASES,
         rocking::CASES,
+        slender::CASES,
         sliding::CASES,
         stacks::CASES,
         sudden::CASES,
+        together::CASES,
     ];
     let mut cases: Vec<&Case> = groups.into_iter().flatten().collect();
     cases.sort_by_key(|case| family(case.id));
