@@ -95,9 +95,13 @@ impl Equilibrium {
         }
         self.accelerations.clear();
         self.accelerations.extend((0..bodies.len()).map(|i| {
-            let free =
-                if begins(i as u32) { f64::from(bodies.gravity_scale[i]) * gravity } else { DVec2::ZERO };
-            [free.x, free.y, 0.0]
+            if !begins(i as u32) {
+                return [0.0; 3];
+            }
+            let [inv_mass, inv_inertia] = [bodies.inv_mass[i], bodies.inv_inertia[i]].map(f64::from);
+            let pushed = [bodies.force_x[i], bodies.force_y[i], bodies.torque[i]].map(f64::from);
+            let weight = f64::from(bodies.gravity_scale[i]) * gravity;
+            [weight.x + inv_mass * pushed[0], weight.y + inv_mass * pushed[1], inv_inertia * pushed[2]]
         }));
         for point in &self.points {
             (0..2).for_each(|axis| point.push(&mut self.accelerations, axis, point.load[axis]));

@@ -7,12 +7,12 @@
 //! # Buckling
 //!
 //! Joint j resists rotation by K_j = ω² Σ m_p (x_p − x̄)², with x the place of a point along it. Were all others
-//! rigid, it would buckle if K_j < g Σ m_i (z_i − z_j), the moment of the weight above for one radian. With all joints
+//! rigid, it would buckle if K_j < Σ w_i (z_i − z_j), the moment of the weights above for one radian. With all joints
 //! soft, Southwell's theorem bounds the critical load from below by the harmonic sum of those of one soft
 //! joint each, so that a column stands if
 //!
 //! ```text
-//! ω² ≥ ω_c² = Σ_j g Σ_i m_i (z_i − z_j) / Σ_p m_p (x_p − x̄)²
+//! ω² ≥ ω_c² = Σ_j Σ_i w_i (z_i − z_j) / Σ_p m_p (x_p − x̄)²
 //! ```
 //!
 //! along each path from the ground to a top. For N equal boxes that has N³/6 in place of Greenhill's N³/7.837
@@ -78,6 +78,8 @@ struct Part {
     mass: f64,
     /// Σ m (x, z), z along the direction (kg·m).
     moment: DVec2,
+    /// Σ w and Σ w z of its weights, with what users push them down with (N, N·m).
+    weight: [f64; 2],
     /// Σ m (x² + z²) + I (kg·m²)
     inertia: f64,
     /// Its bodies, and the least of their masses (kg).
@@ -157,10 +159,10 @@ impl Joint {
         wide && is_over && !self.moves
     }
 
-    /// Moment of the weight above it over the resistance of its springs at 1 rad/s (s⁻²), for gravity g (m/s²).
-    fn buckling(&self, above: &Part, g: f64) -> f64 {
-        let height = above.moment.y - above.mass * self.moment.y / self.mass;
-        g * height / self.resistance()[0]
+    /// Moment of the weight above it for one radian over the resistance of its springs at 1 rad/s (s⁻²).
+    fn buckling(&self, above: &Part) -> f64 {
+        let [weight, moment] = above.weight;
+        (moment - weight * self.moment.y / self.mass).max(0.0) / self.resistance()[0]
     }
 }
 
@@ -171,8 +173,8 @@ struct Search<'w> {
     contacts: &'w [Contact],
     /// The direction, a unit vector.
     up: Vec2,
-    /// Gravity against it (m/s²).
-    g: f64,
+    /// m/s²
+    gravity: DVec2,
     /// Speed (m/s) above which a body moves on what bears it.
     still: f32,
     /// Step (s).
@@ -191,7 +193,9 @@ impl Search<'_> {
         let mass = 1.0 / f64::from(self.bodies.inv_mass[body]);
         let at = self.upright(center(self.bodies, body));
         let inertia = mass * at.length_squared() + 1.0 / f64::from(self.bodies.inv_inertia[body]);
-        Part { mass, moment: mass * at, inertia, bodies: 1, lightest: mass, ..Part::default() }
+        let down = -force(self.bodies, body, self.gravity).dot(self.up.as_dvec2());
+        let weight = [down, down * at.y];
+        Part { mass, moment: mass * at, weight, inertia, bodies: 1, lightest: mass, ..Part::default() }
     }
 
     /// Of a contact along the direction, over ω² (kg).
@@ -244,18 +248,18 @@ impl Piles {
         self.weights.clear();
         self.weights.resize(contacts.len(), 0.0);
         let up = -gravity.try_normalize().unwrap_or(Vec2::NEG_Y);
-        let g = f64::from(gravity.length());
         // What gravity does in a step is still.
-        let still = gravity.length() * dt;
-        let search = Search { bodies, contacts, up, g, still, dt };
+        let (still, gravity) = (gravity.length() * dt, gravity.as_dvec2());
+        let has_weight = gravity != DVec2::ZERO;
+        let search = Search { bodies, contacts, up, gravity, still, dt };
         self.build(&search);
-        let [buckling, rocking] = if g > 0.0 { self.joints(&search) } else { [0.0; 2] };
+        let [buckling, rocking] = if has_weight { self.joints(&search) } else { [0.0; 2] };
         let vertical = self.slowness(&search);
-        if g > 0.0 {
-            self.weigh(bodies, contacts, gravity.as_dvec2(), still, h);
-            self.balance(bodies, contacts, gravity.as_dvec2(), still, h);
+        if has_weight {
+            self.weigh(bodies, contacts, gravity, still, h);
+            self.balance(bodies, contacts, gravity, still, h);
         }
-        let search = Search { bodies, contacts, up: up.perp(), g, still, dt };
+        let search = Search { bodies, contacts, up: up.perp(), gravity, still, dt };
         self.build(&search);
         let horizontal = self.slowness(&search);
         PileModes {
@@ -341,7 +345,7 @@ impl Piles {
             if joint.mass > 0.0 {
                 let gyration = f64::from(search.bodies.inv_mass[body] / search.bodies.inv_inertia[body]);
                 if joint.stands(part, gyration) {
-                    part.buckling += joint.buckling(part, search.g);
+                    part.buckling += joint.buckling(part);
                     part.rocking += joint.rocking(part);
                 }
             }
@@ -398,10 +402,11 @@ impl Piles {
                 }
             }
             let [borne, torque] = self.forces[b];
-            let own = gravity.length() * f64::from(bodies.gravity_scale[b]) / f64::from(bodies.inv_mass[b]);
+            let force = force(bodies, b, gravity) - borne * up;
+            let torque = torque + f64::from(bodies.torque[b]);
             let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
-            let weight = borne + own;
-            statics::load(&mut self.supports, -weight * up, torque, gyration);
+            let weight = (-force.dot(up)).max(0.0);
+            statics::load(&mut self.supports, force, torque, gyration);
             // Weight goes down the pile, no more and no less; pushes to the sides end here.
             let carried = |support: &Support| support.force().dot(up).max(0.0);
             let part = weight / self.supports.iter().map(carried).sum::<f64>();
@@ -514,6 +519,7 @@ impl Piles {
         let part = &mut self.parts[a as usize];
         part.mass += other.mass;
         part.moment += other.moment;
+        part.weight = [0, 1].map(|i| part.weight[i] + other.weight[i]);
         part.inertia += other.inertia;
         part.bodies += other.bodies;
         part.lightest = part.lightest.min(other.lightest);
@@ -572,6 +578,12 @@ fn rests(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint, still: f32) 
 /// A load, now or before.
 fn has_borne(contact: &Contact) -> bool {
     contact.preload > 0.0 || contact.manifold.points().iter().any(|p| p.normal_impulse > 0.0)
+}
+
+/// Weight of a body, and what users push it with (N).
+fn force(bodies: &Bodies, body: usize, gravity: DVec2) -> DVec2 {
+    let pushed = DVec2::new(f64::from(bodies.force_x[body]), f64::from(bodies.force_y[body]));
+    f64::from(bodies.gravity_scale[body]) / f64::from(bodies.inv_mass[body]) * gravity + pushed
 }
 
 /// Centre of mass of a body (m).

@@ -49,6 +49,7 @@ impl World {
     ///
     /// Contacts are updated where they lie, and sorted again only if one came or went.
     pub(super) fn update_contacts(&mut self) {
+        self.scale_loads();
         let narrow = &mut self.narrow;
         if narrow.count != self.contacts.len() {
             // Somebody else changed the list: what candidates remember of it means nothing.

@@ -18,6 +18,7 @@
 //!   be brought back by a reset, so that they remain those of a simulation.
 
 use super::World;
+use super::loads::LoadsOf;
 use super::piles::Found;
 use super::recycle::Recycled;
 use crate::engine::bodies::Bodies;
@@ -51,6 +52,7 @@ struct Saved {
     kept: Kept,
     recycled: Recycled,
     found: Found,
+    loads_of: Option<LoadsOf>,
     is_changed: bool,
     /// Visits that impacts have spent.
     spent: usize,
@@ -89,6 +91,7 @@ impl World {
             kept: self.work.kept.clone(),
             recycled: self.narrow.recycled.clone(),
             found: self.found,
+            loads_of: self.loads_of,
             is_changed: self.narrow.is_changed,
             spent: self.work.plastic.spent,
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
@@ -103,12 +106,13 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, found, is_changed, spent, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, recycled, found, loads_of, is_changed, spent, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.narrow.recycled.clone_from(recycled);
         self.work.plastic.spent = *spent;
+        self.loads_of = *loads_of;
         // The list is another, but no contact has come or gone.
         (self.found, self.narrow.is_changed, self.lanes_are_for) = (*found, *is_changed, None);
     }

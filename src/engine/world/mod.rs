@@ -20,6 +20,7 @@ use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
 use collide::Narrow;
 use glam::Vec2;
+use loads::LoadsOf;
 use piles::Found;
 use traits::Traits;
 
@@ -29,6 +30,7 @@ mod counts;
 mod held;
 mod jams;
 mod lanes;
+mod loads;
 mod memory;
 mod pairs;
 mod piles;
@@ -88,6 +90,8 @@ pub struct World {
     lanes_are_for: Option<([LaneWidth; 2], Order, bool, Features)>,
     piles: Piles,
     found: Found,
+    /// What the impulses of `contacts` belong to; none before there are any.
+    loads_of: Option<LoadsOf>,
     work: Workspace,
 }
 
@@ -117,6 +121,7 @@ impl World {
             lanes_are_for: None,
             piles: Piles::default(),
             found: Found::default(),
+            loads_of: None,
             work: Workspace::default(),
         }
     }

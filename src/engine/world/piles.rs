@@ -1,11 +1,15 @@
 //! What piles ask of soft contacts, found anew from time to time.
 
 use super::World;
+use crate::engine::bodies::Bodies;
 use crate::engine::constraints::piles::PileModes;
 use glam::Vec2;
 
 /// Steps between two searches: columns take a second to buckle, and preload is slow.
 const EVERY: u64 = 32;
+
+/// Part by which gravity may change before piles are searched at once (1).
+const SAME: f32 = 0.1;
 
 /// What was found last.
 #[derive(Clone, Copy, Debug, Default)]
@@ -14,26 +18,33 @@ pub(super) struct Found {
     pub modes: PileModes,
     /// Contacts then.
     contacts: usize,
-    /// Contacts have come or gone since.
+    /// Gravity then (m/s²).
+    gravity: Vec2,
+    /// Σ |F| + |M| of what users push bodies with (N, N·m), and Σ of factors on gravity (1).
+    pushes: [f32; 2],
+    /// Contacts have come or gone since, or loads have changed.
     is_stale: bool,
     /// Contacts have come or gone in this step.
     pub contacts_changed: bool,
 }
 
 impl World {
-    /// Searches the piles if the solver asks for it and contacts have come or gone: every so many steps, and
-    /// when a quarter more contacts are there than the last time.
+    /// Searches the piles if the solver asks for it and contacts have come or gone, or gravity or what users push with has
+    /// changed: every so many steps, and at once if there are a quarter more contacts than the last time or gravity is
+    /// another.
     pub(super) fn find_piles(&mut self) {
         if !self.settings.solver.piles {
             return;
         }
-        let found = &mut self.found;
+        let (found, gravity) = (&mut self.found, Vec2::from(self.settings.gravity));
         self.work.weights.clear();
         found.contacts_changed = self.narrow.is_changed;
-        found.is_stale |= found.contacts_changed;
+        let turn = self.step_index.is_multiple_of(EVERY);
+        let pushes = if turn { pushes(&self.bodies) } else { found.pushes };
+        found.is_stale |= found.contacts_changed || gravity != found.gravity || pushes != found.pushes;
         let grown = 4 * self.contacts.len() > 5 * found.contacts;
-        if found.is_stale && (grown || self.step_index.is_multiple_of(EVERY)) {
-            let gravity = Vec2::from(self.settings.gravity);
+        let other = gravity.distance(found.gravity) > SAME * found.gravity.length();
+        if found.is_stale && (grown || other || turn) {
             let modes = self.piles.modes(
                 &self.bodies,
                 &mut self.contacts,
@@ -41,7 +52,15 @@ impl World {
                 [self.settings.dt, self.settings.h()],
             );
             self.work.weights.extend_from_slice(self.piles.weights());
-            *found = Found { modes, contacts: self.contacts.len(), is_stale: false, ..*found };
+            *found =
+                Found { modes, contacts: self.contacts.len(), gravity, pushes, is_stale: false, ..*found };
         }
     }
+}
+
+/// [`Found::pushes`] of all bodies.
+fn pushes(bodies: &Bodies) -> [f32; 2] {
+    let forces = [&bodies.force_x, &bodies.force_y, &bodies.torque];
+    let size = forces.map(|force| force.iter().map(|f| f.abs()).sum::<f32>());
+    [size.iter().sum(), bodies.gravity_scale.iter().sum()]
 }

@@ -59,6 +59,7 @@
 
 mod balance;
 mod carried;
+mod changes;
 mod columns;
 mod far;
 mod flight;
@@ -72,10 +73,12 @@ mod paradox;
 mod ratios;
 mod rocking;
 mod runner;
+mod slender;
 mod sliding;
 mod stacks;
 mod sudden;
 mod table;
+mod together;
 
 pub use lab::Lab;
 pub use runner::{Cell, Matrix, Progress, run, select};

@@ -26,6 +26,14 @@ pub(super) static CASES: &[Case] = &[
         Yes("what rolls has the frame of the mean time of the substeps, and no torque lags"),
     ),
     Case::new(
+        "A26.block",
+        "energy that a rocking block keeps when it comes down on its other corner, (1 - 3/2 sin²α)²",
+        "1",
+        "1 %, as for A1.slip",
+        block,
+        Yes("impacts run from body to body, and what an impact releases has borne its body until then"),
+    ),
+    Case::new(
         "A26.rollers",
         "period of a plank on two rollers that turn towards each other",
         "s",
@@ -102,6 +110,29 @@ fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
     let at_contact = inertia + (light + heavy) * (radius - e).powi(2);
     let period = TAU * (at_contact / ((light + heavy) * G * e)).sqrt();
     growth(lab, Scene::new("eccentric", vec![ground(50.0, 1.0), disc]), period)
+}
+
+/// A26. Housner's block, 2 b wide and 2 h high with tan α = b/h, turns about one lower corner and then about the other: angular
+/// momentum about the new one leaves it 1 − 3/2 sin²α of its spin. Energy five steps after over that a step before.
+fn block(lab: &Lab) -> Result<Finding, Failure> {
+    let (b, h, start) = (1.0, 4.0, -0.15f64);
+    let ((sin, cos), friction) = (start.sin_cos(), 1e3);
+    let at = [b - cos * b - sin * h, cos * h - sin * b];
+    let shape = SceneShape::rectangle(b, h).friction(friction);
+    let bodies = vec![ground(50.0, friction), SceneBody::dynamic(at, shape).turned(start)];
+    let (mut energies, mut down) = (Vec::new(), None);
+    lab.run(Scene::new("block", bodies), 3.0, |world| {
+        energies.push(kinetic_energy(world) + mass(world) * G * (center(world, 1)[1] - h));
+        if down.is_none() && angle(world, 1) > 0.0 {
+            down = Some(energies.len() - 1);
+        }
+    })?;
+    let pair = down.and_then(|step| Some((*energies.get(step.checked_sub(2)?)?, *energies.get(step + 5)?)));
+    let Some((before, after)) = pair else {
+        return Err(Failure::Unmeasured("the block does not come down".into()));
+    };
+    let truth = (1.0 - 1.5 * b * b / (b * b + h * h)).powi(2);
+    Ok(Finding::new(after / before, truth, 0.01 * truth))
 }
 
 /// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its centre:

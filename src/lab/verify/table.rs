@@ -1,8 +1,8 @@
 //! The list of cases.
 
 use super::{
-    Case, balance, carried, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox, ratios,
-    rocking, sliding, stacks, sudden,
+    Case, balance, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox,
+    ratios, rocking, slender, sliding, stacks, sudden, together,
 };
 use std::sync::LazyLock;
 
@@ -23,6 +23,7 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
         balance::CASES,
         carried::CASES,
+        changes::CASES,
         columns::CASES,
         far::CASES,
         flight::CASES,
@@ -34,9 +35,11 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
         paradox::CASES,
         ratios::CASES,
         rocking::CASES,
+        slender::CASES,
         sliding::CASES,
         stacks::CASES,
         sudden::CASES,
+        together::CASES,
     ];
     let mut cases: Vec<&Case> = groups.into_iter().flatten().collect();
     cases.sort_by_key(|case| family(case.id));

@@ -1,0 +1,138 @@
+//! B25: gravity, pushes and steps that change while a pile rests. Nothing moves: what was in equilibrium still is.
+
+use super::Required::Yes;
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::engine::world::World;
+use crate::lab::scenes::Scene;
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B25.gravity",
+        "greatest movement of twenty boxes in 20 s after gravity has become ten times as strong",
+        "m",
+        "the slop",
+        gravity,
+        Yes("loads change with gravity, and springs are stiffer than those on which the column would buckle"),
+    ),
+    Case::new(
+        "B25.off",
+        "greatest speed of twenty boxes in 5 s after gravity has gone",
+        "m/s",
+        "list, as for B9: 0.05 m/s",
+        off,
+        Yes("loads of gravity go with it"),
+    ),
+    Case::new(
+        "B25.on",
+        "greatest movement of twenty boxes in 10 s after gravity has come",
+        "m",
+        "the slop",
+        on,
+        Yes("what has borne nothing begins with the loads of statics"),
+    ),
+    Case::new(
+        "B25.heavy",
+        "greatest movement in 20 s of twenty boxes, the highest of which feels a hundred times the gravity",
+        "m",
+        "the slop",
+        heavy,
+        Yes("springs are stiffer than those on which the column would buckle under its weights"),
+    ),
+    Case::new(
+        "B25.pushed",
+        "greatest way to the side of twenty boxes in 20 s under 100 times a box's weight, put on the highest at once",
+        "m",
+        "the slop",
+        pushed,
+        Yes("what users push with is a weight, and found within 32 steps"),
+    ),
+    Case::new(
+        "B25.step",
+        "greatest speed of twenty boxes while steps take 1/60, 1/240, 1/30 and 1/60 s, a second each",
+        "m/s",
+        "list, as for B9: 0.05 m/s",
+        step,
+        Yes("impulses and preload follow the length of a step"),
+    ),
+];
+
+/// Twenty unit boxes.
+fn boxes(lab: &Lab) -> Result<Scene, Failure> {
+    lab.scene("stack:20")
+}
+
+/// A world of them after 3 s at rest.
+fn rested(lab: &Lab) -> Result<World, Failure> {
+    lab.run(boxes(lab)?, 3.0, |_| ())
+}
+
+/// Runs `world` for `seconds`: greatest distance of a body from where it was (m), along each axis, and greatest speed (m/s).
+fn watch(world: &mut World, seconds: f64) -> Result<[f64; 3], Failure> {
+    let places: Vec<_> = (0..world.bodies.len()).map(|i| center(world, i)).collect();
+    let mut most = [0.0; 3];
+    for _ in 0..steps(world, seconds) {
+        world.step()?;
+        for (i, from) in places.iter().enumerate() {
+            let (at, [vx, vy]) = (center(world, i), velocity(world, i));
+            let found = [(at[0] - from[0]).abs(), (at[1] - from[1]).abs(), vx.hypot(vy)];
+            most = [0, 1, 2].map(|k| largest([most[k], found[k]]));
+        }
+    }
+    Ok(most)
+}
+
+fn moves(world: &mut World, seconds: f64) -> Result<Finding, Failure> {
+    let [x, y, _] = watch(world, seconds)?;
+    Ok(Finding::new(x.hypot(y), 0.0, SLOP))
+}
+
+fn gravity(lab: &Lab) -> Result<Finding, Failure> {
+    let mut world = rested(lab)?;
+    world.settings.gravity[1] *= 10.0;
+    moves(&mut world, 20.0)
+}
+
+fn off(lab: &Lab) -> Result<Finding, Failure> {
+    let mut world = rested(lab)?;
+    world.settings.gravity = [0.0; 2];
+    let [.., speed] = watch(&mut world, 5.0)?;
+    Ok(Finding::new(speed, 0.0, 0.05))
+}
+
+fn on(lab: &Lab) -> Result<Finding, Failure> {
+    let scene = boxes(lab)?;
+    let gravity = scene.gravity.map(|g| g as f32);
+    let mut world = lab.run(scene.weightless(), 3.0, |_| ())?;
+    world.settings.gravity = gravity;
+    moves(&mut world, 10.0)
+}
+
+fn heavy(lab: &Lab) -> Result<Finding, Failure> {
+    let mut scene = boxes(lab)?;
+    if let Some(highest) = scene.bodies.last_mut() {
+        highest.gravity_scale = 100.0;
+    }
+    let mut world = lab.world(scene)?;
+    moves(&mut world, 20.0)
+}
+
+fn pushed(lab: &Lab) -> Result<Finding, Failure> {
+    let mut world = rested(lab)?;
+    if let Some((highest, mass, _)) = dynamic(&world).last() {
+        world.bodies.force_y[highest] = (-100.0 * G * mass) as f32;
+    }
+    let [x, ..] = watch(&mut world, 20.0)?;
+    Ok(Finding::new(x, 0.0, SLOP))
+}
+
+fn step(lab: &Lab) -> Result<Finding, Failure> {
+    let mut world = rested(lab)?;
+    let usual = world.settings.dt;
+    let mut fastest = 0.0;
+    for factor in [1.0, 0.25, 2.0, 1.0] {
+        world.settings.dt = factor * usual;
+        fastest = largest([fastest, watch(&mut world, 1.0)?[2]]);
+    }
+    Ok(Finding::new(fastest, 0.0, 0.05))
+}

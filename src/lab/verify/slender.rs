@@ -1,0 +1,106 @@
+//! B24: structures on little width, which statics says stand.
+
+use super::Required::Yes;
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "B24.pressed",
+        "movement in 10 s of five boxes side by side that 27 times a box's weight presses to a wall, 25 in truth",
+        "m",
+        "the slop",
+        pressed,
+        Yes("what users push with is a load as others are, and preload takes away the sag of it"),
+    ),
+    Case::new(
+        "B24.needles",
+        "movement in 20 s of ten boxes of 0.1 m × 1 m on each other",
+        "m",
+        "the slop",
+        needles,
+        Yes("springs are stiffer than those on which the column would buckle"),
+    ),
+    Case::new(
+        "B24.tree",
+        "movement in 20 s of five storeys, each a plank on a post with a weight at each end",
+        "m",
+        "the slop",
+        tree,
+        Yes("springs are stiffer than those on which the column would buckle"),
+    ),
+    Case::new(
+        "B24.turned",
+        "movement in 20 s of twenty boxes with everything turned by 45°, gravity as well",
+        "m",
+        "the slop",
+        turned,
+        Yes("nothing knows where down is but from gravity"),
+    ),
+];
+
+/// The greatest distance of a body from where it began (m), in all steps of `seconds`.
+fn movement(lab: &Lab, scene: Scene, push: Option<f64>, seconds: f64) -> Result<Finding, Failure> {
+    let mut world = lab.world(scene)?;
+    if let Some(push) = push {
+        let last = world.bodies.len() - 1;
+        world.bodies.force_x[last] = push as f32;
+    }
+    let places: Vec<_> = (0..world.bodies.len()).map(|i| center(&world, i)).collect();
+    let mut most = 0.0;
+    for _ in 0..steps(&world, seconds) {
+        world.step()?;
+        let of = |(i, from): (usize, &[f64; 2])| {
+            let at = center(&world, i);
+            (at[0] - from[0]).hypot(at[1] - from[1])
+        };
+        most = largest(places.iter().enumerate().map(of).chain([most]));
+    }
+    Ok(Finding::new(most, 0.0, SLOP))
+}
+
+/// B24. A row of n unit boxes on a wall needs friction for n m g, n/µ times the weight of one, and at the wall's joint a moment of
+/// n²/2 m g, which a push through its middle gives up to half of itself: 25 m g for five.
+fn pressed(lab: &Lab) -> Result<Finding, Failure> {
+    let wall = SceneBody::fixed([-0.5, 0.0], SceneShape::rectangle(0.5, 20.0));
+    let mut bodies = vec![wall];
+    bodies.extend(
+        (0..5).map(|i| SceneBody::dynamic([f64::from(i) + 0.5, 0.0], SceneShape::rectangle(0.5, 0.5))),
+    );
+    movement(lab, Scene::new("pressed", bodies), Some(-27.0 * G), 10.0)
+}
+
+fn needles(lab: &Lab) -> Result<Finding, Failure> {
+    let mut bodies = vec![ground(20.0, 0.6)];
+    bodies.extend(
+        (0..10).map(|i| SceneBody::dynamic([0.0, f64::from(i) + 0.5], SceneShape::rectangle(0.05, 0.5))),
+    );
+    movement(lab, Scene::new("needles", bodies), None, 20.0)
+}
+
+fn tree(lab: &Lab) -> Result<Finding, Failure> {
+    let mut bodies = vec![ground(20.0, 0.6)];
+    for storey in 0..5 {
+        let floor = 1.1 * f64::from(storey);
+        bodies.push(SceneBody::dynamic([0.0, floor + 0.5], SceneShape::rectangle(0.2, 0.5)));
+        bodies.push(SceneBody::dynamic([0.0, floor + 1.05], SceneShape::rectangle(2.0, 0.05)));
+        bodies.extend(
+            [-1.75, 1.75].map(|x| {
+                SceneBody::dynamic([x, floor + 1.35], SceneShape::rectangle(0.25, 0.25).density(4.0))
+            }),
+        );
+    }
+    movement(lab, Scene::new("tree", bodies), None, 20.0)
+}
+
+fn turned(lab: &Lab) -> Result<Finding, Failure> {
+    let mut scene = lab.scene("stack:20")?;
+    let (angle, half) = (std::f64::consts::FRAC_PI_4, 0.5f64.sqrt());
+    let turn = |[x, y]: [f64; 2]| [half * (x - y), half * (x + y)];
+    scene.gravity = turn(scene.gravity);
+    for body in &mut scene.bodies {
+        (body.position, body.angle) = (turn(body.position), body.angle + angle);
+    }
+    movement(lab, scene, None, 20.0)
+}
