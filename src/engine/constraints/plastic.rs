@@ -355,8 +355,10 @@ impl Point {
             return None;
         }
         // With t = (n_y, −n_x), r = (r × n) t − (r × t) n.
+        // Nothing turns a smooth disc.
+        let turns = self.friction > 0.0 || !self.is_round;
         let arm = |k: usize| {
-            let [with_n, with_t] = self.arms[k].map(f64::from);
+            let [with_n, with_t] = if turns { self.arms[k].map(f64::from) } else { [0.0; 2] };
             with_n * DVec2::new(ny, -nx) - with_t * n
         };
         let (above, below) = if is_b { (1, 0) } else { (0, 1) };
@@ -489,7 +491,7 @@ impl PlasticImpacts {
                 point.rows.map(|row| self.bodies[row as usize].time).into_iter().fold(STILL.time, f32::max);
             let brings_back = point.k[0] * point.borne[0] * (on.dt / on.h);
             let leaves = point.impulse[0] == 0.0 && point.velocity(on.rows)[0] > brings_back;
-            if point.borne[0] <= 0.0 || time == STILL.time || !leaves {
+            if point.is_round || point.borne[0] <= 0.0 || time == STILL.time || !leaves {
                 continue;
             }
             on.release(&point);
@@ -630,7 +632,8 @@ impl PlasticImpacts {
             let load: f64 = self.pile.bearings[i..end].iter().map(|bearing| bearing.support.load[0]).sum();
             let at = |p: usize, quantity: usize| first + layout.at(p, quantity) * width;
             let borne: f32 = (0..layout.points).map(|p| floats[at(p, layout.normal_impulse)]).sum();
-            if layout.points == 2 && load > 2.0 * f64::from(borne) {
+            let contact = self.points[self.bearing[i] as usize].contact as usize;
+            if on.contacts[contact].manifold.count == 2 && load > 2.0 * f64::from(borne) {
                 for k in i..end {
                     let (p, load) =
                         (self.points[self.bearing[k] as usize].index, self.pile.bearings[k].support.load);
@@ -639,7 +642,6 @@ impl PlasticImpacts {
                         floats[at(p as usize, layout.tangent_impulse)] = load[1] as f32;
                     }
                 }
-                let contact = self.points[self.bearing[i] as usize].contact as usize;
                 if on.weights.is_empty() {
                     on.weights.resize(on.contacts.len(), 0.0);
                 }
