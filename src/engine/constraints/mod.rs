@@ -21,7 +21,6 @@ mod equilibrium;
 pub mod features;
 pub mod graph;
 pub mod impact;
-mod impact_statics;
 pub mod jacobi;
 pub mod kept;
 pub mod lemke;

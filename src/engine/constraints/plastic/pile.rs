@@ -12,7 +12,7 @@
 //! impulses of this kind can leave, so they are taken if they leave less than there was; Gauss–Seidel goes on from
 //! them. Where a body has nothing under it, as in a row on ice, it would only hand momentum from end to end.
 
-use super::statics::{self, Support};
+use crate::engine::constraints::statics::{self, Support};
 use crate::engine::lanes::held;
 use glam::DVec2;
 
@@ -33,6 +33,8 @@ pub(super) struct Bearing {
     /// Which bodies; none below is what does not move.
     pub above: u32,
     pub below: Option<u32>,
+    /// Which point.
+    pub point: u32,
     /// From the centre of the body below (m).
     pub arm_below: DVec2,
     /// Of the body above. Its load is the impulse found (N·s).
@@ -43,6 +45,10 @@ pub(super) struct Bearing {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pile {
     pub bodies: Vec<Carried>,
+    /// Their rows.
+    pub rows: Vec<u32>,
+    /// Where a row is in these. `[rows]`
+    places: Vec<Option<u32>>,
     /// Those of each body next to each other.
     pub bearings: Vec<Bearing>,
     /// Range of each body's own in `bearings`, and how many bear on it from above.
@@ -72,10 +78,21 @@ impl Carried {
 }
 
 impl Pile {
-    /// Forgets its bodies.
-    pub fn clear(&mut self) {
+    /// Begins with no body, of so many rows.
+    pub fn clear(&mut self, rows: usize) {
         self.bodies.clear();
+        self.rows.clear();
         self.bearings.clear();
+        self.places.clear();
+        self.places.resize(rows, None);
+    }
+
+    /// The place of a row in `rows`, from now on if it was not there.
+    pub fn place(&mut self, row: u32) -> u32 {
+        *self.places[row as usize].get_or_insert_with(|| {
+            self.rows.push(row);
+            self.rows.len() as u32 - 1
+        })
     }
 
     /// Finds the impulses of its supports, and the part of the kinetic energy that they leave; none if some body has no
@@ -167,7 +184,13 @@ mod tests {
                     friction: 0.5,
                     load: [0.0; 2],
                 };
-                pile.bearings.push(Bearing { above: body, below, arm_below: DVec2::new(x, 0.5), support });
+                pile.bearings.push(Bearing {
+                    above: body,
+                    below,
+                    point: 0,
+                    arm_below: DVec2::new(x, 0.5),
+                    support,
+                });
             }
         }
         pile
