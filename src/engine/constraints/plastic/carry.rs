@@ -10,13 +10,13 @@
 //! # Rest
 //!
 //! A pile that is at rest after an impact has a new load, for which its springs are not shortened: one of 300 times the mass
-//! sinks into ten boxes by 14 cm, and swings for seconds. So the same way down is taken with what forces add in a
-//! substep in place of momentum. If that leaves nothing, contacts of two points that bear more than twice what they
-//! bore begin the step with these impulses, and have their preload ([`super::super::preload`]). Others follow
-//! motion; so do contacts of one point, which roll under preload that is raised.
+//! sinks into ten boxes by 14 cm, and swings for seconds. So the same way down is taken by what forces add in a substep to the
+//! momentum of bodies that nothing has borne before. If that stops them, contacts of two points begin the step with these
+//! impulses beside their own, and with the preload of both ([`super::super::preload`]). Contacts of one point follow motion:
+//! they roll under preload that is raised.
 
 use super::pile::{Bearing, Carried};
-use super::point::{On, Place, Point, STILL};
+use super::point::{Body, On, Place, Point, STILL};
 use super::{NONE, PlasticImpacts};
 use crate::engine::constraints::statics::Support;
 use crate::engine::lanes::BodyRow;
@@ -58,7 +58,7 @@ impl Point {
 impl PlasticImpacts {
     /// Sends the momentum of pushed bodies down to what does not move, if that takes energy from them.
     pub(super) fn carry(&mut self, on: &mut On<'_>) -> bool {
-        let found = self.find_pile(on, |row| on.rows[row].velocity);
+        let found = self.find_pile(on, |row, _| on.rows[row].velocity);
         if !found || self.pile.stop().is_none_or(|left| left >= 1.0) {
             return false;
         }
@@ -98,22 +98,22 @@ impl PlasticImpacts {
 
     /// Lists what was pushed, and what bears it against the sum of its momentum at these velocities of rows; false if it
     /// has none, or if something bears that moves although nothing can push it.
-    fn find_pile(&mut self, on: &On<'_>, velocity: impl Fn(usize) -> [f32; 4]) -> bool {
+    fn find_pile(&mut self, on: &On<'_>, velocity: impl Fn(usize, &Body) -> [f32; 4]) -> bool {
         self.pile.clear(on.rows.len());
         let mut momentum = DVec2::ZERO;
-        for (row, _) in (0..).zip(&self.bodies).filter(|(_, body)| body.time > STILL.time) {
+        for (row, body) in (0..).zip(&self.bodies).filter(|(_, body)| body.time > STILL.time) {
             self.pile.place(row);
-            let [x, y, ..] = velocity(row as usize).map(f64::from);
+            let [x, y, ..] = velocity(row as usize, body).map(f64::from);
             momentum += DVec2::new(x, y) / f64::from(on.rows[row as usize].velocity[3]);
         }
         let Some(direction) = momentum.try_normalize() else { return false };
         let mut above = 0;
         while let Some(&row) = self.pile.rows.get(above as usize) {
             let BodyRow { velocity: [.., inv_mass], delta: [.., inv_inertia] } = on.rows[row as usize];
-            let [x, y, turn, _] = velocity(row as usize).map(f64::from);
-            let (inverse, time) = ([inv_mass, inv_inertia].map(f64::from), self.bodies[row as usize].begun);
+            let body = &self.bodies[row as usize];
+            let [x, y, turn, _] = velocity(row as usize, body).map(f64::from);
+            let (inverse, time, mut end) = ([inv_mass, inv_inertia].map(f64::from), body.begun, body.first);
             self.pile.bodies.push(Carried { velocity: [x, y, turn], inverse, time });
-            let mut end = self.bodies[row as usize].first;
             while end != NONE {
                 // Ends of a are even.
                 let (lane, is_b) = (end / 2, end % 2 == 1);
@@ -147,9 +147,14 @@ impl PlasticImpacts {
 
     /// A pile at rest begins to bear what has come on it.
     pub(super) fn rest(&mut self, on: &mut On<'_>) {
-        let found = self.find_pile(on, |row| {
-            let [x, y, ..] = on.increments[row];
-            [x, y, 0.0, 0.0]
+        for point in &self.points {
+            for row in point.rows {
+                self.bodies[row as usize].borne += point.borne[0];
+            }
+        }
+        let found = self.find_pile(on, |row, body| match body.time > STILL.time && body.borne == 0.0 {
+            true => on.increments[row],
+            false => [0.0; 4],
         });
         // No faster than what forces make in a step.
         let is_still = |&row: &u32| {
@@ -165,23 +170,22 @@ impl PlasticImpacts {
         let points = &self.points;
         let lane_of = |bearing: &Bearing| points[bearing.point as usize].lane;
         for bearings in self.pile.bearings.chunk_by(|a, b| lane_of(a) == lane_of(b)) {
+            let contact = bearings[0].support.contact as usize;
+            if on.contacts[contact].manifold.count < 2 {
+                continue;
+            }
             let Place { part, width, first, layout, .. } = on.place(lane_of(&bearings[0]));
             let floats: &mut [f32] = bytemuck::cast_slice_mut(on.batches[part].records_mut());
             let at = |p: usize, quantity: usize| first + layout.at(p, quantity) * width;
-            let load: f64 = bearings.iter().map(|bearing| bearing.support.load[0]).sum();
-            let borne: f32 = (0..layout.points).map(|p| floats[at(p, layout.normal_impulse)]).sum();
-            let contact = bearings[0].support.contact as usize;
-            if on.contacts[contact].manifold.count < 2 || load <= 2.0 * f64::from(borne) {
-                continue;
-            }
             for Support { point, load: [n, t], .. } in bearings.iter().map(|bearing| bearing.support) {
-                floats[at(point, layout.normal_impulse)] = n as f32;
+                floats[at(point, layout.normal_impulse)] += n as f32;
                 if layout.has_friction {
-                    floats[at(point, layout.tangent_impulse)] = t as f32;
+                    floats[at(point, layout.tangent_impulse)] += t as f32;
                 }
             }
             on.weights.resize(on.contacts.len(), 0.0);
-            on.weights[contact] = load as f32 / on.h;
+            on.weights[contact] =
+                (0..layout.points).map(|p| floats[at(p, layout.normal_impulse)]).sum::<f32>() / on.h;
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct Body {
     /// When it was last pushed (s); −∞ for never.
     pub time: f32,
     pub is_queued: bool,
+    /// Normal impulses of its points in the last substep (N·s).
+    pub borne: f32,
     /// `time` when only what arrives had been solved (s).
     pub begun: f32,
     /// Its velocity before anything pushed it (m/s, m/s, rad/s).
@@ -30,6 +32,7 @@ pub const STILL: Body = Body {
     first: NONE,
     time: f32::NEG_INFINITY,
     is_queued: false,
+    borne: 0.0,
     flown: [0.0; 3],
     begun: f32::NEG_INFINITY,
     rounded: [0.0; 3],
