@@ -69,9 +69,17 @@
 //! With 16 registers (AVX2, `x86-64-v3`), eight lanes, relaxing: a batch is 412 instructions instead of the 349
 //! that it is with 32. Of these 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have an
 //! operand in it instead of 6; 72 shuffles and some 120 of arithmetic are the same. On the same core that takes 11 %
-//! longer, soft contacts 15 %. Where the stack lay cost more than that (`align_frame`). Tried without gain: reading
-//! records again instead of keeping them on the stack (5 stores and 9 loads less; relaxing −1 %, soft 0 %), and a
-//! barrier that keeps an inverse mass in one register, not in the two that it is shuffled from (0 %, −2 %).
+//! longer, soft contacts 15 %. Where the stack lay cost more than that (`align_frame`).
+//!
+//! So at four and at eight lanes eight batches go through a sweep together, stage by stage: gather bodies and form the
+//! rows, solve them, apply and scatter. A stage needs fewer registers, and its short chain overlaps with that of the next
+//! batch: with 16 registers and eight lanes soft contacts −9 %, relaxing −7 %, and −12 % both with body rows loaded whole;
+//! with 32 registers −7 % at eight lanes, −10 % at four; at sixteen lanes 0 and +2 %, so not there. Segments of fewer
+//! batches go one by one, which costs 5 to 8 % more than before there were stages (`pyramid:10`, `stack:20`).
+//! Tried without gain: four stages (gathering apart from forming rows: +4 %; positions apart from velocities: +4 and
+//! +6 %); without stages, the k of coupling in the record (53 instructions less; −5 and −3 %, preparing +18 %), friction
+//! rows that wait for the spins (41 less; −3 and −2 %), reading records again instead of keeping them on the stack (0 and
+//! −1 %), and a barrier that keeps an inverse mass in one register, not in the two that it is shuffled from (0, −2 %).
 //!
 //! # Order of rows
 //!
@@ -83,14 +91,14 @@
 //!
 //! Tried without gain: row indices stored as multiples that the addressing mode takes (32
 //! instructions less, relaxing −3 %, soft 0 %; left to itself the compiler then forms addresses
-//! in vectors, +20 %). Not tried: the k of coupling in the record (24 bytes for 16 instructions).
+//! in vectors, +20 %).
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
 //! (gather, solve, scatter by colour); the contact frame is this crate's own.
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{AnyPass, Pass, PassInput, PerLane};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, prefetch};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore, align_frame, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
 macro_rules! over_segments {
@@ -224,6 +232,17 @@ impl<L: Lanes> BodyPair<L> {
     ) -> Self {
         let a = if O::HAS_ROW { rows.gather(row_a) } else { [L::zero(); 8] };
         BodyPair { a, b: rows.gather(row_b) }
+    }
+
+    /// As [`Self::gather`], of bodies that have not just been written, see [`Lanes::gather_whole`].
+    #[inline(always)]
+    fn gather_whole<O: Opposite, S: RowStore + ?Sized>(
+        rows: &S,
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
+    ) -> Self {
+        let a = if O::HAS_ROW { rows.gather_whole(row_a) } else { [L::zero(); 8] };
+        BodyPair { a, b: rows.gather_whole(row_b) }
     }
 
     /// Writes back the velocities of the bodies that answer to impulses.
@@ -374,54 +393,114 @@ impl<L: Lanes> Rows<L> {
     }
 }
 
-/// One sweep over a segment: Gauss–Seidel within a contact, all contacts of a batch at once.
-#[inline(always)]
-pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
-    rows: &mut S,
-    batches: &mut Batches,
-    segment: &Segment,
-    rule: R,
-) {
-    let layout = const { Layout::of::<N, O>() };
-    let friction_rows = const { N::FRICTION && R::FRICTION };
-    let pushes_a = segment.pushes_a();
-    for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
-        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, S>(rows, row_a, row_b);
-        let n = [record[0], record[1]];
-        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
-        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
-        let mut w = [a[W], b[W]];
+/// What a sweep keeps of a batch from one stage to the next.
+#[derive(Clone, Copy)]
+struct Pending<L> {
+    /// Velocities (m/s) and inverse masses (1/kg) of bodies a and b: `[vx, vy, m⁻¹]`.
+    linear: [[L; 3]; 2],
+    /// Inverse inertias of a and b (1/(kg·m²)).
+    inertia: [L; 2],
+    /// Spins of a and b (rad/s).
+    w: [L; 2],
+    /// sin Δθ, and 1 − cos Δθ, of a and b; only where arms turn.
+    turn: [[L; 2]; 2],
+    /// Of the normal rows: what a unit of velocity takes away (kg).
+    slope: [L; 2],
+    /// Of the rows along n, and along t: c − s v, unclamped (N·s).
+    impulse: [[L; 2]; 2],
+    /// What the rows along n, and along t, have applied (N·s).
+    sum: [L; 2],
+}
 
+impl<L: Lanes> Pending<L> {
+    fn zero() -> Self {
+        let pair = [L::zero(); 2];
+        Pending {
+            linear: [[L::zero(); 3]; 2],
+            inertia: pair,
+            w: pair,
+            turn: [pair; 2],
+            slope: pair,
+            impulse: [pair; 2],
+            sum: pair,
+        }
+    }
+
+    /// Arms of bodies a and b at point `p` along n, and along t, as the rule has them.
+    #[inline(always)]
+    fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
+        let layout = const { Layout::of::<N, O>() };
+        let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+        if R::TURNED { turned(arm_n, arm_t, self.turn[0], self.turn[1]) } else { [arm_n, arm_t] }
+    }
+
+    /// First stage: what the rows would be, unclamped, at the velocities so far.
+    #[inline(always)]
+    fn begin<N: KernelFeatures, O: Opposite, R: NormalRule>(
+        &mut self,
+        BodyPair { a, b }: &BodyPair<L>,
+        record: &[L],
+        rule: R,
+        pushes_a: bool,
+    ) {
+        let layout = const { Layout::of::<N, O>() };
+        let n = [record[0], record[1]];
+        self.linear = [[a[VX], a[VY], a[INV_MASS]], [b[VX], b[VY], b[INV_MASS]]];
+        self.inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let w = [a[W], b[W]];
+        self.w = w;
         let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
         let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
-
-        let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());
+        if R::TURNED {
+            self.turn = [[sine_a, sine_b], [versine_a, versine_b]];
+        }
         for p in 0..N::POINTS {
-            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
-            let mut arm_t = arms::<L, N, O>(record, &layout, p, 1);
             let mut separation = L::zero();
             if R::SEPARATION {
+                let (arm_n, arm_t) =
+                    (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
                 separation = record[layout.at(p, layout.separation)] + moved;
                 separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
                 separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             }
-            if R::TURNED {
-                [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
-            }
-            normal.arm[p] = arm_n;
+            let [arm_n, arm_t] = self.arms::<N, O, R>(record, p);
             let mass = record[layout.at(p, layout.normal_mass)];
             let old = record[layout.at(p, layout.normal_impulse)];
             let [constant, slope] = rule.line(!pushes_a, separation, mass, old);
             let vn = with_arms::<L, N, O>(along_n, w, arm_n);
-            normal.impulse[p] = slope.neg_mul_add(vn, constant);
-            (normal.slope[p], normal.old[p]) = (slope, old);
-            if friction_rows {
+            self.impulse[0][p] = slope.neg_mul_add(vn, constant);
+            self.slope[p] = slope;
+            if const { N::FRICTION && R::FRICTION } {
                 let vt = with_arms::<L, N, O>(along_t, w, arm_t);
-                tangent.load_friction(p, record, &layout, rule, arm_t, vt);
+                let slope = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
+                let old = record[layout.at(p, layout.tangent_impulse)];
+                self.impulse[1][p] = slope.neg_mul_add(vt, old);
             }
         }
+    }
 
+    /// Second stage: solves the rows, one after the other.
+    #[inline(always)]
+    fn solve<N: KernelFeatures, O: Opposite, R: NormalRule>(&mut self, record: &mut [L], rule: R) {
+        let layout = const { Layout::of::<N, O>() };
+        let friction_rows = const { N::FRICTION && R::FRICTION };
+        let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());
+        let inertia = self.inertia;
+        let [[_, _, mass_a], [_, _, mass_b]] = self.linear;
+        let mass_sum = if O::HAS_ROW { mass_a + mass_b } else { mass_b };
+        let mut w = self.w;
+        for p in 0..N::POINTS {
+            [normal.arm[p], tangent.arm[p]] = self.arms::<N, O, R>(record, p);
+            normal.slope[p] = self.slope[p];
+            normal.impulse[p] = self.impulse[0][p];
+            normal.old[p] = record[layout.at(p, layout.normal_impulse)];
+            if friction_rows {
+                tangent.slope[p] = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
+                tangent.impulse[p] = self.impulse[1][p];
+                tangent.old[p] = record[layout.at(p, layout.tangent_impulse)];
+            }
+        }
         for p in 0..N::POINTS {
             let new = normal.impulse[p].max(L::zero());
             normal.impulse[p] = new;
@@ -442,10 +521,94 @@ pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalR
         if friction_rows {
             tangent.solve_friction::<N, O>(record, &layout, normal.impulse, mass_sum, inertia, &mut w);
         }
+        self.sum = [normal.sum, tangent.sum];
+        self.w = w;
+    }
 
-        apply::<L, O>(&mut a, &mut b, n, [normal.sum, tangent.sum], w);
+    /// Third stage: applies the impulses to the bodies.
+    #[inline(always)]
+    fn finish<O: Opposite, S: RowStore + ?Sized>(
+        &self,
+        rows: &mut S,
+        record: &[L],
+        row_a: LaneIndex<L::Index>,
+        row_b: LaneIndex<L::Index>,
+        pushes_a: bool,
+    ) {
+        let (mut a, mut b) = ([L::zero(); 8], [L::zero(); 8]);
+        for (row, linear) in [&mut a, &mut b].into_iter().zip(self.linear) {
+            [row[VX], row[VY], row[INV_MASS]] = linear;
+        }
+        apply::<L, O>(&mut a, &mut b, [record[0], record[1]], self.sum, self.w);
         BodyPair { a, b }.scatter_velocities::<O, S>(rows, row_a, row_b, pushes_a);
+    }
+}
+
+/// Batches that go through the stages of a sweep together. In four stages 2, 4, 8 and 16 of them gained 1, 3, 4 and 3 %.
+const STAGED: usize = 8;
+
+/// One sweep over a segment: Gauss–Seidel within a contact, all contacts of a batch at once.
+#[inline(always)]
+pub(super) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
+    rows: &mut S,
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: R,
+) {
+    if const { L::WIDTH > 1 && L::WIDTH < 16 } && segment.disjoint && segment.batches >= STAGED {
+        return sweep_staged::<L, N, O, R, S>(rows, batches, segment, rule);
+    }
+    let pushes_a = segment.pushes_a();
+    for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let mut batch = Pending::<L>::zero();
+        let bodies = BodyPair::gather::<O, S>(rows, row_a, row_b);
+        batch.begin::<N, O, R>(&bodies, record, rule, pushes_a);
+        batch.solve::<N, O, R>(record, rule);
+        batch.finish::<O, S>(rows, record, row_a, row_b, pushes_a);
     });
+}
+
+/// As [`sweep_segment`], stage by stage over [`STAGED`] batches; the bits are the same, since no two contacts of the
+/// segment push the same body.
+#[inline(never)]
+fn sweep_staged<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
+    rows: &mut S,
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: R,
+) {
+    align_frame();
+    let stride = const { Layout::of::<N, O>().stride };
+    let pushes_a = segment.pushes_a();
+    let SegmentRecords { mut records, row_a, row_b, .. } =
+        batches.records_of::<L>(segment, &N::layout(segment.opposite));
+    rows.assert_rows(row_b);
+    if O::HAS_ROW {
+        rows.assert_rows(row_a);
+    }
+    let mut staged = [Pending::<L>::zero(); STAGED];
+    for first in (0..segment.batches).step_by(STAGED) {
+        let count = STAGED.min(segment.batches - first);
+        let lanes = first * L::WIDTH..(first + count) * L::WIDTH;
+        let (row_a, row_b) = (row_a.part(lanes.clone()), row_b.part(lanes));
+        let bodies = || row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());
+        let mut coming: &[L] = records;
+        for (batch, (row_a, row_b)) in staged.iter_mut().zip(bodies()) {
+            let (record, later) = coming.split_at(stride);
+            prefetch(later, (PREFETCH_BATCHES - 1) * stride..PREFETCH_BATCHES * stride);
+            let bodies = BodyPair::gather_whole::<O, S>(rows, row_a, row_b);
+            batch.begin::<N, O, R>(&bodies, record, rule, pushes_a);
+            coming = later;
+        }
+        let (now, later) = records.split_at_mut(count * stride);
+        for (batch, record) in staged.iter_mut().zip(now.chunks_exact_mut(stride)) {
+            batch.solve::<N, O, R>(record, rule);
+        }
+        for (batch, (record, (row_a, row_b))) in staged.iter().zip(now.chunks_exact(stride).zip(bodies())) {
+            batch.finish::<O, S>(rows, record, row_a, row_b, pushes_a);
+        }
+        records = later;
+    }
 }
 
 /// Turns the impulses along n and t back into world axes and applies them; `w` are the new spins.
@@ -495,7 +658,7 @@ fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bo
     let layout = const { Layout::of::<N, O>() };
     let pushes_a = segment.pushes_a();
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather_whole::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
         let mut w = [a[W], b[W]];

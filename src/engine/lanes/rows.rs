@@ -55,6 +55,42 @@ pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [wide::f32x16
     [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
 }
 
+#[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
+pub use avx::gather_8;
+
+/// Without instructions for 8 lanes, by halves of rows.
+#[cfg(not(all(target_arch = "x86_64", target_feature = "avx")))]
+#[inline(always)]
+pub fn gather_8(rows: &[BodyRow], index: LaneIndex<[u32; 8]>) -> [wide::f32x8; 8] {
+    let quads = bytemuck::cast_slice(rows);
+    let (v, d) = (super::quads::gather_8::<2, 0>(quads, index), super::quads::gather_8::<2, 1>(quads, index));
+    [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
+}
+
+#[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
+mod avx {
+    use super::super::quads::avx::{from, transpose};
+    use super::{BodyRow, LaneIndex, assert_fits};
+    use std::arch::x86_64::*;
+    use wide::f32x8;
+
+    /// By whole rows: 8 loads and 24 shuffles. By half rows it is 16 loads, 8 of them with an insert, and 16 shuffles.
+    #[inline(always)]
+    pub fn gather_8(rows: &[BodyRow], index: LaneIndex<[u32; 8]>) -> [f32x8; 8] {
+        assert_fits(index.bound(), rows.len(), 1);
+        let index = index.array();
+        // SAFETY: every entry is below the bound; a row is eight floats, aligned to 32 bytes.
+        unsafe {
+            let row = |i: usize| _mm256_load_ps(rows.as_ptr().add(index[i] as usize).cast());
+            let p = transpose([row(0), row(1), row(2), row(3)]);
+            let q = transpose([row(4), row(5), row(6), row(7)]);
+            let velocity = |c: usize| from(_mm256_permute2f128_ps::<0x20>(p[c], q[c]));
+            let delta = |c: usize| from(_mm256_permute2f128_ps::<0x31>(p[c], q[c]));
+            [velocity(0), velocity(1), velocity(2), velocity(3), delta(0), delta(1), delta(2), delta(3)]
+        }
+    }
+}
+
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 mod avx512 {
     use super::super::quads::avx512::{from, into, transpose};

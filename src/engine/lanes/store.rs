@@ -21,6 +21,12 @@ pub trait RowStore {
     /// If the store has fewer rows than the bound of `index`.
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8];
 
+    /// As [`Self::gather`], for rows that have not just been written; see [`Lanes::gather_whole`].
+    #[inline(always)]
+    fn gather_whole<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        self.gather::<L>(index)
+    }
+
     /// Writes back `[vx, vy, ω, m⁻¹]`, in lane order.
     ///
     /// # Panics
@@ -37,6 +43,11 @@ impl RowStore for [BodyRow] {
     #[inline(always)]
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
         L::gather(self, index)
+    }
+
+    #[inline(always)]
+    fn gather_whole<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather_whole(self, index)
     }
 
     #[inline(always)]

@@ -65,6 +65,17 @@ pub trait Lanes:
         [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
     }
 
+    /// As [`Self::gather`], by whole rows where that is fewer loads, as at eight lanes. A row of which a half has
+    /// just been written cannot be loaded whole before that half is in the cache: sweeps of a stack of 20 take 5 to 10 % longer,
+    /// those of a pyramid of 5050 boxes 2 to 4 % less.
+    ///
+    /// # Panics
+    /// As [`Self::gather`].
+    #[inline(always)]
+    fn gather_whole(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
+        Self::gather(rows, index)
+    }
+
     /// Writes back the first half `[vx, vy, ω, m⁻¹]` of `WIDTH` rows, in lane order.
     ///
     /// # Panics

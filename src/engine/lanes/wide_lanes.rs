@@ -9,7 +9,7 @@ use wide::{f32x4, f32x8, f32x16};
 
 macro_rules! wide_lanes {
     ($type:ty, $width:literal, quads: $gather_quads:ident, $scatter:ident, $halves:ident,
-     columns: $load:ident, $store:ident $(, rows: $gather:ident)?) => {
+     columns: $load:ident, $store:ident $(, rows: $gather:ident)? $(, whole: $whole:ident)?) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
@@ -19,6 +19,13 @@ macro_rules! wide_lanes {
                 #[inline(always)]
                 fn gather(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
                     rows::$gather(rows, index)
+                }
+            )?
+
+            $(
+                #[inline(always)]
+                fn gather_whole(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
+                    rows::$whole(rows, index)
                 }
             )?
 
@@ -112,7 +119,8 @@ macro_rules! wide_lanes {
 }
 
 wide_lanes!(f32x4, 4, quads: gather_4, scatter_4, scatter_halves_4, columns: load_each, store_each);
-wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8, columns: load_each, store_each);
+wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8,
+    columns: load_each, store_each, whole: gather_8);
 wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16,
     columns: load_at_16, store_at_16, rows: gather_16);
 
@@ -192,6 +200,7 @@ mod tests {
                 prop_assert_eq!(got, (10 * index[lane] as usize + c) as f32);
             }
         }
+        prop_assert_eq!(L::gather_whole(&rows, at).map(floats), v.map(floats));
         let plus = |v: L| v + L::splat(0.5);
         let (mut velocities, mut deltas) = (rows.clone(), rows.clone());
         L::scatter_velocity(&mut velocities, at, [plus(v[0]), plus(v[1]), plus(v[2]), plus(v[3])]);
