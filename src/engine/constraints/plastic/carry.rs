@@ -62,12 +62,13 @@ impl PlasticImpacts {
         if !found || self.pile.stop().is_none_or(|left| left >= 1.0) {
             return false;
         }
+        // What nothing that arrives has hit from above is pushed when the impact begins.
+        let begun = self.bodies.iter().map(|body| body.begun).filter(|time| time.is_finite());
+        let first = begun.fold(f32::INFINITY, f32::min);
         for (&row, carried) in self.pile.rows.iter().zip(&self.pile.bodies) {
+            let time = if carried.time > STILL.time { carried.time } else { first };
             let body = &mut self.bodies[row as usize];
-            if carried.time > STILL.time {
-                body.time = carried.time;
-            }
-            body.begun = body.time;
+            (body.time, body.begun) = (time, time);
         }
         for i in 0..self.pile.bearings.len() {
             let Bearing { above, point: place, support, .. } = self.pile.bearings[i];
