@@ -37,7 +37,7 @@ mod point_passes;
 pub mod point_vector;
 pub mod position;
 mod positional;
-mod preload;
+pub mod preload;
 pub mod prepare;
 pub mod restitution;
 pub mod rules;

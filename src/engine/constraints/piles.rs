@@ -46,7 +46,7 @@
 
 use super::equilibrium::Equilibrium;
 use super::graph::{Graph, UNSUPPORTED};
-use super::preload::{GIVING, LEFT};
+use super::preload::LEFT;
 use super::statics::{self, Support};
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::{Contact, ManifoldPoint};
@@ -437,12 +437,9 @@ impl Piles {
         let begins = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic && !is_loaded[body as usize];
         let rests = |contact: &Contact, p: usize| rests(bodies, contact, &contact.manifold.points[p], still);
         self.equilibrium.balance(bodies, contacts, gravity, h, begins, rests);
-        for (weight, contact) in self.weights.iter_mut().zip(contacts.iter_mut()) {
+        for (weight, contact) in self.weights.iter_mut().zip(contacts.iter()) {
             if begins(contact.body_a) || begins(contact.body_b) {
                 *weight = contact.manifold.points().iter().map(|p| p.normal_impulse / h).sum();
-                if contact.manifold.count > 1 {
-                    contact.wait = -GIVING;
-                }
             }
         }
         self.spare_placed(bodies, contacts);

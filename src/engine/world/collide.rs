@@ -4,6 +4,7 @@ use super::World;
 use super::candidates::Candidate;
 use super::jams::Jams;
 use super::recycle::{Pairs, Recycled};
+use crate::engine::constraints::preload::GIVING;
 use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::lanes::{Quad, held};
 use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
@@ -96,13 +97,11 @@ impl World {
             candidate.contact = if contact.manifold.count == 0 {
                 NO_CONTACT
             } else {
-                let preload = if candidate.bodies.iter().any(|&body| body as usize >= stepped) {
-                    contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least))
-                } else {
-                    0.0
-                };
+                let is_placed = candidate.bodies.iter().any(|&body| body as usize >= stepped);
+                let least = || contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
+                let [preload, wait] = if is_placed { [least(), -GIVING] } else { [0.0; 2] };
                 let Contact { manifold, turn, .. } = *contact;
-                fresh.push(Contact { manifold, preload, turn, ..candidate.without_manifold() });
+                fresh.push(Contact { manifold, preload, wait, turn, ..candidate.without_manifold() });
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;
