@@ -226,6 +226,8 @@ pub struct Piles {
     columns: Vec<Column>,
     /// What each body bears: weight (N), and its torque about the centre of mass (N·m).
     forces: Vec<[f64; 2]>,
+    /// What of that is set on the pile in this step.
+    added: Vec<[f64; 2]>,
     /// Whether a contact of the body has borne a load.
     is_loaded: Vec<bool>,
     /// Of one body.
@@ -379,13 +381,15 @@ impl Piles {
     }
 
     /// Writes what contacts bear at rest, from the top downwards: each body stands, with what it bears, on its
-    /// contacts with the level below. Bodies that have borne nothing yet get their impulses per substep of `h` (s), too:
-    /// of others motion knows better what a contact that comes will bear. Nor is anything written there for contacts of one
-    /// point, since discs in a pile share their loads in many ways.
+    /// contacts with the level below. Bodies that have borne nothing yet get their impulses per substep of `h` (s), too, and
+    /// what bears them already others gets theirs added: what it bore before is known from motion. Nor is anything written
+    /// there for contacts of one point, since discs in a pile share their loads in many ways.
     fn weigh(&mut self, bodies: &Bodies, contacts: &mut [Contact], gravity: DVec2, still: f32, h: f32) {
         let up = -gravity.normalize();
         self.forces.clear();
         self.forces.resize(bodies.len(), [0.0; 2]);
+        self.added.clear();
+        self.added.resize(bodies.len(), [0.0; 2]);
         self.is_loaded.clear();
         self.is_loaded.resize(bodies.len(), false);
         for contact in contacts.iter().filter(|contact| has_borne(contact)) {
@@ -404,28 +408,34 @@ impl Piles {
             let [borne, torque] = self.forces[b];
             let force = force(bodies, b, gravity) - borne * up;
             let torque = torque + f64::from(bodies.torque[b]);
-            let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
-            let weight = (-force.dot(up)).max(0.0);
-            statics::load(&mut self.supports, force, torque, gyration);
-            // Weight goes down the pile, no more and no less; pushes to the sides end here.
-            let carried = |support: &Support| support.force().dot(up).max(0.0);
-            let part = weight / self.supports.iter().map(carried).sum::<f64>();
+            hand_down(bodies, contacts, body, [force, up], torque, &mut self.supports, &mut self.forces);
             let is_new = !self.is_loaded[b];
             for support in &self.supports {
                 let contact = &mut contacts[support.contact as usize];
                 if is_new || contact.manifold.count > 1 {
                     self.weights[support.contact as usize] += support.load[0] as f32;
                 }
-                let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
-                let arm = center(bodies, b) + support.arm - center(bodies, other);
-                if part.is_finite() {
-                    let carried = part * carried(support);
-                    self.forces[other][0] += carried;
-                    self.forces[other][1] -= carried * arm.perp_dot(up);
-                }
                 if is_new {
                     let point = &mut contact.manifold.points[support.point];
                     [point.normal_impulse, point.tangent_impulse] = support.load.map(|load| load as f32 * h);
+                }
+            }
+            // What has fallen is borne by what it has done to the pile.
+            let is_set = is_new && self.supports.iter().any(|s| contacts[s.contact as usize].wait < 0.0);
+            let [borne, turns] = self.added[b];
+            let (force, torque) = if is_set { (force, torque) } else { (-borne * up, turns) };
+            if force == DVec2::ZERO {
+                continue;
+            }
+            hand_down(bodies, contacts, body, [force, up], torque, &mut self.supports, &mut self.added);
+            for support in self.supports.iter().filter(|_| !is_new) {
+                let contact = &mut contacts[support.contact as usize];
+                if contact.manifold.count > 1 {
+                    let point = &mut contact.manifold.points[support.point];
+                    point.normal_impulse += support.load[0] as f32 * h;
+                    point.tangent_impulse += support.load[1] as f32 * h;
+                    let points = contact.manifold.points().iter();
+                    self.weights[support.contact as usize] = points.map(|p| p.normal_impulse / h).sum();
                 }
             }
         }
@@ -538,6 +548,7 @@ impl Piles {
             + held(&self.parts)
             + held(&self.columns)
             + held(&self.forces)
+            + held(&self.added)
             + held(&self.is_loaded)
             + held(&self.supports)
             + held(&self.weights)
@@ -565,6 +576,35 @@ fn supports<'c>(
         friction: f64::from(contact.friction),
         load: [0.0; 2],
     })
+}
+
+/// Lets `supports` of a body bear a force (N) and a torque (N·m), and gives what they bear to the bodies below. Weight goes
+/// down the pile along −`up`, no more and no less; pushes to the sides end here.
+fn hand_down(
+    bodies: &Bodies,
+    contacts: &[Contact],
+    body: u32,
+    [force, up]: [DVec2; 2],
+    torque: f64,
+    supports: &mut [Support],
+    forces: &mut [[f64; 2]],
+) {
+    let b = body as usize;
+    let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
+    statics::load(supports, force, torque, gyration);
+    let carried = |support: &Support| support.force().dot(up).max(0.0);
+    let part = (-force.dot(up)).max(0.0) / supports.iter().map(carried).sum::<f64>();
+    if !part.is_finite() {
+        return;
+    }
+    for support in supports.iter() {
+        let contact = &contacts[support.contact as usize];
+        let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
+        let arm = center(bodies, b) + support.arm - center(bodies, other);
+        let carried = part * carried(support);
+        forces[other][0] += carried;
+        forces[other][1] -= carried * arm.perp_dot(up);
+    }
 }
 
 /// A point touches, and moves by no more than `still` (m/s).

@@ -24,6 +24,8 @@ pub(super) struct Narrow {
     pub shapes: Shapes,
     /// The set of contacts is not that of the lanes.
     pub is_changed: bool,
+    /// Contacts came in the first step of one of their bodies.
+    pub is_placed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
     /// Manifolds that are kept.
@@ -89,17 +91,19 @@ impl World {
         let mut points = recycled.update(&pairs, &mut self.contacts, distance);
         narrow.list_jobs(self.contacts.len());
 
-        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, .. } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, is_placed, poses, ways, shapes, .. } = narrow;
         fresh.clear();
+        *is_placed = false;
         let stepped = self.stepped;
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
             candidate.contact = if contact.manifold.count == 0 {
                 NO_CONTACT
             } else {
-                let is_placed = candidate.bodies.iter().any(|&body| body as usize >= stepped);
+                let was_placed = candidate.bodies.iter().any(|&body| body as usize >= stepped);
                 let least = || contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                let [preload, wait] = if is_placed { [least(), -GIVING] } else { [0.0; 2] };
+                *is_placed |= was_placed;
+                let [preload, wait] = if was_placed { [least(), -GIVING] } else { [0.0; 2] };
                 let Contact { manifold, turn, .. } = *contact;
                 fresh.push(Contact { manifold, preload, wait, turn, ..candidate.without_manifold() });
                 FRESH | (fresh.len() - 1) as u32

@@ -30,8 +30,8 @@ pub(super) struct Found {
 
 impl World {
     /// Searches the piles if the solver asks for it and contacts have come or gone, or gravity or what users push with has
-    /// changed: every so many steps, and at once if there are a quarter more contacts than the last time or gravity is
-    /// another.
+    /// changed: every so many steps, and at once if there are a quarter more contacts than the last time, bodies were put where they
+    /// touch, or gravity is another.
     pub(super) fn find_piles(&mut self) {
         if !self.settings.solver.piles {
             return;
@@ -44,7 +44,7 @@ impl World {
         found.is_stale |= found.contacts_changed || gravity != found.gravity || pushes != found.pushes;
         let grown = 4 * self.contacts.len() > 5 * found.contacts;
         let other = gravity.distance(found.gravity) > SAME * found.gravity.length();
-        if found.is_stale && (grown || other || turn) {
+        if found.is_stale && (grown || other || turn || self.narrow.is_placed) {
             let modes = self.piles.modes(
                 &self.bodies,
                 &mut self.contacts,

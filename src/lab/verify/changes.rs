@@ -3,8 +3,11 @@
 use super::Required::Yes;
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
+use crate::engine::bodies::{BodyDef, BodyKind, ShapeDef};
+use crate::engine::shapes::Shape;
 use crate::engine::world::World;
 use crate::lab::scenes::Scene;
+use glam::Vec2;
 
 pub(super) static CASES: &[Case] = &[
     Case::new(
@@ -46,6 +49,14 @@ pub(super) static CASES: &[Case] = &[
         "the slop",
         pushed,
         Yes("what users push with is a weight, and found within 32 steps"),
+    ),
+    Case::new(
+        "B25.set",
+        "greatest movement in 10 s of ten boxes on which one of a hundred times the mass is set",
+        "m",
+        "the slop",
+        set,
+        Yes("what is put on a pile is borne by all of it at once"),
     ),
     Case::new(
         "B25.step",
@@ -124,6 +135,16 @@ fn pushed(lab: &Lab) -> Result<Finding, Failure> {
     }
     let [x, ..] = watch(&mut world, 20.0)?;
     Ok(Finding::new(x, 0.0, SLOP))
+}
+
+fn set(lab: &Lab) -> Result<Finding, Failure> {
+    let mut world = lab.run(lab.scene("stack:10")?, 3.0, |_| ())?;
+    let highest = largest(dynamic(&world).map(|(i, ..)| center(&world, i)[1]));
+    let shape = Shape::rectangle("B25.set", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0)
+        .map_err(|error| Failure::Unmeasured(error.to_string()))?;
+    let heavy = ShapeDef { density: 100.0, ..ShapeDef::new(shape) };
+    world.add_body(&BodyDef::new(BodyKind::Dynamic, [0.0, highest + 1.0], vec![heavy]));
+    moves(&mut world, 10.0)
 }
 
 fn step(lab: &Lab) -> Result<Finding, Failure> {
