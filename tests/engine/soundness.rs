@@ -107,6 +107,7 @@ impl Given {
             &of.contacts,
             &of.increments,
             0.01,
+            &[],
         );
         self.bounces = of.bounces;
         self
@@ -133,6 +134,7 @@ fn row_passes<L: Lanes>() -> [Pass; 7] {
                 &g.contacts,
                 &g.increments,
                 0.01,
+                &[],
             );
         }),
         ("restitution::apply", |g| {
@@ -154,6 +156,7 @@ fn contact_passes<L: Lanes>() -> [Pass; 3] {
                 &g.contacts,
                 &g.increments,
                 0.01,
+                &[],
             );
         }),
     ]
@@ -260,7 +263,7 @@ fn short_rows<L: Lanes>() {
     let mut given = Given { increments: vec![], ..Given::new(good(L::WIDTH)) };
     let pass = |g: &mut Given| {
         let Given { rows, batches, bounces, contacts, increments } = g;
-        restitution::prepare::<L, Full>(rows, batches, bounces, contacts, increments, 0.01);
+        restitution::prepare::<L, Full>(rows, batches, bounces, contacts, increments, 0.01, &[]);
     };
     panics("out of bounds", || pass(&mut given));
 }

@@ -5,7 +5,7 @@ use super::batches::Segment;
 use crate::engine::lanes::{Block, Lanes, held};
 use std::slice::ChunksExactMut;
 
-/// Side records: per batch four vectors, then five per point. What they hold, [`super::impact`] says, and
+/// Side records: per batch four vectors, then seven per point. What they hold, [`super::impact`] says, and
 /// after it [`super::restitution`]: the acceleration a of approach (m/s²), then per point the energy e² E₀
 /// (m²/s²; zero where it shall not bounce) and the largest normal impulse so far (N·s).
 #[derive(Debug, Default)]
@@ -15,7 +15,7 @@ pub struct Bounces {
 
 /// Vectors per side record.
 const fn stride(points: usize) -> usize {
-    4 + 5 * points
+    4 + 7 * points
 }
 
 impl Bounces {

@@ -14,6 +14,25 @@
 //!
 //! A disc has k_nt = 0; a corner does not, and is turned by both. Both rows are solved at once.
 //!
+//! # Friction takes energy
+//!
+//! Both laws together may make energy: a rod at 45° that comes in along its normal is turned so that its end would slip back, and the
+//! impulse that keeps it from slipping pushes it off (Kane). The work of a point's impulses, from v⁻ before the wave to v⁺ after it, is
+//!
+//! ```text
+//! W = ½ N (v_n⁻ + v_n⁺) + ½ T (v_t⁻ + v_t⁺),      Σ W = K⁺ − K⁻
+//! ```
+//!
+//! so that a wave makes none if W ≤ 0 at each of its points. The first part is −½ N L with L = |v_n⁻| − v⁺, or what height makes of it.
+//! With v_n⁺ as Newton has it, W is a convex function of T, and T = 0 is no gain. So T is bounded to where W ≤ 0, between both roots of
+//!
+//! ```text
+//! d T² + (k_nn (v_t⁻ + u) + L k_nt) T − L w ≤ 0,      d = k_nn k_tt − k_nt²
+//! ```
+//!
+//! with w the v_n that the point has to gain from neither of its impulses, and u the v_t that it leaves at with T = 0. Impulses stay within the
+//! cone, which is convex. Where Newton and Coulomb take energy, they stay as they are. See also `rebounds.rs`.
+//!
 //! # When in the step
 //!
 //! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 in the place of v. From the gap s it is at the surface
@@ -51,7 +70,7 @@ use super::touch::Round;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use glam::Vec2;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 /// Reads what impacts need of contacts and bodies, once per step.
 pub(super) struct Load {
@@ -81,6 +100,10 @@ pub(super) struct Solve {
     pub timed: bool,
     /// The fastest that something shall leave at (m/s).
     pub fastest: f32,
+    /// There are no impulses so far.
+    pub is_first: bool,
+    /// Else as if nothing had any.
+    pub with_friction: bool,
     /// Greatest change of a velocity, as a part of that (1).
     pub change: Cell<f32>,
 }
@@ -94,10 +117,20 @@ pub(super) struct PutBack;
 /// What has bounced leaves by itself: it is not pushed out as well.
 pub(super) struct Leave;
 
+/// Notes the contacts that have bounced.
+pub(super) struct Bounced<'a> {
+    /// Whether it has. `[contacts]`
+    pub found: RefCell<&'a mut [bool]>,
+}
+
 /// Side record of an impact: a (m/s²), e (1), threshold (m/s), whether it is at its time (1); then per point target (m/s; zero where
-/// nothing comes in), N and T (N·s), its time (s), and whether it has bounced in any wave (1). See [`Bounces`].
+/// nothing comes in), N and T (N·s), its time (s), whether it has bounced in any wave (1), and before the wave v_t and
+/// what of |v_n| it shall lose (m/s). See [`Bounces`].
 const FIRST: usize = 4;
-const PER_POINT: usize = 5;
+const PER_POINT: usize = 7;
+
+/// Part of v⁺ that friction may gain by rounding (1).
+const ROUNDING: f32 = 1e-6;
 
 /// A point is looked at for a tenth of its way further than it gets in the step (1).
 pub(super) const AHEAD: f32 = 1.1;
@@ -217,6 +250,27 @@ impl Pass for Leave {
                         let at = layout.at(p, layout.separation);
                         record[at] = record[at] - raised;
                     }
+                }
+            }
+        });
+    }
+}
+
+impl Pass for Bounced<'_> {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        PerLane { floats_read: 1 + layout.points, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let contact = batches.records_of::<L>(segment, layout).contact;
+            let sides = on.bounces.of::<L>(segment, layout.points);
+            for (batch, (side, contact)) in sides.zip(contact.batches::<L::Index>()).enumerate() {
+                let floats: &[f32] = bytemuck::cast_slice(side);
+                let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+                for (lane, &contact) in filled.iter().enumerate() {
+                    let has = |p| floats[(FIRST + PER_POINT * p + 4) * L::WIDTH + lane] > 0.0;
+                    self.found.borrow_mut()[contact as usize] = (0..layout.points).any(has);
                 }
             }
         });
@@ -395,6 +449,12 @@ fn targets<L: Lanes>(
         let target = record[layout.at(p, layout.normal_mass)].select_positive(target, zero);
         let at = FIRST + PER_POINT * p;
         (side[at], side[at + 1], side[at + 2], side[at + 3]) = (target, zero, zero, time);
+        if layout.has_friction {
+            let b = L::gather(rows, row_b);
+            let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+            side[at + 5] = slip(record, layout, p, [&a, &b]);
+            side[at + 6] = (-v - target).max(zero) + L::splat(ROUNDING) * target;
+        }
         most = most.max(target);
     }
     most
@@ -431,6 +491,39 @@ pub(super) fn rough_impulses<L: Lanes>(
     let slides = stick[0].select_positive(slides, one);
     let rough = [slides.select_positive(edge_n, stick[0]), slides.select_positive(slope * edge_n, stick[1])];
     std::array::from_fn(|axis| mu.select_positive(rough[axis], smooth[axis]))
+}
+
+/// Velocity of b against a along t (m/s).
+#[inline(always)]
+fn slip<L: Lanes>(record: &[L], layout: &Layout, p: usize, [a, b]: [&[L; 8]; 2]) -> L {
+    let arm = |first: usize, has: bool| if has { record[layout.at(p, first) + 1] } else { L::zero() };
+    let (of_a, of_b) = (arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0]));
+    let along = record[1].mul_add(b[0] - a[0], -(record[0] * (b[1] - a[1])));
+    a[2].neg_mul_add(of_a, b[2].mul_add(of_b, along))
+}
+
+/// Impulses `rough` along n and t (N·s), with less friction where they would make energy; see the [module](self). `wanted`: what
+/// is to be gained from neither impulse (m/s); `slip`: v_t⁻ (m/s); `lost`: L, if positive (m/s).
+#[inline(always)]
+fn lossy_impulses<L: Lanes>(
+    [k_nn, k_tt, k_nt]: [L; 3],
+    rough: [L; 2],
+    [wanted_n, wanted_t]: [L; 2],
+    [slip, lost]: [L; 2],
+) -> [L; 2] {
+    let (zero, half) = (L::zero(), L::splat(0.5));
+    let d = k_nn.mul_add(k_tt, -(k_nt * k_nt));
+    let half_b = half * lost.mul_add(k_nt, k_nt.mul_add(wanted_n, k_nn * (slip - wanted_t)));
+    let c = lost * wanted_n.max(zero);
+    let root = half_b.mul_add(half_b, d * c).max(zero).sqrt();
+    let safe = d.select_positive(d, L::splat(1.0));
+    let (least, most) = ((-(half_b + root) / safe).min(zero), ((root - half_b) / safe).max(zero));
+    let tangent = rough[1].min(most).max(least);
+    let less = rough[1] - tangent;
+    let is_less = d.select_positive(less.max(-less), zero);
+    let normal = (k_nt.neg_mul_add(tangent, wanted_n) / k_nn.select_positive(k_nn, L::splat(1.0))).max(zero);
+    let lossy = [normal, normal.select_positive(tangent, zero)];
+    std::array::from_fn(|axis| is_less.select_positive(lossy[axis], rough[axis]))
 }
 
 /// Accumulated impulses of both points of smooth contacts together, and where these are (positive): one after the other
@@ -490,9 +583,9 @@ fn solve<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    &Solve { timed, fastest, ref change }: &Solve,
+    &Solve { timed, fastest, is_first, with_friction, ref change }: &Solve,
 ) {
-    let pushes_a = segment.pushes_a();
+    let (pushes_a, has_friction) = (segment.pushes_a(), layout.has_friction && with_friction);
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let (zero, one, fastest) = (L::zero(), L::splat(1.0), L::splat(fastest));
@@ -500,8 +593,14 @@ fn solve<L: Lanes>(
     for (side, (record, (row_a, row_b))) in bounces.of::<L>(segment, layout.points).zip(records) {
         let hit: [L; 2] =
             std::array::from_fn(|p| if p < layout.points { side[FIRST + PER_POINT * p] } else { zero });
+        if is_first {
+            for p in 0..layout.points {
+                let at = FIRST + PER_POINT * p;
+                (side[at + 1], side[at + 2]) = (zero, zero);
+            }
+        }
         let mut both = hit[0].min(hit[1]);
-        if layout.has_friction {
+        if has_friction {
             both = record[layout.friction].select_positive(zero, both);
         }
         let pair = if both.any_positive() {
@@ -532,18 +631,19 @@ fn solve<L: Lanes>(
             let wanted = target - vn;
             // Without friction, whether the scene has any or not.
             let mut new = [mass.mul_add(wanted, old_n).max(zero), zero];
-            if layout.has_friction {
-                let vt = {
-                    let x = b[0] - a[0];
-                    let along = n[1].mul_add(x, -(n[0] * (b[1] - a[1])));
-                    a[2].neg_mul_add(arm_a[1], b[2].mul_add(arm_b[1], along))
-                };
+            if has_friction {
+                let vt = slip(record, layout, p, [&a, &b]);
                 let mass_t = record[layout.at(p, layout.tangent_mass)];
                 let k_tt = one / mass_t.select_positive(mass_t, one);
                 let answers = if pushes_a { a[7] } else { zero };
                 let k_nt = (b[7] * arm_b[0]).mul_add(arm_b[1], answers * arm_a[0] * arm_a[1]);
                 let k = [k_nn, k_tt, k_nt];
                 new = rough_impulses(k, mass, record[layout.friction], [old_n, old_t], [wanted, -vt]);
+                let from_none = [
+                    k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted)),
+                    k_nt.mul_add(old_n, k_tt.mul_add(old_t, -vt)),
+                ];
+                new = lossy_impulses(k, new, from_none, [side[at + 5], side[at + 6]]);
             }
             new[0] = both.select_positive(pair[p], new[0]);
             if !timed {
@@ -574,7 +674,7 @@ fn solve<L: Lanes>(
 
 #[cfg(test)]
 mod tests {
-    use super::rough_impulses;
+    use super::{lossy_impulses, rough_impulses};
 
     /// Of a unit square's corner with k_nn, k_tt, k_nt that comes in at 4 m/s and slides at `vt`.
     fn corner(mu: f32, old: [f32; 2], vt: f32) -> [f32; 2] {
@@ -599,5 +699,22 @@ mod tests {
         assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
         // Points that leave by themselves take all of it back.
         assert_eq!(rough_impulses::<f32>([2.0, 3.0, 1.0], 0.5, 1.0, [1.0, 0.0], [-4.0, -1.0]), [0.0, 0.0]);
+    }
+
+    /// A rod at 45° of 2 m and 1 kg that comes in at 1 m/s and slides at `slip`, e = 1: k_nn = k_tt = 5/2, k_nt = −3/2.
+    fn rod(slip: f32) -> [f32; 2] {
+        let (k, wanted) = ([2.5, 2.5, -1.5], [2.0, -slip]);
+        let rough = rough_impulses::<f32>(k, 0.4, 1.0, [0.0; 2], wanted);
+        lossy_impulses(k, rough, wanted, [slip, 0.0])
+    }
+
+    #[test]
+    fn a_rod_gains_nothing_from_its_friction() {
+        // Newton and Coulomb: T = 7/16, N = 17/16, W = ½ T v_t⁻ = 0.11 J. With T = 1/8 it leaves at −v_t⁻: N = 7/8.
+        let [n, t] = rod(0.5);
+        assert!((n - 0.875).abs() < 1e-6 && (t - 0.125).abs() < 1e-6, "{n} {t}");
+        // Slides against its friction: as Newton and Coulomb have it. T = −(5 − 3)/4, N = (5 − 3)/4 … sticks with W < 0.
+        let [n, t] = rod(2.0);
+        assert!((n - 0.5).abs() < 1e-6 && (t + 0.5).abs() < 1e-6, "{n} {t}");
     }
 }

@@ -39,6 +39,7 @@ pub mod position;
 mod positional;
 pub mod preload;
 pub mod prepare;
+pub mod rebounds;
 pub mod restitution;
 pub mod rules;
 pub mod segment;

@@ -22,6 +22,7 @@ use super::position::PositionSweep;
 use super::positional::{AfterDisplacing, Displace};
 use super::preload::Preload;
 use super::prepare::{Prepare, Store};
+use super::rebounds::Rebounds;
 use super::restitution;
 use super::rules::{NormalRule, Rule, Soft};
 use super::sticky::{BookDrift, LoadDrift, StickySweep};
@@ -68,6 +69,8 @@ pub struct Workspace {
     pub vectors: Vec<PointVector>,
     /// What contacts bear in statics (N), in the steps in which that has been found, else empty. `[contacts]`
     pub weights: Vec<f32>,
+    /// What waves of impacts may do to bodies.
+    pub rebounds: Rebounds,
     /// How impacts without restitution spread.
     pub plastic: PlasticImpacts,
     /// Inverse masses and inertias of the rows while they are scaled; else empty.
@@ -99,6 +102,7 @@ impl Workspace {
             + self.descent.held_bytes()
             + self.points.held_bytes()
             + vectors
+            + self.rebounds.held_bytes()
             + self.plastic.held_bytes()
             + held(&self.weights)
             + held(&self.masses)
@@ -642,6 +646,7 @@ impl<'a> Passes<'a> {
         let (h, dt, timed) = (self.h(), self.dt(), self.input.timed_impacts);
         self.over_contacts(&impact::Load { h, dt, timed });
         let (mut has_bounced, mut has_ended) = (false, false);
+        self.work.rebounds.stopped.clear();
         for _ in 0..IMPACT_WAVES {
             let wave = impact::Wave { h, dt, is_first: !has_bounced, found: Cell::new(0.0) };
             self.over_contacts(&wave);
@@ -650,37 +655,60 @@ impl<'a> Passes<'a> {
                 break;
             }
             has_bounced = true;
-            for _ in 0..IMPACT_SWEEPS {
-                let solve = impact::Solve { timed, fastest: wave.found.get(), change: Cell::new(0.0) };
-                self.over_contacts(&solve);
-                self.count_sweep(if self.input.features.friction { 2 } else { 1 });
-                if solve.change.get() < IMPACT_TOLERANCE {
-                    break;
-                }
+            self.work.rebounds.begin(&self.work.rows);
+            let fastest = wave.found.get();
+            let friction = self.input.features.friction;
+            if !self.solve_wave(timed, fastest, friction)
+                && friction
+                && self.work.rebounds.has_gained(&self.work.rows)
+            {
+                self.work.rebounds.undo(&mut self.work.rows);
+                self.solve_wave(timed, fastest, false);
             }
             if self.input.record_impulses {
                 self.over_contacts(&impact::Book);
             }
             if timed {
                 self.over_contacts(&impact::PutBack);
+                self.work.rebounds.bound(&mut self.work.rows, dt);
             }
         }
         if has_bounced && timed {
             if !has_ended {
                 // Bodies stay where they are: one might be in a third that nobody has looked at.
                 self.work.rows.iter_mut().for_each(|row| row.delta[..3].fill(0.0));
+                let mut stopped = std::mem::take(&mut self.work.rebounds.stopped);
+                stopped.resize(self.contacts.len(), false);
+                self.over_contacts(&impact::Bounced { found: RefCell::new(&mut stopped) });
+                self.work.rebounds.stopped = stopped;
             }
             self.work.motion.hide_turns(&mut self.work.rows);
             self.over_contacts(&impact::Leave);
         }
     }
 
+    /// Solves a wave, the fastest point of which shall leave at `fastest` (m/s), from no impulses; whether it is solved.
+    fn solve_wave(&mut self, timed: bool, fastest: f32, with_friction: bool) -> bool {
+        for sweep in 0..IMPACT_SWEEPS {
+            let is_first = sweep == 0;
+            let solve = impact::Solve { timed, fastest, is_first, with_friction, change: Cell::new(0.0) };
+            self.over_contacts(&solve);
+            self.count_sweep(if self.input.features.friction && with_friction { 2 } else { 1 });
+            if solve.change.get() < IMPACT_TOLERANCE {
+                return true;
+            }
+        }
+        false
+    }
+
     /// Notes how fast points come in that shall bounce at the end of the step.
     fn begin_bounces(&mut self) {
         if self.input.features.restitution {
-            let begin = restitution::Begin { h: self.input.h, found: Cell::new(0.0) };
+            let stopped = std::mem::take(&mut self.work.rebounds.stopped);
+            let begin = restitution::Begin { h: self.input.h, stopped: &stopped, found: Cell::new(0.0) };
             self.over_contacts(&begin);
             self.bounces = begin.found.get() > 0.0;
+            self.work.rebounds.stopped = stopped;
         }
     }
 

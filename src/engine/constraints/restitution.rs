@@ -40,14 +40,16 @@ use glam::Vec2;
 use std::cell::Cell;
 
 /// Reads the energies, before anything moves.
-pub struct Begin {
+pub struct Begin<'a> {
     /// Substep (s).
     pub h: f32,
+    /// Contacts that do not bounce; none if empty. `[contacts]`
+    pub stopped: &'a [bool],
     /// Whether a point may bounce: greater than zero (m²/s²).
     pub found: Cell<f32>,
 }
 
-impl Pass for Begin {
+impl Pass for Begin<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let bounce = 1 + 2 * layout.points;
         let read = 2 + layout.points * (layout.arms() + 1);
@@ -55,7 +57,9 @@ impl Pass for Begin {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&self, on: PassInput<'_>) {
-        let most = prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, on.increments, self.h);
+        let (contacts, increments) = (on.contacts, on.increments);
+        let most =
+            prepare::<L, F>(on.rows, on.batches, on.bounces, contacts, increments, self.h, self.stopped);
         self.found.set(self.found.get().max(most));
     }
 }
@@ -112,7 +116,7 @@ impl Pass for Forget {
 // them per batch is not measurable beside the gathers.
 
 /// Reads energies before anything moves. `increments` are the changes of velocity in free flight
-/// per substep `h` (s), `[h aₓ, h a_y, h α, 0]` per row. Returns the greatest energy (m²/s²).
+/// per substep `h` (s), `[h aₓ, h a_y, h α, 0]` per row; `stopped`: see [`Begin`]. Returns the greatest energy (m²/s²).
 pub fn prepare<L: Lanes, N: KernelFeatures>(
     rows: &[BodyRow],
     batches: &mut Batches,
@@ -120,11 +124,13 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     contacts: &[Contact],
     increments: &[[f32; 4]],
     h: f32,
+    stopped: &[bool],
 ) -> f32 {
     bounces.reserve(batches.lanes(), N::POINTS);
     let mut most = 0.0_f32;
     batches.each_segment(N::layout, |batches, segment, layout| {
-        let found = prepare_segment::<L>(rows, batches, segment, layout, bounces, contacts, increments, h);
+        let found =
+            prepare_segment::<L>(rows, batches, segment, layout, bounces, contacts, increments, h, stopped);
         most = most.max(found);
     });
     most
@@ -141,6 +147,7 @@ fn prepare_segment<L: Lanes>(
     contacts: &[Contact],
     increments: &[[f32; 4]],
     h: f32,
+    stopped: &[bool],
 ) -> f32 {
     let mut most = L::zero();
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
@@ -153,8 +160,9 @@ fn prepare_segment<L: Lanes>(
         for lane in 0..L::WIDTH {
             // Lanes without a contact have e = 0 and so no energy.
             let (e, n) = if lane < segment.filled(batch, L::WIDTH) {
-                let contact = &contacts[contact.entries()[lane] as usize];
-                (contact.restitution, contact.manifold.normal)
+                let index = contact.entries()[lane] as usize;
+                let (contact, is_stopped) = (&contacts[index], stopped.get(index).is_some_and(|is| *is));
+                (if is_stopped { 0.0 } else { contact.restitution }, contact.manifold.normal)
             } else {
                 (0.0, Vec2::ZERO)
             };
