@@ -5,6 +5,7 @@ use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use simpulse::engine::coloring::{Coloring, EXEMPT};
 use simpulse::engine::constraints::rules::Rigid;
+use simpulse::engine::constraints::warm_start::warm_start;
 use simpulse::engine::constraints::{
     Batches, Features, Kernel, Layout, NormalRule, OppositeKind, prepare, sweep,
 };
@@ -96,7 +97,7 @@ fn in_lanes<L: Lanes>(setup: &Setup) -> (Vec<BodyRow>, Vec<[[f32; 2]; 2]>, Batch
     let mut rows = setup.rows.clone();
     let mut batches = batches(setup, L::WIDTH);
     prepare::prepare::<L, Full>(&mut rows, &mut batches, &setup.contacts);
-    sweep::warm_start::<L, Full>(&mut rows, &mut batches);
+    warm_start::<L, Full>(&mut rows, &mut batches);
     for _ in 0..3 {
         sweep::sweep::<L, Full, _>(&mut rows, &mut batches, Rigid { inv_h: INV_H });
     }

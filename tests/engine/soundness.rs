@@ -8,7 +8,8 @@ use simpulse::engine::constraints::piles::PileModes;
 use simpulse::engine::constraints::position::position_sweep;
 use simpulse::engine::constraints::restitution;
 use simpulse::engine::constraints::rules::Rigid;
-use simpulse::engine::constraints::sweep::{self, sweep, sweep_store, warm_start};
+use simpulse::engine::constraints::sweep::{self, sweep, sweep_store};
+use simpulse::engine::constraints::warm_start::warm_start;
 use simpulse::engine::constraints::{
     Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace, prepare,
 };

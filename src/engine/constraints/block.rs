@@ -61,12 +61,10 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
+use super::frame::{BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms};
 use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::NormalRule;
-use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, Rows, TURN, VX, VY, W, apply, arms, for_each_batch,
-    over_segments, spin, to_frame, turn, with_arms,
-};
+use super::stages::{PairState, Stages, in_stages, over_segments};
+use super::sweep::{NormalRule, Rows, unbounded_friction};
 use crate::engine::lanes::{BodyRow, Lanes};
 use crate::engine::params::LINEAR_SLOP;
 
@@ -130,40 +128,24 @@ fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool, c
     over_segments!(segment, L, N, R, NORMAL_FIRST, PARTING; rows, batches, rule, [time, slowest]);
 }
 
-/// Velocities of a contact while its rows are solved, and what they have applied.
-struct Progress<L> {
-    /// Of b against a along t, by motion without spin (m/s).
-    along_t: L,
-    /// Spins (rad/s).
-    w: [L; 2],
-    /// Impulses along n and t (N·s).
-    sum: [L; 2],
+/// The block sweep as a kernel. `PARTING`: see [`Parting`].
+#[derive(Clone, Copy)]
+struct InBlocks<R, const NORMAL_FIRST: bool, const PARTING: bool> {
+    rule: R,
+    /// As [`Parting::time`] and [`Parting::slowest`].
+    time: f32,
+    slowest: f32,
 }
 
-/// The friction rows of a batch, bounded by the normal impulses in its record.
-#[inline(always)]
-fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
-    record: &mut [L],
-    rule: R,
-    mass_sum: L,
-    inertia: [L; 2],
-    progress: &mut Progress<L>,
-) {
-    let layout = const { Layout::of::<N, O>() };
-    let friction = record[layout.friction];
-    for p in 0..N::POINTS {
-        let arm = arms::<L, N, O>(record, &layout, p, 1);
-        let vt = with_arms::<L, N, O>(progress.along_t, progress.w, arm);
-        let at = layout.at(p, layout.tangent_impulse);
-        let (old, mass) = (record[at], rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]));
-        let bound = friction * record[layout.at(p, layout.normal_impulse)];
-        let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
-        record[at] = new;
-        let delta = new - old;
-        progress.sum[1] = progress.sum[1] + delta;
-        progress.along_t = mass_sum.mul_add(delta, progress.along_t);
-        spin::<L, N, O>(&mut progress.w, inertia, arm, delta);
-    }
+/// See [`Stages::Begun`].
+#[derive(Clone, Copy)]
+struct Begun<L> {
+    /// c (N·s), s (kg) and v (m/s) of the normal rows.
+    constant: [L; 2],
+    slope: [L; 2],
+    velocity: [L; 2],
+    /// [`unbounded_friction`] of the friction rows that come last.
+    friction: [L; 2],
 }
 
 #[inline(always)]
@@ -181,45 +163,104 @@ fn segment<
     rule: R,
     [time, slowest]: [f32; 2],
 ) {
-    let layout = const { Layout::of::<N, O>() };
-    let pushes_a = segment.pushes_a();
     // Momentum is that of two bodies that move: against others nothing slides.
-    let (half_time, slowest) = (0.5 * time, if pushes_a { slowest } else { f32::INFINITY });
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
-        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
-        let n = [record[0], record[1]];
-        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
-        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        let [along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
-        let mut progress = Progress { along_t, w: [a[W], b[W]], sum: [L::zero(); 2] };
-        let has_friction = const { N::FRICTION && R::FRICTION };
-        if has_friction && !NORMAL_FIRST {
-            friction_rows::<L, N, O, R>(record, rule, mass_sum, inertia, &mut progress);
-        }
+    let slowest = if segment.pushes_a() { slowest } else { f32::INFINITY };
+    let kernel = InBlocks::<R, NORMAL_FIRST, PARTING> { rule, time, slowest };
+    in_stages::<L, N, O, _, _>(rows, batches, segment, kernel);
+}
 
-        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
+/// The friction rows of a batch, bounded by the normal impulses in its record; `along_t` is the velocity of b against
+/// a along t, by motion without spin (m/s), so far.
+#[inline(always)]
+fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+    record: &mut [L],
+    rule: R,
+    mut along_t: L,
+    state: &mut PairState<L>,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let friction = record[layout.friction];
+    state.sum[1] = L::zero();
+    for p in 0..N::POINTS {
+        let arm = arms::<L, N, O>(record, &layout, p, 1);
+        let vt = with_arms::<L, N, O>(along_t, state.w, arm);
+        let bound = friction * record[layout.at(p, layout.normal_impulse)];
+        let new = unbounded_friction(record, &layout, p, rule, vt).min(bound).max(-bound);
+        let at = layout.at(p, layout.tangent_impulse);
+        let delta = new - record[at];
+        record[at] = new;
+        state.sum[1] = state.sum[1] + delta;
+        along_t = state.mass_sum::<O>().mul_add(delta, along_t);
+        spin::<L, N, O>(&mut state.w, state.inertia, arm, delta);
+    }
+}
+
+impl<L, N, O, R, const NORMAL_FIRST: bool, const PARTING: bool> Stages<L, N, O>
+    for InBlocks<R, NORMAL_FIRST, PARTING>
+where
+    L: Lanes,
+    N: KernelFeatures,
+    O: Opposite,
+    R: NormalRule,
+{
+    type Begun = Begun<L>;
+
+    #[inline(always)]
+    fn nothing() -> Begun<L> {
+        let pair = [L::zero(); 2];
+        Begun { constant: pair, slope: pair, velocity: pair, friction: pair }
+    }
+
+    #[inline(always)]
+    fn begin(
+        self,
+        BodyPair { a, b }: &BodyPair<L>,
+        record: &mut [L],
+        pushes_a: bool,
+        state: &mut PairState<L>,
+        begun: &mut Begun<L>,
+    ) {
+        let layout = const { Layout::of::<N, O>() };
+        let has_friction = const { N::FRICTION && R::FRICTION };
+        let [along_n, along_t] = state.along::<O>(record);
+        if has_friction && !NORMAL_FIRST {
+            friction_rows::<L, N, O, R>(record, self.rule, along_t, state);
+        }
+        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], [record[0], record[1]])[0];
         let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+        for p in 0..N::POINTS {
+            let s = separation::<L, N, O>(record, p, moved, [sine_a, sine_b], [versine_a, versine_b]);
+            let old = record[layout.at(p, layout.normal_impulse)];
+            let mass = record[layout.at(p, layout.normal_mass)];
+            [begun.constant[p], begun.slope[p]] = self.rule.line(!pushes_a, s, mass, old);
+            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            begun.velocity[p] = with_arms::<L, N, O>(along_n, state.w, arm_n);
+            if has_friction && NORMAL_FIRST {
+                let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, state.w, arm_t);
+                begun.friction[p] = unbounded_friction(record, &layout, p, self.rule, vt);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn solve(self, begun: &Begun<L>, record: &mut [L], state: &mut PairState<L>) {
+        let layout = const { Layout::of::<N, O>() };
+        let friction_last = const { N::FRICTION && R::FRICTION && NORMAL_FIRST };
+        let inertia = state.inertia;
         let (mut arm, mut old) = ([[L::zero(); 2]; 2], [L::zero(); 2]);
-        let (mut constant, mut slope, mut v) = ([L::zero(); 2], [L::zero(); 2], [L::zero(); 2]);
         let mut tangent = Rows::<L>::new();
         for p in 0..N::POINTS {
             arm[p] = arms::<L, N, O>(record, &layout, p, 0);
-            let arm_t = arms::<L, N, O>(record, &layout, p, 1);
-            let mut separation = record[layout.at(p, layout.separation)] + moved;
-            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm[p]);
-            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             old[p] = record[layout.at(p, layout.normal_impulse)];
-            let mass = record[layout.at(p, layout.normal_mass)];
-            [constant[p], slope[p]] = rule.line(!pushes_a, separation, mass, old[p]);
-            v[p] = with_arms::<L, N, O>(along_n, progress.w, arm[p]);
-            if has_friction && NORMAL_FIRST {
-                let vt = with_arms::<L, N, O>(along_t, progress.w, arm_t);
-                tangent.load_friction(p, record, &layout, rule, arm_t, vt);
+            if friction_last {
+                let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+                tangent.load_friction(p, record, &layout, self.rule, arm_t, begun.friction[p]);
             }
         }
         let mut coupling = L::zero();
         if N::POINTS == 2 {
-            coupling = mass_sum;
+            coupling = state.mass_sum::<O>();
             if N::ROTATION {
                 coupling = (inertia[1] * arm[0][1]).mul_add(arm[1][1], coupling);
                 if O::HAS_ROW {
@@ -227,37 +268,39 @@ fn segment<
                 }
             }
         }
-        let new = solve_pair::<L>(N::POINTS, constant, slope, v, coupling, old);
+        let new = solve_pair::<L>(N::POINTS, begun.constant, begun.slope, begun.velocity, coupling, old);
+        state.sum[0] = L::zero();
         for p in 0..N::POINTS {
             record[layout.at(p, layout.normal_impulse)] = new[p];
             let delta = new[p] - old[p];
-            progress.sum[0] = progress.sum[0] + delta;
-            spin::<L, N, O>(&mut progress.w, inertia, arm[p], delta);
-            if has_friction && NORMAL_FIRST {
+            state.sum[0] = state.sum[0] + delta;
+            spin::<L, N, O>(&mut state.w, inertia, arm[p], delta);
+            if friction_last {
                 for q in 0..N::POINTS {
                     tangent.answer::<N, O>(q, L::zero(), inertia, arm[p], delta);
                 }
             }
         }
-        if has_friction && NORMAL_FIRST {
-            tangent.solve_friction::<N, O>(record, &layout, new, mass_sum, inertia, &mut progress.w);
-            progress.sum[1] = tangent.sum;
+        if friction_last {
+            tangent.solve_friction::<N, O>(record, &layout, new, state);
+        }
+        if const { NORMAL_FIRST || !N::FRICTION || !R::FRICTION } {
+            state.sum[1] = tangent.sum;
         }
         if const { PARTING && O::HAS_ROW && N::FRICTION && R::FRICTION } {
-            let slides = along_t.max(-along_t) - L::splat(slowest);
+            let [along_n, along_t] = state.along::<O>(record);
+            let slides = along_t.max(-along_t) - L::splat(self.slowest);
             if slides.any_positive() {
-                let [normal, tangent] = progress.sum;
-                let orbital = along_t.mul_add(normal, -(along_n * tangent)) * L::splat(half_time);
+                let [normal, tangent] = state.sum;
+                let orbital = along_t.mul_add(normal, -(along_n * tangent)) * L::splat(0.5 * self.time);
                 let rough = record[layout.friction].min(slides);
                 let taken = rough.select_positive(orbital, L::zero());
-                for (w, inertia) in progress.w.iter_mut().zip(inertia) {
+                for (w, inertia) in state.w.iter_mut().zip(inertia) {
                     *w = inertia.neg_mul_add(taken, *w);
                 }
             }
         }
-        apply::<L, O>(&mut a, &mut b, n, progress.sum, progress.w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
-    });
+    }
 }
 
 /// The impulses of both rows; see the [module](self).

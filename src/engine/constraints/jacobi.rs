@@ -7,9 +7,11 @@
 //! of rows that reads from one place and adds up in another.
 
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind};
+use super::frame::{INV_MASS, VX, VY, W};
 use super::pass::{Pass, PassInput, PassMode, PerLane};
 use super::rules::{Relaxed, Soft};
-use super::sweep::{INV_MASS, VX, VY, W, over_segments, sweep_segment};
+use super::stages::over_segments;
+use super::sweep::sweep_segment;
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under the soft rule, which without springs is the rigid one.

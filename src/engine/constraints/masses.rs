@@ -7,8 +7,9 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
+use super::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
 use super::pass::{Pass, PassInput, PassMode, PerLane};
-use super::sweep::{BodyPair, INV_INERTIA, INV_MASS, arms, for_each_batch, over_segments};
+use super::stages::{for_each_batch, over_segments};
 use crate::engine::lanes::{BodyRow, Lanes};
 
 /// Recomputes the effective masses of all records from the rows.

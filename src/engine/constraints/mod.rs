@@ -1,8 +1,8 @@
 //! Constraints: contacts as lane batches, and the passes that solvers are made of.
 //!
 //! Reading order: [`features`] (what is compiled in, where a record keeps what), [`batches`] and
-//! [`assign`] (which contact is in which lane), [`sweep`] (the kernel) and [`rules`] (what it
-//! solves), [`prepare`], [`impact`], [`plastic`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
+//! [`assign`] (which contact is in which lane), [`frame`] (bodies and rows of a contact), [`stages`] (how a kernel goes
+//! through batches), [`sweep`] (the kernel) and [`rules`] (what it solves), [`warm_start`], [`prepare`], [`impact`], [`plastic`] and [`restitution`], [`motion`]; then [`passes`], which is all that a solver
 //! sees. Beside the Gauss–Seidel sweep there are a [`block`], a [`jacobi`] and a [`position`]
 //! sweep; [`system`] shows the problem as vectors, in lanes as [`point_vector`], [`graph`] as nodes and edges, and [`kept`]
 //! keeps a solver's own numbers, [`piles`] says how stiff and how slow contacts have to be. [`order`] is in which order a sweep goes, [`pass`] how a kernel is
@@ -19,6 +19,7 @@ pub mod coulomb_lcp;
 pub mod descent;
 mod equilibrium;
 pub mod features;
+pub mod frame;
 pub mod graph;
 pub mod impact;
 pub mod jacobi;
@@ -43,12 +44,14 @@ pub mod rebounds;
 pub mod restitution;
 pub mod rules;
 pub mod segment;
+pub mod stages;
 mod statics;
 mod sticky;
 pub mod sweep;
 pub mod system;
 mod touch;
 pub mod types;
+pub mod warm_start;
 
 pub use batches::Batches;
 pub use features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};

@@ -5,9 +5,9 @@
 
 use super::batches::{Batches, SegmentRecords};
 use super::features::{Features, Layout};
+use super::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
 use super::point_vector::places;
 use super::segment::Segment;
-use super::sweep::{INV_INERTIA, INV_MASS, VX, VY, W};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
 
 /// What a pass works on: bodies, and one set of batches with its part of a vector.

@@ -24,11 +24,9 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
+use super::frame::{BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms};
 use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, for_each_batch, over_segments, spin, to_frame, turn,
-    with_arms,
-};
+use super::stages::{for_each_batch, over_segments};
 use crate::engine::lanes::{BodyRow, Lanes};
 
 /// One sweep; see the [module](self).

@@ -26,11 +26,12 @@
 
 use super::batches::{Batches, Segment};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
-use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, for_each_batch, over_segments,
-    spin, to_frame, turn, turned, with_arms,
+use super::frame::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, turned,
+    with_arms,
 };
+use super::pass::{Pass, PassInput, PerLane};
+use super::stages::{for_each_batch, over_segments};
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, RowStore};
 
 /// Displaces bodies; see the [module](self).

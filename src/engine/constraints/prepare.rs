@@ -3,7 +3,7 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind};
 use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::over_segments;
+use super::stages::over_segments;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
 

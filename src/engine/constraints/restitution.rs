@@ -31,8 +31,8 @@
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::bounces::Bounces;
 use super::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
+use super::frame::turn;
 use super::pass::{Pass, PassInput, PerLane};
-use super::sweep::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 use crate::engine::params::RESTITUTION_THRESHOLD;

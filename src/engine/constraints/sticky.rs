@@ -22,13 +22,13 @@
 
 use super::batches::{Batches, Segment, SegmentRecords};
 use super::features::{KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind};
+use super::frame::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
+};
 use super::kept::Kept;
 use super::pass::{Pass, PassInput, PerLane};
 use super::point_vector::places;
-use super::sweep::{
-    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, over_segments, spin, to_frame,
-    turn, with_arms,
-};
+use super::stages::over_segments;
 use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
 
 /// One sweep; see the [module](self). The solver keeps one float per contact point.

@@ -15,7 +15,7 @@
 //! what two bodies do until they touch is not known.
 
 use super::features::Layout;
-use super::sweep::turn;
+use super::frame::turn;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
 use crate::engine::narrowphase::circles::arrival;

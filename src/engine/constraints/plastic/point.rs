@@ -3,8 +3,8 @@
 use super::NONE;
 use crate::engine::constraints::batches::Batches;
 use crate::engine::constraints::features::{Features, Layout};
+use crate::engine::constraints::frame::turn;
 use crate::engine::constraints::segment::Segment;
-use crate::engine::constraints::sweep::turn;
 use crate::engine::constraints::touch::{Frame, Round, couplings, write_arms};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes};
