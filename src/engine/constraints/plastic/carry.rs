@@ -148,6 +148,10 @@ impl PlasticImpacts {
 
     /// A pile at rest begins to bear what has come on it.
     pub(super) fn rest(&mut self, on: &mut On<'_>) {
+        let lies = |p: &Point| p.impulse[0] > 0.0 && on.contacts[p.contact as usize].manifold.count == 2;
+        if !self.points[..self.arrived].iter().any(lies) {
+            return;
+        }
         for point in &self.points {
             for row in point.rows {
                 self.bodies[row as usize].borne += point.borne[0];
