@@ -45,7 +45,8 @@ proptest! {
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
         for k in 0..2 {
-            prop_assert!((after[k] - before[k]).abs() < 1e-5 * scale, "{before:?} {after:?}");
+            // 60 · 14 substeps round each velocity four times, by 2⁻²⁴ of it: √3360 · 6e-8 = 3.5e-6, and six times that.
+            prop_assert!((after[k] - before[k]).abs() < 2.1e-5 * scale, "{before:?} {after:?}");
         }
         // A gap that closes within a step without having been foreseen is off by v dt (see `papers/shim.md`).
         prop_assert!((after[2] - before[2]).abs() < 0.01 * scale, "{before:?} {after:?}");
