@@ -258,9 +258,10 @@ where
                 tangent.load_friction(p, record, &layout, self.rule, arm_t, begun.friction[p]);
             }
         }
+        let mass_sum = state.mass_sum::<O>();
         let mut coupling = L::zero();
         if N::POINTS == 2 {
-            coupling = state.mass_sum::<O>();
+            coupling = mass_sum;
             if N::ROTATION {
                 coupling = (inertia[1] * arm[0][1]).mul_add(arm[1][1], coupling);
                 if O::HAS_ROW {
@@ -282,7 +283,7 @@ where
             }
         }
         if friction_last {
-            tangent.solve_friction::<N, O>(record, &layout, new, state);
+            tangent.solve_friction::<N, O>(record, &layout, new, mass_sum, state);
         }
         if const { NORMAL_FIRST || !N::FRICTION || !R::FRICTION } {
             state.sum[1] = tangent.sum;

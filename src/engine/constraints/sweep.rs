@@ -201,9 +201,10 @@ impl<L: Lanes> Rows<L> {
         record: &mut [L],
         layout: &Layout,
         normal: [L; 2],
+        mass_sum: L,
         state: &mut PairState<L>,
     ) {
-        let (inertia, mass_sum) = (state.inertia, state.mass_sum::<O>());
+        let inertia = state.inertia;
         let friction = record[layout.friction];
         for p in 0..N::POINTS {
             let bound = friction * normal[p];
@@ -337,7 +338,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
             spin::<L, N, O>(&mut state.w, inertia, arm, delta);
         }
         if friction_rows {
-            tangent.solve_friction::<N, O>(record, &layout, normal.impulse, state);
+            tangent.solve_friction::<N, O>(record, &layout, normal.impulse, mass_sum, state);
         }
         state.sum = [normal.sum, tangent.sum];
     }
