@@ -33,20 +33,20 @@
 //!
 //! A body that rocks takes the load from one of its sides, and brings it back. A preload that falls with the load and
 //! is raised under it does the work F Δd in each period: a box of 300 times the mass went on rocking for minutes on a
-//! pyramid. So a contact of two points whose load has fallen waits for [`WAIT`] before its preload is raised again.
+//! pyramid. So a contact of two points whose load has fallen waits for `WAIT` before its preload is raised again.
 //!
 //! # Contacts that roll
 //!
 //! Raised preload moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, d
 //! falls at once where they do and is raised again, so that the pile swells and settles without an end. A contact
-//! of one point is left alone once it has [`HELD`] of its goal,
+//! of one point is left alone once it has `HELD` of its goal,
 //!
 //! ```text
 //! d ← min(d + max(0, ½ goal − d) · rate, (1 + ε) goal)
 //! ```
 //!
 //! What is held is a spring as others are, which makes nothing swing. The sooner it is held the better: its rate is
-//! [`QUICKER`] times as high. Waiting does not help there, some load always falls.
+//! `QUICKER` times as high. Waiting does not help there, some load always falls.
 //!
 //! # Where it begins
 //!
