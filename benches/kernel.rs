@@ -10,8 +10,8 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use simpulse::engine::constraints::NormalRule;
-use simpulse::engine::constraints::rules::{Rigid, Soft};
-use simpulse::engine::constraints::sweep::{sweep, sweep_store};
+use simpulse::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
+use simpulse::engine::constraints::kernels::velocity::sweep::{sweep, sweep_store};
 use simpulse::engine::constraints::{Batches, Kernel, Workspace};
 use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
 use std::hint::black_box;

@@ -44,7 +44,7 @@
 //! # Reading order
 //!
 //! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method,
-//! [`engine::constraints::sweep`] is the kernel that solvers share, [`engine::lanes`] what it is
+//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, [`engine::lanes`] what it is
 //! made of. `lab::scenes` says what is simulated and what is known about it, `lab::metrics` how
 //! errors are measured.
 

@@ -23,9 +23,6 @@ pub struct ManifoldPoint {
 }
 
 /// Up to two contact points that share a normal.
-///
-/// A round contact in flight, whose only point wanders with its bodies, keeps in the place of the second one what it is round
-/// about; see [`Self::centers`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Manifold {
@@ -61,15 +58,11 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// By how much the contact's springs are shortened (m), for solvers that do. Zero when it comes, but for the overlap
-    /// that a body is put into the world with: negative.
-    pub preload: f32,
-    /// Time for which `preload` is not raised (s), for solvers that have one; negative while it gives back what it had
-    /// more than it keeps.
-    pub wait: f32,
-    /// What turns its frame. Of a round shape the time from the beginning of the step to that of the frame (s), see
-    /// [`crate::engine::narrowphase::frames`]; of two points what the preload of the second is more than `preload` (m).
-    pub turn: f32,
+    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner, infinite on a
+    /// face; both 0 where nothing is round. Only found for solvers that ask for them.
+    pub radii: [f32; 2],
+    /// Fills the second cache line.
+    pub unused: f32,
 }
 
 /// Quads of a [`Contact`], and which of them holds what.
@@ -86,8 +79,8 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
-    /// `[of the step's impulses, preload, wait, turn]`.
-    pub const PRELOAD: usize = 7;
+    /// `[of the step's impulses, radii, unused]`.
+    pub const RADII: usize = 7;
 }
 
 impl Contact {
@@ -103,16 +96,6 @@ pub fn pair_key(a: u32, b: u32) -> u64 {
 }
 
 impl Manifold {
-    /// Feature of the second point where it is no point but the centres of a round contact.
-    pub const CENTERS: u32 = 1 << 20;
-
-    /// What the contact is round about, if it is and its frame is that of the beginning of the step: the anchors are those of
-    /// two centres, which are `separation` apart when the shapes touch (m).
-    pub fn centers(&self) -> Option<&ManifoldPoint> {
-        let [_, second] = &self.points;
-        (self.count == 1 && second.feature_id == Self::CENTERS).then_some(second)
-    }
-
     /// The points in use.
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]

@@ -36,7 +36,7 @@ pub const MAX_PUSH_SPEED: f32 = 3.0;
 pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 
 /// Approach speeds above this bounce in any case (m/s); slower ones where they are foreseen, see
-/// [`crate::engine::constraints::impact`].
+/// [`crate::engine::constraints::impacts::waves`].
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 
 /// Most waves of impacts before a step. What still comes in is stopped by the solver.

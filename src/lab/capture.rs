@@ -17,7 +17,7 @@
 //! step begins with k times as much.
 //!
 //! Bouncing is no part of it: sweeps solve the inelastic problem, and restitution is a pass of its
-//! own after them (see [`crate::engine::constraints::restitution`]). So `rebound` is zero.
+//! own after them (see [`crate::engine::constraints::impacts::restitution`]). So `rebound` is zero.
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, ManifoldPoint};

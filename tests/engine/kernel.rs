@@ -4,10 +4,10 @@
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use simpulse::engine::coloring::{Coloring, EXEMPT};
-use simpulse::engine::constraints::rules::Rigid;
-use simpulse::engine::constraints::warm_start::warm_start;
+use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
+use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
 use simpulse::engine::constraints::{
-    Batches, Features, Kernel, Layout, NormalRule, OppositeKind, prepare, sweep,
+    Batches, Features, Kernel, Layout, NormalRule, OppositeKind, kernels::prepare, kernels::velocity::sweep,
 };
 use simpulse::engine::contacts::{Contact, Manifold, ManifoldPoint};
 use simpulse::engine::lanes::{BodyRow, Lanes};

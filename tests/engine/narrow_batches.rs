@@ -48,7 +48,7 @@ impl Scene {
         });
         let ways = vec![Quad::default(); poses.len()];
         let input =
-            Input { poses: &poses, ways: &ways, times: None, shapes: &self.rows, speculative: SPECULATIVE };
+            Input { poses: &poses, ways: &ways, rolling: None, shapes: &self.rows, speculative: SPECULATIVE };
         let (mut changed, mut fresh) = (vec![], vec![]);
         let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
             changed.push(name);

@@ -1,8 +1,8 @@
 //! The law of a rule, read off from what it answers.
 
-use simpulse::engine::constraints::observe::{NormalLaw, ObservedRule};
-use simpulse::engine::constraints::rules::{NormalRule, Rigid, Soft};
-use simpulse::engine::constraints::sweep::Sweep;
+use simpulse::engine::constraints::kernels::observe::{NormalLaw, ObservedRule};
+use simpulse::engine::constraints::kernels::velocity::rules::{NormalRule, Rigid, Soft};
+use simpulse::engine::constraints::kernels::velocity::sweep::Sweep;
 use simpulse::engine::lanes::Lanes;
 
 #[test]

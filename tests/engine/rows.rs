@@ -30,7 +30,7 @@ fn rows_are_complete() {
             assert!(!p.meaning.is_empty() && p.name == p.name.to_lowercase(), "{} {}", v.name, p.name);
         }
         // Iterations count something that the schedule has.
-        let (none, three) = ((v.iterations)(0), (v.iterations)(3));
+        let (none, three) = (v.of_iterations(0), v.of_iterations(3));
         assert!(none != three && three.substeps == 1, "{}", v.name);
     }
 }

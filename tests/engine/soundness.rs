@@ -3,15 +3,16 @@
 //! without a read or write out of place. Run it under valgrind as well (README, Benches).
 
 use simpulse::engine::clock::{Clock, PhaseFilter};
-use simpulse::engine::constraints::bounces::Bounces;
-use simpulse::engine::constraints::piles::PileModes;
-use simpulse::engine::constraints::position::position_sweep;
-use simpulse::engine::constraints::restitution;
-use simpulse::engine::constraints::rules::Rigid;
-use simpulse::engine::constraints::sweep::{self, sweep, sweep_store};
-use simpulse::engine::constraints::warm_start::warm_start;
+use simpulse::engine::constraints::ImpactLaw;
+use simpulse::engine::constraints::impacts::restitution::{self, Begin, Rebound};
+use simpulse::engine::constraints::kernels::position::position_sweep;
+use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
+use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep, sweep_store};
+use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
+use simpulse::engine::constraints::records::bounces::Bounces;
 use simpulse::engine::constraints::{
-    Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace, prepare,
+    Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace,
+    kernels::prepare,
 };
 use simpulse::engine::contacts::{Contact, quad};
 use simpulse::engine::lanes::{
@@ -98,18 +99,17 @@ impl Given {
         }
     }
 
+    fn prepare_bounces<L: Lanes>(&mut self) {
+        let Given { rows, batches, bounces, contacts, increments } = self;
+        let rebound = Rebound { threshold: 1.0, in_flight: true, only_new: false };
+        let begin = Begin { h: 0.01, rebound, stride: ImpactLaw::BOX2D.stride(2), stopped: &[], found: 0.0 };
+        restitution::prepare::<L, Full>(rows, batches, bounces, contacts, increments, &begin);
+    }
+
     /// With side records, as `restitution::prepare` makes them for good batches.
     fn with_bounces<L: Lanes>(mut self) -> Self {
         let mut of = Given::new(good(L::WIDTH));
-        restitution::prepare::<L, Full>(
-            &of.rows,
-            &mut of.batches,
-            &mut of.bounces,
-            &of.contacts,
-            &of.increments,
-            0.01,
-            &[],
-        );
+        of.prepare_bounces::<L>();
         self.bounces = of.bounces;
         self
     }
@@ -127,17 +127,7 @@ fn row_passes<L: Lanes>() -> [Pass; 7] {
         ("warm_start", |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
         ("position_sweep", |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
         ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
-        ("restitution::prepare", |g| {
-            restitution::prepare::<L, Full>(
-                &g.rows,
-                &mut g.batches,
-                &mut g.bounces,
-                &g.contacts,
-                &g.increments,
-                0.01,
-                &[],
-            );
-        }),
+        ("restitution::prepare", |g| g.prepare_bounces::<L>()),
         ("restitution::apply", |g| {
             restitution::apply::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces, 0.01);
         }),
@@ -149,17 +139,7 @@ fn contact_passes<L: Lanes>() -> [Pass; 3] {
     [
         ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
         ("store", |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
-        ("restitution::prepare", |g| {
-            restitution::prepare::<L, Full>(
-                &g.rows,
-                &mut g.batches,
-                &mut g.bounces,
-                &g.contacts,
-                &g.increments,
-                0.01,
-                &[],
-            );
-        }),
+        ("restitution::prepare", |g| g.prepare_bounces::<L>()),
     ]
 }
 
@@ -263,8 +243,7 @@ fn short_rows<L: Lanes>() {
     }
     let mut given = Given { increments: vec![], ..Given::new(good(L::WIDTH)) };
     let pass = |g: &mut Given| {
-        let Given { rows, batches, bounces, contacts, increments } = g;
-        restitution::prepare::<L, Full>(rows, batches, bounces, contacts, increments, 0.01, &[]);
+        g.prepare_bounces::<L>();
     };
     panics("out of bounds", || pass(&mut given));
 }
@@ -410,6 +389,7 @@ fn a_sweep_over_no_rows_panics() {
 #[test]
 fn a_step_says_what_is_wrong_before_it_begins() {
     let input = StepInput {
+        impacts: ImpactLaw::Waves,
         features: Features::FULL,
         budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
         h: 0.01,
@@ -417,9 +397,6 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
-        pile_modes: PileModes::default(),
-        contacts_changed: true,
-        timed_impacts: true,
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };
@@ -450,7 +427,7 @@ fn collide(kind: Kind, width: LaneWidth, pairs: u32, contacts: usize, spoil: imp
     let input = Input {
         poses: &[PoseRow::default()],
         ways: &[Quad::default()],
-        times: None,
+        rolling: None,
         shapes: &shapes,
         speculative: 0.02,
     };
@@ -583,4 +560,11 @@ mod words {
         assert!(!has_word(&code("//! unsafe\nlet x = \"unsafe\"; // unsafe"), "unsafe"));
         assert!(!has_word(&code("#![allow(unsafe_code)]"), "unsafe"));
     }
+}
+
+/// A world can be stepped on any thread.
+#[test]
+fn a_world_is_send() {
+    fn is_send<T: Send>() {}
+    is_send::<simpulse::engine::world::World>();
 }

@@ -3,14 +3,14 @@
 
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
-use simpulse::engine::constraints::kept::KeptSize;
-use simpulse::engine::constraints::point_vector::{dot, scaled, update};
-use simpulse::engine::constraints::sweep::{NormalRule, Sweep};
-use simpulse::engine::constraints::{Passes, System};
+use simpulse::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use simpulse::engine::constraints::records::kept::KeptSize;
+use simpulse::engine::constraints::records::point_vector::{dot, scaled, update};
+use simpulse::engine::constraints::{Passes, Schedule, System};
 use simpulse::engine::lanes::{LaneWidth, Lanes};
 use simpulse::engine::params::{Budget, Parameter};
 use simpulse::engine::shapes::Shape;
-use simpulse::engine::solvers::{Uses, Variant};
+use simpulse::engine::solvers::Variant;
 use simpulse::engine::world::{Order, Settings, World};
 
 /// λ ← max(0, λ − m_eff (v_n + max(s, β s)/h)): closes gaps, and removes the share β of an overlap.
@@ -35,8 +35,6 @@ static ADAPTIVE: Variant = Variant {
     source: "catto2006",
     summary: "sequential impulses until the residual is small",
     budget: Budget { substeps: 1, velocity_iterations: 64, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..ADAPTIVE.budget },
     parameters: &[Parameter {
         name: "tolerance",
         unit: "N·s",
@@ -45,22 +43,18 @@ static ADAPTIVE: Variant = Variant {
         meaning: "residual of the contact law at which a step is solved",
         trials: &[],
     }],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 1, per_body: 0 },
-    breaks: &[],
-    step,
+    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let sweep = Sweep(Lift { inv_h: 1.0 / passes.h(), share: 0.2 });
+    let mut sweep = Sweep(Lift { inv_h: 1.0 / passes.h(), share: 0.2 });
     passes.integrate_velocities();
     passes.warm_start();
     for _ in 0..budget.velocity_iterations {
-        passes.velocity_sweep(Phase::Solve, &sweep);
+        passes.velocity_sweep(Phase::Solve, &mut sweep);
         passes.iteration_done();
         if passes.residual() <= f64::from(passes.parameter(0)) {
             break;
@@ -139,29 +133,13 @@ fn what_it_keeps_follows_the_contact_points() {
 #[test]
 fn vectors_are_the_sweeps_problem() {
     // J v by the system, then impulses applied by it: what a warm start does.
-    static PROBE: Variant = Variant { name: "probe", step: probe, ..ADAPTIVE_ROW };
-    const ADAPTIVE_ROW: Variant = Variant {
-        name: "row",
-        source: "catto2006",
-        summary: "for the test",
-        budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 0, position_iterations: 0 },
-        uses: Uses { velocity: true, relax: false, position: false },
-        iterations: |_| unreachable!(),
-        parameters: &[],
-        softness: None,
-        by_levels: false,
-        piles: false,
-        turning_frames: false,
-        kept: KeptSize { per_point: 0, per_body: 0 },
-        breaks: &[],
-        step: probe,
-    };
+    static PROBE: Variant = Variant { name: "probe", make: || Schedule::boxed(probe), ..Variant::BASE };
     fn probe(passes: &mut Passes<'_>) {
         let h = passes.h();
         passes.integrate_velocities();
         let (mut before, mut after, mut impulses) = (Vec::new(), Vec::new(), Vec::new());
         passes.system().relative_velocities(&mut before);
-        passes.velocity_sweep(Phase::Solve, &Sweep(Lift { inv_h: 1.0 / h, share: 0.0 }));
+        passes.velocity_sweep(Phase::Solve, &mut Sweep(Lift { inv_h: 1.0 / h, share: 0.0 }));
         let mut system = passes.system();
         system.relative_velocities(&mut after);
         system.impulses(&mut impulses);

@@ -4,8 +4,8 @@
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
 use simpulse::engine::constraints::SweepOrder;
-use simpulse::engine::constraints::pass::{PassMode, PassWidth};
-use simpulse::engine::constraints::types::{ConstraintType, TypeInput};
+use simpulse::engine::constraints::kernels::pass::{PassMode, PassWidth};
+use simpulse::engine::constraints::kernels::types::{ConstraintType, TypeInput};
 use simpulse::engine::lanes::{LaneWidth, Lanes, RowStore};
 use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers::{Variant, find};

@@ -5,7 +5,7 @@ use super::harness::Random;
 use super::values;
 use rand::{RngExt, SeedableRng};
 use simpulse::engine::broadphase::BroadPhaseKind;
-use simpulse::engine::constraints::motion::{Integrator, RotationUpdate};
+use simpulse::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::{Order, Settings, World};

@@ -368,7 +368,7 @@ fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() 
     let mut replay = replay(&problem, Sequence::Natural, apgd);
     let rounding = 1e-6 * least.abs();
     for k in 1..200 {
-        let Outcome { impulses, .. } = replay.run(apgd, (apgd.iterations)(k), Start::Cold);
+        let Outcome { impulses, .. } = replay.run(apgd, apgd.of_iterations(k), Start::Cold);
         let bound = 2.0 * 4.0 * square / f64::from(k + 1).powi(2) + rounding;
         let gap = objective(&impulses) - least;
         assert!(gap < bound, "{k}: {gap:e} for {bound:e}");
@@ -381,7 +381,7 @@ fn the_relaxation_parts_in_proportion_to_sliding() {
     let problem = sliding_box();
     let apgd = solvers::find("apgd").unwrap();
     let mut replay = replay(&problem, Sequence::Natural, apgd);
-    let Outcome { velocities, impulses, .. } = replay.run(apgd, (apgd.iterations)(2000), Start::Cold);
+    let Outcome { velocities, impulses, .. } = replay.run(apgd, apgd.of_iterations(2000), Start::Cold);
     let mut pushing = 0;
     for ((c, [un, ut]), l) in
         problem.contacts.iter().zip(problem.contact_velocities(&velocities)).zip(&impulses)
@@ -449,7 +449,7 @@ fn the_order_of_contacts_is_that_of_bodies_in_block_descent() {
     avbd.set(&mut parameters, "beta", 1e9).unwrap();
     let outcome = |order| {
         let mut replay = Replay::new(&problem, order, LaneWidth::W8, parameters).unwrap();
-        replay.run(avbd, (avbd.iterations)(20), Start::Cold)
+        replay.run(avbd, avbd.of_iterations(20), Start::Cold)
     };
     let orders = [Sequence::Natural, Sequence::Colored, Sequence::Shuffled(1), Sequence::Shuffled(2)];
     let outcomes = orders.map(outcome);

@@ -7,6 +7,7 @@ mod contacts;
 mod converge;
 mod elastic;
 mod features;
+mod golden;
 mod impulses;
 mod metrics;
 mod piles;

@@ -3,10 +3,10 @@
 use super::common;
 use glam::Vec2;
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
-use simpulse::engine::constraints::piles::{PileModes, Piles};
-use simpulse::engine::constraints::rules::Softness;
+use simpulse::engine::constraints::kernels::velocity::rules::Softness;
 use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers;
+use simpulse::engine::solvers::shim::piles::modes::{PileModes, Piles};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::scenes::Scene;
@@ -16,7 +16,8 @@ const GRAVITY: Vec2 = Vec2::new(0.0, -10.0);
 
 fn modes(world: &mut World) -> PileModes {
     world.find_contacts();
-    Piles::default().modes(&world.bodies, &mut world.contacts, Vec2::from(world.settings.gravity), [1.0, 1.0])
+    let (gravity, mut kept) = (Vec2::from(world.settings.gravity), world.workspace().kept.clone());
+    Piles::default().modes(&world.bodies, &mut world.contacts, &mut kept, gravity, [1.0, 1.0])
 }
 
 fn scene(name: &str) -> World {

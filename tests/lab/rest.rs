@@ -1,8 +1,10 @@
 //! The law of rest: piles of a few boxes stay where they are at the standard budget.
 
 use simpulse::engine::clock::Phase;
-use simpulse::engine::constraints::Passes;
-use simpulse::engine::constraints::rules::{Frictionless, NormalRule, Soft, angular_frequencies};
+use simpulse::engine::constraints::kernels::velocity::rules::{
+    Frictionless, NormalRule, Soft, angular_frequencies,
+};
+use simpulse::engine::constraints::{Passes, Schedule};
 use simpulse::engine::lanes::Lanes;
 use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION};
 use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
@@ -162,7 +164,7 @@ impl<R: NormalRule> NormalRule for Grainy<R> {
 }
 
 /// `rapier` with such springs.
-static GRAINY: Variant = Variant { name: "grainy", step: grainy_step, ..rapier::SOLVER };
+static GRAINY: Variant = Variant { name: "grainy", make: || Schedule::boxed(grainy_step), ..rapier::SOLVER };
 
 fn grainy_step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());

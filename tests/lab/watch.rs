@@ -1,25 +1,25 @@
 //! Iterations can be watched: every solver shows each of its own, and what it shows is the problem.
 
 use simpulse::engine::constraints::System;
-use simpulse::engine::constraints::passes::Watch;
+use simpulse::engine::constraints::step::Watch;
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
 use simpulse::engine::world::World;
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::Mutex;
 
 /// What a watch saw in one step of a pyramid: iteration and residual of the rigid law (N·s).
 fn watched(variant: &'static Variant, iterations: u32) -> Vec<(u32, f64)> {
     let mut settings = crate::common::settings(variant);
-    settings.budget = (variant.iterations)(iterations);
+    settings.budget = variant.of_iterations(iterations);
     let mut world: World = crate::common::scene("pyramid:4").build(settings).unwrap();
     let h = world.settings.h();
-    let seen = Rc::new(RefCell::new(Vec::new()));
+    let seen = Arc::new(Mutex::new(Vec::new()));
     let to = seen.clone();
-    let look = move |k: u32, system: &mut System<'_>| to.borrow_mut().push((k, system.residual(h)));
+    let look = move |k: u32, system: &mut System<'_>| to.lock().unwrap().push((k, system.residual(h)));
     world.workspace().watch = Some(Watch(Box::new(look)));
     world.step().unwrap();
     world.workspace().watch = None;
-    seen.take()
+    std::mem::take(&mut *seen.lock().unwrap())
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
 
-use super::frames::FrameTimes;
+use super::circles::{self, Rolling};
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
 use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
-use super::{circles, rectangles};
+use super::rectangles;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{
     IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, held, prefetch_records,
@@ -137,8 +137,8 @@ pub struct Input<'a> {
     /// What bodies move and turn by in the coming step, and a little longer, if nothing hinders them: `[x, y, θ, 0]`
     /// (m, rad), by body.
     pub ways: &'a [Quad],
-    /// Of the frames of round contacts, if these are not of the step's beginning.
-    pub times: Option<FrameTimes>,
+    /// Whether radii of curvature are found, and what rolls.
+    pub rolling: Option<Rolling>,
     /// Shapes by number.
     pub shapes: &'a Shapes,
     /// Points farther apart are left out (m).
@@ -225,64 +225,63 @@ fn run<L: Lanes, const KIND: usize>(
 ) -> usize {
     // Vectors that spill do so within cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, ways, times, shapes: Shapes { rows, hulls }, speculative } = input;
+    let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, speculative } = input;
     match const { Kind::ALL[KIND] } {
-        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
+        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0])
+            (rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
         }),
-        Kind::Circles => run_kernel(jobs, indices, contacts, made, times, change, |bodies, shapes| {
-            let poses = Poses::<L>::gather(poses, bodies);
-            let pair = ShapePair::gather(poses, rows, shapes);
-            let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-            circles::in_step(&pair, ways, times, speculative)
-        }),
+        Kind::Circles => {
+            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
+                let poses = Poses::<L>::gather(poses, bodies);
+                let pair = ShapePair::gather(poses, rows, shapes);
+                let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
+                circles::in_step(&pair, ways, rolling, speculative)
+            })
+        }
         Kind::Hulls => {
             let mut pair = Hulls::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, None, change, |bodies, shapes| {
+            run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0])
+                (pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
             })
         }
         Kind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, times, change, |bodies, shapes| {
+            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, round) = pair.in_step(&poses, ways, times, speculative);
-                let touch = touch.on_held(poses.held[0]).with_gap(round.gap);
-                if times.is_some() { touch.about(round.centers, round.reach, round.flies) } else { touch }
+                let (touch, gap, radii) = pair.in_step(&poses, ways, rolling, speculative);
+                (touch.on_held(poses.held[0]).with_gap(gap), radii)
             })
         }
         Kind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, times, change, |bodies, [a, b]| {
+            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
                 let ways = [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, round) = pair.in_step(&poses, ways, times, speculative);
-                let touch = touch.swapped().on_held(poses.held[1]).with_gap(round.gap);
-                let [core, center] = round.centers;
-                if times.is_some() { touch.about([center, core], round.reach, round.flies) } else { touch }
+                let (touch, gap, [hull, circle]) = pair.in_step(&poses, ways, rolling, speculative);
+                (touch.swapped().on_held(poses.held[1]).with_gap(gap), [circle, hull])
             })
         }
     }
 }
 
 /// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
-/// given their bodies and shapes; `times` are those of the frames it makes, if it does.
+/// given their bodies and shapes, and returns their radii of curvature, which are written if `has_radii`.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
     jobs: &Jobs,
     indices: JobIndices,
     contacts: &mut [Contact],
     made: usize,
-    times: Option<FrameTimes>,
+    has_radii: bool,
     change: &mut dyn FnMut(u32, &Contact),
-    mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> Touch<L>,
+    mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> (Touch<L>, [L; 2]),
 ) -> usize {
     let mut points = 0_u32;
     let count = jobs.name.len();
@@ -307,14 +306,14 @@ fn run_kernel<L: Lanes>(
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
-        let touch = kernel(bodies, shapes);
+        let (touch, radii) = kernel(bodies, shapes);
         let target_lanes = LaneIndex::new(&target);
         merge(&touch, bytemuck::cast_slice_mut(contacts), target_lanes);
-        if let Some(times) = times {
+        if has_radii {
             let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
-            let mut last = L::gather_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, target_lanes);
-            last[3] = L::splat(times.unit) * touch.lead;
-            L::scatter_quads::<{ quad::STRIDE }, { quad::PRELOAD }>(quads, target_lanes, last);
+            let [sum, _, _, rest] = L::gather_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes);
+            let last = [sum, radii[0], radii[1], rest];
+            L::scatter_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes, last);
         }
         // Counts in memory once more, so that a batch without changes is one comparison.
         let mut count = [0.0_f32; MOST_LANES];

@@ -13,8 +13,7 @@
 //! it is right at the end of the step, and those that do not touch are left alone. Those that graze each other less
 //! deep, and have passed by the end, may do so until the next step finds them.
 
-use super::frames::{FrameTimes, turned};
-use super::lanes::{Poses, ShapePair, Touch, rotate};
+use super::lanes::{Poses, ShapePair, Touch, abs, dot, rotate};
 use crate::engine::lanes::Lanes;
 use crate::engine::params::LINEAR_SLOP;
 
@@ -58,34 +57,43 @@ pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L
     [product / comes.select_positive(sum, L::splat(1.0)), comes]
 }
 
-/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad);
-/// `times`: of frames, if these are not of the beginning.
+/// What a solver that turns the frames of round contacts asks of the narrow phase.
+///
+/// A contact rolls if its gap changes by less than [`Rolling::limit`] in the coming step. Its gap is that of the step's
+/// beginning, as its normal turns with it; that of another one is [`passing`].
+#[derive(Clone, Copy, Debug)]
+pub struct Rolling {
+    /// Change of the gap up to which a contact rolls (m).
+    pub limit: f32,
+}
+
+impl Rolling {
+    /// Positive where a gap that changes by `along` (m) is that of a contact that rolls.
+    #[inline(always)]
+    pub fn rolls<L: Lanes>(self, along: L) -> L {
+        L::splat(self.limit) - abs(along)
+    }
+}
+
+/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad), and
+/// their radii of curvature, where `rolling` asks for them; see [`Rolling`].
 #[inline(always)]
 pub fn in_step<L: Lanes>(
     pair: &ShapePair<L>,
     ways: [[L; 4]; 2],
-    times: Option<FrameTimes>,
+    rolling: Option<Rolling>,
     speculative: f32,
-) -> Touch<L> {
+) -> (Touch<L>, [L; 2]) {
     let (touch, distance) = with_distance(pair, speculative);
     let way = pair.way(ways);
     let held = pair.poses.held[0];
     let gap = passing(&touch, distance, way);
-    let Some(times) = times else { return touch.on_held(held).with_gap(gap) };
+    let touch = touch.on_held(held);
+    let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
+    let gap = rolling.rolls(dot(touch.normal, way)).select_positive(touch.separation[0], gap);
     // Centres in one place have no direction to turn.
-    let curvature =
-        distance.select_positive(L::splat(1.0) / distance.max(L::splat(f32::MIN_POSITIVE)), L::zero());
-    let frame = times.frame(touch.normal, curvature, way, [touch.separation[0], gap]);
-    let center = |k: usize| {
-        let [x, y, ..] = pair.place[k];
-        turned(rotate(pair.poses.rotation[k], [x, y]), frame.time * ways[k][2])
-    };
-    let size = pair.size.map(|size| size[2]);
-    let touch = Touch { normal: frame.normal, lead: frame.time, ..touch };
-    let centers = [center(0), center(1)];
-    let touch = touch.with_anchors(centers[0], centers[1], size).on_held(held).with_gap(frame.gap);
-    let flies = frame.time.select_positive(L::zero(), curvature);
-    touch.about(centers, size[0] + size[1], flies)
+    let radii = pair.size.map(|size| distance.select_positive(size[2], L::zero()));
+    (touch.with_gap(gap), radii)
 }
 
 /// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.
@@ -116,7 +124,6 @@ pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<
         separation: [separation; 2],
         feature: [zero; 2],
         passes: zero,
-        lead: zero,
     };
     (touch.with_anchors(center_a, center_b, [size_a[2], size_b[2]]), distance)
 }

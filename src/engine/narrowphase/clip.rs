@@ -172,6 +172,5 @@ pub fn touch<L: Lanes>(
         separation: points.map(|p| p[2]),
         feature: points.map(|p| p[3]),
         passes,
-        lead: L::zero(),
     }
 }

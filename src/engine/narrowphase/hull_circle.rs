@@ -5,8 +5,7 @@
 //! is past one of its ends, the centre is h n + o n⊥ from it: along n itself over the face, so
 //! that long segments round nothing, and inside the core.
 
-use super::circles::{PASSING, arrival};
-use super::frames::{Frame, FrameTimes, turned};
+use super::circles::{PASSING, Rolling, arrival};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
@@ -45,15 +44,15 @@ impl<L: Lanes> HullCircle<L> {
 
     /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
     /// than `speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
-    /// `times`: of frames, if these are not of the beginning. And what points are not to be told by.
+    /// And their radii of curvature, where `rolling` asks for them, of the hull and of the circle.
     #[inline(always)]
     pub fn in_step(
         &self,
         poses: &Poses<L>,
         ways: [[L; 4]; 2],
-        times: Option<FrameTimes>,
+        rolling: Option<Rolling>,
         speculative: f32,
-    ) -> (Touch<L>, Round<L>) {
+    ) -> (Touch<L>, L, [L; 2]) {
         let way = self.way(poses, ways);
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
         let rotation_a = poses.rotation[0];
@@ -107,28 +106,24 @@ impl<L: Lanes> HullCircle<L> {
             let passes = corner.min(separation).min(over).min(closest + slop);
             passes.select_positive(raised, separation)
         };
-        let mut frame = Frame { time: zero, normal, gap };
-        let mut normal = rotate(rotation_a, normal);
-        let (mut center, mut between) = (center, poses.centers);
-        let reach = distance - separation;
-        let core = [0, 1].map(|k| distance.neg_mul_add(normal[k], center[k] + between[k]));
-        let mut round = Round { gap, centers: [core, center], reach, flies: zero };
-        if let Some(times) = times {
-            let curvature = corner.select_positive(inverse, zero);
-            frame = times.frame(frame.normal, curvature, way, [separation, gap]);
-            center = turned(center, frame.time * ways[1][2]);
-            between = [0, 1].map(|k| frame.time.mul_add(ways[1][k] - ways[0][k], between[k]));
-            normal = turned(rotate(rotation_a, frame.normal), frame.time * ways[0][2]);
-            round.gap = frame.gap;
+        let mut gap = gap;
+        let mut radii = [zero; 2];
+        if let Some(rolling) = rolling {
+            let rolls = rolling.rolls(dot(normal, way));
+            gap = rolls.select_positive(separation, gap);
             // When it is as far away as it is when it touches, it still has to be past the same end, and above the face.
-            let toward = dot(frame.normal, way) * distance;
-            let [part, comes] = arrival(toward, dot(way, way), [distance, reach]);
+            let reach = distance - separation;
+            let [part, comes] = arrival(dot(normal, way) * distance, dot(way, way), [distance, reach]);
             let part = comes.select_positive(part, zero);
             let (up, aside) = (dot(n, way), dot(t, way));
             let outside = past * part.mul_add(aside, past);
-            let stays = part.mul_add(up, height).min(outside);
-            round.flies = frame.time.select_positive(zero, corner.min(stays));
+            let stays = rolls.select_positive(one, part.mul_add(up, height).min(outside));
+            let curved = corner.select_positive(self.hull.head[0], L::splat(f32::INFINITY));
+            let is_told = corner.select_positive(stays, one);
+            radii = [curved, radius].map(|radius| is_told.select_positive(radius, zero));
         }
+        let normal = rotate(rotation_a, normal);
+        let between = poses.centers;
         // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
         // normal, and friction is all that turns it. a's follows from the centres of mass.
         let arm = half.mul_add(separation, radius);
@@ -142,22 +137,9 @@ impl<L: Lanes> HullCircle<L> {
             separation: [separation; 2],
             feature: [zero; 2],
             passes: zero,
-            lead: frame.time,
         };
-        (touch, round)
+        (touch, gap, radii)
     }
-}
-
-/// What a contact of a hull and a circle is beside its point.
-pub struct Round<L> {
-    /// Signed gap, for a circle that passes by (m).
-    pub gap: L,
-    /// From the centres of mass: the nearest point of the hull's core, and the centre of the circle (m).
-    pub centers: [[L; 2]; 2],
-    /// Distance of these at which the shapes touch (m).
-    pub reach: L,
-    /// Positive where that point of the core is a corner, and the frame that of the beginning of the step.
-    pub flies: L,
 }
 
 impl HullCircle<f32> {

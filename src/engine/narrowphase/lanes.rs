@@ -194,8 +194,6 @@ pub struct Touch<L> {
     pub feature: [L; 2],
     /// Positive where flush faces are apart, and face each other by no more than a graze.
     pub passes: L,
-    /// Time of its frame from the beginning of the step, in the units of ways (1).
-    pub lead: L,
 }
 
 impl<L: Lanes> Touch<L> {
@@ -240,20 +238,6 @@ impl<L: Lanes> Touch<L> {
     #[inline(always)]
     pub fn with_gap(self, gap: L) -> Self {
         Touch { separation: [gap, self.separation[1]], ..self }
-    }
-
-    /// The same contact of one point, and where `is_round` is positive the centres that it is round about (m, from
-    /// the centres of mass), and how far apart these are when the shapes touch (m); see [`Manifold::centers`].
-    #[inline(always)]
-    pub fn about(self, [center_a, center_b]: [[L; 2]; 2], reach: L, is_round: L) -> Self {
-        let name = is_round.select_positive(L::splat(Manifold::CENTERS as f32), L::zero());
-        Touch {
-            anchor_a: [self.anchor_a[0], center_a],
-            anchor_b: [self.anchor_b[0], center_b],
-            separation: [self.separation[0], reach],
-            feature: [self.feature[0], name],
-            ..self
-        }
     }
 }
 

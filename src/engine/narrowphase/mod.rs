@@ -16,10 +16,10 @@
 //! to check this one.
 
 pub mod batch;
+pub mod candidate;
 pub mod circles;
 pub mod clip;
 pub mod epa;
-pub mod frames;
 pub mod gjk;
 pub mod hull;
 pub mod hull_circle;
@@ -89,7 +89,7 @@ fn touch(
         Kind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
         Kind::Circles => {
             let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
-            circles::in_step(&pair, ways, None, speculative_distance)
+            circles::in_step(&pair, ways, None, speculative_distance).0
         }
         Kind::Hulls => {
             let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
@@ -97,13 +97,13 @@ fn touch(
         }
         Kind::HullCircle => {
             let pair = HullCircle::new(HullRow::new(a), row_b);
-            let (touch, round) = pair.in_step(&poses, ways, None, speculative_distance);
-            touch.on_held(held).with_gap(round.gap)
+            let (touch, gap, _) = pair.in_step(&poses, ways, None, speculative_distance);
+            touch.on_held(held).with_gap(gap)
         }
         Kind::CircleHull => {
             let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
-            let (touch, round) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
-            touch.swapped().on_held(held).with_gap(round.gap)
+            let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
+            touch.swapped().on_held(held).with_gap(gap)
         }
     };
     Some(touch)

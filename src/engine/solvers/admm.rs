@@ -24,15 +24,14 @@
 //! with the cone of friction Π and scaled multipliers w; where both agree, u + (µ |ut|, 0) = −ρ D⁻¹ w
 //! is in the polar cone, which is Coulomb's law.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::point_vector::{
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::sweep::Sweep;
+use crate::engine::constraints::records::point_vector::{
     Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, update,
 };
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::sweep::Sweep;
-use crate::engine::constraints::{Passes, PointVector, System, cone};
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::lanes::Lanes;
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
@@ -42,8 +41,6 @@ pub static SOLVER: Variant = Variant {
     source: "boyd2011",
     summary: "a linear problem and a projection on friction cones in turn",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
@@ -63,16 +60,13 @@ pub static SOLVER: Variant = Variant {
             trials: &[3.0, 6.0],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
         (Law::Rest, "20 iterations are too few for tall stacks"),
     ],
-    step,
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

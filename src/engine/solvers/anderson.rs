@@ -24,13 +24,12 @@
 //! γ comes from the normal equations of at most 5 unknowns in `f64`, their diagonal raised by a
 //! billionth.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::matrix::solve_in_place;
-use crate::engine::constraints::point_vector::{difference, dot, plus_scaled, update};
-use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::records::point_vector::{difference, dot, plus_scaled, update};
+use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -39,8 +38,6 @@ pub static SOLVER: Variant = Variant {
     source: "walker2011",
     summary: "Gauss–Seidel sweeps, extrapolated from the last few of them",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
@@ -52,13 +49,9 @@ pub static SOLVER: Variant = Variant {
             trials: &[1.0, 3.0, 5.0],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 /// Most earlier sweeps.

@@ -23,14 +23,13 @@
 //! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. Where
 //! g·(λ⁺ − λ) > 0 momentum is dropped.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::point_vector::{
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::records::point_vector::{
     Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
 };
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, PointVector, System, cone};
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -39,19 +38,14 @@ pub static SOLVER: Variant = Variant {
     source: "mazhar2015",
     summary: "accelerated projected gradients on the convex relaxation: lifts off while sliding",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::BAUMGARTE],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "to the convex relaxation, which is another law"),
         (Law::Rest, "gradients spread a load more slowly than sweeps"),
     ],
-    step,
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 /// L shrinks by this factor per iteration, so that one steep place does not slow all that follow (1).

@@ -11,7 +11,7 @@
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
-//! a colour ([`crate::engine::constraints::descent`]). Sweeps of a step request 6874 B per contact.
+//! a colour (`avbd/descent.rs`). Sweeps of a step request 6874 B per contact.
 //!
 //! **Fails when** iterations are few for the height of a stack: a penalty needs them to grow, and
 //! descent carries a change by one body per iteration. In `f32` a body is lost where penalties exceed
@@ -32,12 +32,17 @@
 //! f ≥ 0 along n, |f| ≤ µ f_n along t. Then λ ← f and, where f is within its bounds, k ← k + β |C|.
 //! From step to step λ keeps the share α γ and k the share γ.
 
+mod descent;
+mod lanes;
+
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::descent::{NORMAL, PER_POINT, TANGENT};
-use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::records::graph::Graph;
+use crate::engine::constraints::records::kept::KeptSize;
+use crate::engine::constraints::step::StepParts;
+use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
 use crate::engine::params::{Budget, Parameter};
+use descent::{Bodies, Descent, NORMAL, PER_POINT, TANGENT};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -46,7 +51,6 @@ pub static SOLVER: Variant = Variant {
     summary: "descent body by body on penalties that grow, with multipliers",
     budget: Budget { substeps: 1, velocity_iterations: 10, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: true, relax: false, position: true },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter {
             name: "alpha",
@@ -73,37 +77,120 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: PER_POINT, per_body: 0 },
+    kept: KeptSize { per_point: PER_POINT, ..KeptSize::NONE },
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),
         (Law::Rest, "pyramid:4 creeps at 9.6 mm/s: friction holds places of the substep's start alone"),
     ],
-    step,
+    impacts: ImpactLaw::None,
+    make: || Box::new(Avbd::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
-    let (budget, h) = (passes.budget(), passes.h());
-    let [alpha, beta, gamma] = [0, 1, 2].map(|i| passes.parameter(i));
-    passes.assign_descent();
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        passes.begin_descent(alpha * gamma, gamma);
-        for _ in 0..budget.velocity_iterations {
-            passes.descend(Phase::Solve, alpha);
-            passes.raise_penalties(Phase::Solve, alpha, beta);
-            passes.iteration_done();
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct Avbd {
+    graph: Graph,
+    descent: Descent,
+}
+
+impl Solver for Avbd {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [alpha, beta, gamma] = [0, 1, 2].map(|i| passes.parameter(i));
+        self.assign(passes);
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            let motion = passes.motion_after_velocities();
+            self.run(passes, Phase::Solve, |descent, on| {
+                descent.begin(on, h, motion, [alpha * gamma, gamma]);
+            });
+            for _ in 0..budget.velocity_iterations {
+                self.descend(passes, Phase::Solve, alpha);
+                self.run(passes, Phase::Solve, |descent, on| descent.raise(on, alpha, beta));
+                passes.iteration_done();
+            }
+            self.run(passes, Phase::Solve, |descent, on| descent.velocities(on, h));
+            for _ in 0..budget.position_iterations {
+                self.descend(passes, Phase::Position, 0.0);
+            }
+            keep_impulses(passes, h);
+            passes.hide_turns();
+            passes.end_substep(substep);
         }
-        passes.velocities_of_descent();
-        for _ in 0..budget.position_iterations {
-            passes.descend(Phase::Position, 0.0);
-        }
-        passes.keep_impulses(Phase::Solve, |kept| [h * kept[NORMAL], h * kept[TANGENT]]);
-        passes.hide_turns();
-        passes.end_substep(substep);
     }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.graph.held_bytes() + self.descent.held_bytes()
+    }
+}
+
+impl Avbd {
+    /// Gives bodies their lanes, once a step and before all else of it.
+    fn assign(&mut self, passes: &mut Passes<'_>) {
+        if !passes.runs(Phase::Solve) {
+            return;
+        }
+        passes.build_graph(&mut self.graph);
+        let StepParts { work: Workspace { rows, lanes, serial, .. }, contacts, width, .. } = passes.parts();
+        let sequence = lanes.segments().is_empty().then(|| serial.contact());
+        self.descent.assign(rows, contacts, &self.graph, width, sequence);
+    }
+
+    /// Every body takes a step of block descent; of errors at the start of the substep the share `alpha` is left alone.
+    fn descend(&mut self, passes: &mut Passes<'_>, phase: Phase, alpha: f32) {
+        self.run(passes, phase, |descent, on| descent.descend(on, alpha));
+        passes.count_sweep(2);
+    }
+
+    fn run(
+        &mut self,
+        passes: &mut Passes<'_>,
+        phase: Phase,
+        work: impl FnOnce(&mut Descent, &mut Bodies<'_>),
+    ) {
+        if !passes.runs(phase) {
+            return;
+        }
+        let StepParts { work: Workspace { rows, kept, .. }, contacts, input, clock, .. } = passes.parts();
+        let Features { rotation, friction, .. } = input.features;
+        work(&mut self.descent, &mut Bodies { rows, kept, contacts, rotation, friction });
+        // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
+        let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);
+        clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);
+        passes.book_rows([32.0, 16.0]);
+        passes.parts().clock.lap(phase);
+    }
+}
+
+/// Writes the impulses h λ (N·s) of the forces that are kept per point into the records, rounded into their cones, for who
+/// asks what the contacts bore.
+fn keep_impulses(passes: &mut Passes<'_>, h: f32) {
+    if !passes.runs(Phase::Solve) {
+        return;
+    }
+    let StepParts { work: Workspace { lanes, serial, kept, .. }, contacts, input, clock, .. } =
+        passes.parts();
+    for batches in [lanes, serial] {
+        let width = batches.width();
+        batches.for_each_lane(&input.features, |contact, layout, record, lane| {
+            let c = &contacts[contact as usize];
+            for p in 0..c.manifold.count as usize {
+                let kept = kept.point(contact as usize, p);
+                let [normal, tangent] = [h * kept[NORMAL], h * kept[TANGENT]];
+                let bound = c.friction * normal;
+                record[layout.at(p, layout.normal_impulse) * width + lane] = normal;
+                if layout.has_friction {
+                    let at = layout.at(p, layout.tangent_impulse) * width + lane;
+                    record[at] = tangent.min(bound).max(-bound);
+                }
+            }
+        });
+    }
+    clock.lap(Phase::Solve);
 }

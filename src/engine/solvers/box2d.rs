@@ -2,9 +2,9 @@
 //!
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
-//! **Departures.** Bounces are this crate's ([`crate::engine::constraints::restitution`]), which
+//! **Departures.** Bounces are this crate's ([`crate::engine::constraints::impacts::restitution`]), which
 //! keep energy; Box2D gives back e times the speed of approach. Manifolds of bodies that hardly moved are kept as in
-//! Box2D, but a disc's never ([`crate::engine::world`]). The order is that of this crate's colours.
+//! Box2D, but a disc's never (`box2d/recycle.rs`). The order is that of this crate's colours.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
 //! without friction and `relax_iterations` rigid ones with it. Sweeps of a step request 1638 B per contact.
@@ -12,12 +12,18 @@
 //! **Fails when** [`super::soft_step`] does, and what slides or sticks is less accurate: in a substep
 //! friction sees the normal velocities that the springs left, once.
 
+mod recycle;
+
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::constraints::{ImpactLaw, Passes, Solver};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
+use recycle::Recycled;
+
+/// Place of its distance among the parameters.
+const RECYCLE_DISTANCE: usize = 2;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -26,12 +32,12 @@ pub static SOLVER: Variant = Variant {
     summary: "soft contacts in substeps, friction while relaxing only: Box2D 3.2",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[
         Parameter::CONTACT_HERTZ,
         Parameter::PUSH_SPEED,
         Parameter {
-            name: super::RECYCLE_DISTANCE,
+            name: "recycle_distance",
             unit: "m",
             default: 10.0 * LINEAR_SLOP,
             range: [0.0, 1.0],
@@ -40,13 +46,39 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Box::new(Box2d::default()),
+    ..Variant::BASE
 };
+
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct Box2d {
+    recycled: Recycled,
+}
+
+impl Solver for Box2d {
+    fn before_collision(&mut self, scene: &mut Scene<'_>, collision: &mut Collision) {
+        let distance = scene.parameters[RECYCLE_DISTANCE];
+        self.recycled.update(scene.candidates, scene.contacts, distance, &mut collision.keep);
+    }
+
+    fn after_collision(&mut self, scene: &mut Scene<'_>) {
+        self.recycled.take_up(scene.candidates, scene.contacts);
+    }
+
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        step(passes);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.recycled.held_bytes()
+    }
+}
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());

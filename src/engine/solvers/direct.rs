@@ -37,14 +37,13 @@
 //! In fixed states the law is linear, u = K λ + b. A step goes towards the solution of those states as
 //! far as the residual of the natural map falls.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::matrix::solve_in_place;
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::system::{Pair, PointRows};
-use crate::engine::constraints::{Passes, System};
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
+use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::vectors::system::{Pair, PointRows};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule, System};
 use crate::engine::lanes::BodyRow;
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
@@ -54,8 +53,6 @@ pub static SOLVER: Variant = Variant {
     source: "alart1991",
     summary: "Newton's or Lemke's method on the contact law, for small scenes; else sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
@@ -83,16 +80,13 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::NoAllocation, "matrices are as large as the scene"),
         (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
     ],
-    step,
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 /// ε: shift of the unit diagonal (1).
@@ -362,7 +356,7 @@ impl Problem {
         Some(impulses)
     }
 
-    /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::coulomb_lcp`].
+    /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::numerics::coulomb_lcp`].
     fn by_lemke(&self) -> Option<Vec<f64>> {
         let n = self.start.len();
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();

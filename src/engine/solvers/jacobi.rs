@@ -19,9 +19,9 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
+use crate::engine::constraints::{ImpactLaw, Passes, Solver};
+use crate::engine::lanes::{BodyRow, held};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
@@ -31,7 +31,7 @@ pub static SOLVER: Variant = Variant {
     summary: "all contacts at once against the old velocities, soft contacts and relaxing sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[
         Parameter::CONTACT_HERTZ_OF_STEP,
         Parameter {
@@ -45,18 +45,37 @@ pub static SOLVER: Variant = Variant {
         Parameter::push_speed(4.0),
     ],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "diverges where a body has three contacts or more"),
         (Law::Rest, "diverges where a body has three contacts or more"),
     ],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Box::new(Jacobi::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct Jacobi {
+    /// Sums of velocity increments. `[rows]`
+    sums: Vec<BodyRow>,
+}
+
+impl Solver for Jacobi {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        step(passes, &mut self.sums);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        held(&self.sums)
+    }
+}
+
+fn step(passes: &mut Passes<'_>, sums: &mut Vec<BodyRow>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [hertz, relaxation, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
     let soft = Soft::new(
@@ -70,12 +89,12 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_velocities();
         passes.warm_start();
         for _ in 0..budget.velocity_iterations {
-            passes.jacobi_sweep(Phase::Solve, soft, relaxation);
+            passes.jacobi_sweep(Phase::Solve, soft, relaxation, sums, None);
             passes.iteration_done();
         }
         passes.integrate_positions();
         for _ in 0..budget.relax_iterations {
-            passes.jacobi_sweep(Phase::Relax, rigid, relaxation);
+            passes.jacobi_sweep(Phase::Relax, rigid, relaxation, sums, None);
         }
         passes.end_substep(substep);
     }

@@ -26,9 +26,11 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::engine::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
+use crate::engine::constraints::records::graph::Graph;
+use crate::engine::constraints::{ImpactLaw, Passes, Solver};
+use crate::engine::lanes::{BodyRow, held};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
@@ -38,49 +40,69 @@ pub static SOLVER: Variant = Variant {
     summary: "all contacts at once, each with a part of its bodies' masses",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 4, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),
         (Law::Rest, "12 slow sweeps are too few for stacks"),
     ],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Box::new(MassSplitting::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
-    let (budget, h) = (passes.budget(), passes.h());
-    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let soft = Soft::new(
-        angular_frequencies(hertz, CONTACT_HERTZ_FRACTION_OF_STEP, h),
-        CONTACT_DAMPING_RATIO,
-        push_speed,
-        h,
-    );
-    let rigid = Soft::without_springs(h);
-    passes.build_graph();
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        passes.warm_start();
-        sweeps(passes, Phase::Solve, soft, budget.velocity_iterations);
-        passes.integrate_positions();
-        sweeps(passes, Phase::Relax, rigid, budget.relax_iterations);
-        passes.end_substep(substep);
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct MassSplitting {
+    graph: Graph,
+    masses: ScaledMasses,
+    /// Sums of velocity increments. `[rows]`
+    sums: Vec<BodyRow>,
+}
+
+impl Solver for MassSplitting {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
+        let soft = Soft::new(
+            angular_frequencies(hertz, CONTACT_HERTZ_FRACTION_OF_STEP, h),
+            CONTACT_DAMPING_RATIO,
+            push_speed,
+            h,
+        );
+        let rigid = Soft::without_springs(h);
+        passes.build_graph(&mut self.graph);
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            passes.warm_start();
+            self.sweeps(passes, Phase::Solve, soft, budget.velocity_iterations);
+            passes.integrate_positions();
+            self.sweeps(passes, Phase::Relax, rigid, budget.relax_iterations);
+            passes.end_substep(substep);
+        }
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.graph.held_bytes() + self.masses.held_bytes() + held(&self.sums)
     }
 }
 
-/// Sweeps on split bodies.
-fn sweeps(passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
-    passes.scale_masses(phase, |body, graph| graph.constraints_of(body).max(1) as f32);
-    for _ in 0..times {
-        passes.jacobi_sweep(phase, rule, 1.0);
-        if phase == Phase::Solve {
-            passes.iteration_done();
+impl MassSplitting {
+    /// Sweeps on split bodies.
+    fn sweeps(&mut self, passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
+        let MassSplitting { graph, masses, sums } = self;
+        passes.scale_masses(phase, masses, |body| graph.constraints_of(body).max(1) as f32);
+        for _ in 0..times {
+            passes.jacobi_sweep(phase, rule, 1.0, sums, Some(masses));
+            if phase == Phase::Solve {
+                passes.iteration_done();
+            }
         }
+        passes.restore_masses(phase, masses);
     }
-    passes.restore_masses(phase);
 }

@@ -11,8 +11,8 @@
 //! Everything else (command line, study, tests, benches, records) follows from the row.
 
 use crate::engine::clock::Clock;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::{Passes, StepInput, WorkCount, Workspace};
+use crate::engine::constraints::records::kept::KeptSize;
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
@@ -80,9 +80,6 @@ pub static VARIANTS: [&Variant; 27] = [
 /// The solver that is used where none is named.
 pub const DEFAULT: &str = "shim";
 
-/// Name of a parameter that the world reads, see [`Variant::recycle_distance`].
-pub const RECYCLE_DISTANCE: &str = "recycle_distance";
-
 /// Which fields of a [`Budget`] a solver's schedule has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -125,29 +122,23 @@ pub struct Variant {
     pub budget: Budget,
     /// The budget fields it reads, besides `substeps`.
     pub uses: Uses,
-    /// The budget of `k` of what the solver itself calls iterations, without substeps: how
+    /// `k` of what the solver itself calls iterations, without substeps, in the place of those of its standard budget: how
     /// convergence is counted.
-    pub iterations: fn(k: u32) -> Budget,
+    pub iterations: fn(standard: Budget, k: u32) -> Budget,
     /// Its own parameters, [`MAX_PARAMETERS`] at most.
     pub parameters: &'static [Parameter],
     /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
     /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
     /// such a contact gives way, and metrics tell that from error.
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
-    /// Contacts are grouped by their level in the contact graph, see
-    /// [`crate::engine::constraints::SweepOrder::Level`].
-    pub by_levels: bool,
-    /// It is told what piles ask of soft contacts, see [`crate::engine::constraints::Passes::pile_modes`].
-    pub piles: bool,
-    /// Impacts have their time within a step, and round contacts the frame of theirs; see
-    /// [`crate::engine::narrowphase::frames`].
-    pub turning_frames: bool,
-    /// What it keeps from step to step beside impulses.
+    /// What it does where bodies hit each other, as its source has it.
+    pub impacts: ImpactLaw,
+    /// Numbers that it keeps from step to step, beside impulses.
     pub kept: KeptSize,
     /// What it cannot promise, and why.
     pub breaks: &'static [(Law, &'static str)],
-    /// Its schedule: all passes of one step.
-    pub step: fn(&mut Passes<'_>),
+    /// Makes one for a world: its schedule, and what it keeps.
+    pub make: fn() -> Box<dyn Solver>,
 }
 
 /// The variant called `name`.
@@ -158,18 +149,25 @@ pub fn find(name: &str) -> Result<&'static Variant, Error> {
 }
 
 impl Variant {
-    /// Prepares and solves one step; returns what was done.
-    pub fn run(
-        &self,
-        work: &mut Workspace,
-        contacts: &mut [Contact],
-        clock: &mut Clock,
-        input: &StepInput,
-        width: LaneWidth,
-    ) -> WorkCount {
-        let mut passes = Passes::new(work, contacts, clock, input, width);
-        (self.step)(&mut passes);
-        passes.finish()
+    /// What most rows have in common: sequential impulses in one substep, counted in velocity sweeps.
+    pub const BASE: Variant = Variant {
+        name: "",
+        source: "",
+        summary: "",
+        budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
+        uses: Uses { velocity: true, relax: false, position: false },
+        iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, ..standard },
+        parameters: &[],
+        softness: None,
+        impacts: ImpactLaw::Bias,
+        kept: KeptSize::NONE,
+        breaks: &[],
+        make: || Schedule::boxed(|_| {}),
+    };
+
+    /// The budget of `k` of what the solver itself calls iterations, without substeps.
+    pub fn of_iterations(&self, k: u32) -> Budget {
+        (self.iterations)(self.budget, k)
     }
 
     /// Its parameters' standard values.
@@ -203,14 +201,22 @@ impl Variant {
         Ok(())
     }
 
-    /// How far (m) two bodies may move against each other before the world looks for their manifold again: the
-    /// parameter `recycle_distance`, or 0 without one.
-    pub fn recycle_distance(&self, values: &Parameters) -> f32 {
-        self.parameters.iter().zip(values).find(|(p, _)| p.name == RECYCLE_DISTANCE).map_or(0.0, |(_, v)| *v)
-    }
-
     /// Whether it promises `law`.
     pub fn promises(&self, law: Law) -> bool {
         self.breaks.iter().all(|(broken, _)| *broken != law)
     }
+}
+
+/// Prepares and solves one step; returns what was done.
+pub fn run(
+    solver: &mut dyn Solver,
+    work: &mut Workspace,
+    contacts: &mut [Contact],
+    clock: &mut Clock,
+    input: &StepInput,
+    width: LaneWidth,
+) -> WorkCount {
+    let mut passes = Passes::new(work, contacts, clock, input, width);
+    solver.step(&mut passes);
+    passes.finish()
 }

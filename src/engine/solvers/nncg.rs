@@ -20,12 +20,11 @@
 //!
 //! v follows by M⁻¹Jᵀ β p. The next sweep brings λ back to its bounds.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::point_vector::{difference, dot, scaled, sum, update};
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::records::point_vector::{difference, dot, scaled, sum, update};
+use crate::engine::constraints::{Passes, Schedule, SweepOrder};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -34,16 +33,10 @@ pub static SOLVER: Variant = Variant {
     source: "silcowitz2010",
     summary: "conjugate gradients around symmetric sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::BAUMGARTE],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

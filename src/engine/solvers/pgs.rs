@@ -33,11 +33,10 @@
 //! so that a later row's push can be taken back. Friction clamps its own accumulated
 //! impulse to ±µλ. The accumulated impulses are kept, and the next step starts from them.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -46,16 +45,10 @@ pub static SOLVER: Variant = Variant {
     source: "catto2006",
     summary: "sequential impulses with warm starting and Baumgarte stabilisation",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::BAUMGARTE],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

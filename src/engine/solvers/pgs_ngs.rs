@@ -15,9 +15,8 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Rigid;
-use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::constraints::kernels::velocity::rules::Rigid;
+use crate::engine::constraints::{Passes, PositionSweep, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
 
 /// See the [module](self).
@@ -27,15 +26,10 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses without position feedback; nonlinear position sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 2 },
     uses: Uses { velocity: true, relax: false, position: true },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::CORRECTION],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

@@ -13,9 +13,8 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
@@ -25,15 +24,13 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses on soft contacts, then relaxing sweeps, without substeps",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::push_speed(2.0)],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

@@ -15,9 +15,8 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Touching;
-use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::constraints::kernels::velocity::rules::Touching;
+use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION};
 
 /// See the [module](self).
@@ -27,15 +26,10 @@ pub static SOLVER: Variant = Variant {
     summary: "positions pushed apart, then approach velocities removed; no warm starting, no friction",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
     uses: Uses { velocity: true, relax: false, position: true },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
-    parameters: &[],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "no friction and no warm starting")],
-    step,
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

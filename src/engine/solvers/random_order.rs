@@ -15,11 +15,10 @@
 //!
 //! **Fails when** [`super::pgs`] does: news travel no further.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{Passes, Schedule, SweepOrder};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -28,8 +27,6 @@ pub static SOLVER: Variant = Variant {
     source: "cottle1992",
     summary: "sequential impulses, in another order each sweep",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
@@ -41,13 +38,9 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

@@ -18,9 +18,8 @@
 
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Frictionless, Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
@@ -30,15 +29,12 @@ pub static SOLVER: Variant = Variant {
     summary: "soft contacts in substeps, both points at once, friction while stabilising: rapier",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[],
-    step,
+    impacts: ImpactLaw::RAPIER,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

@@ -19,11 +19,14 @@
 //! bodies above, and the bodies below do not feel it. Momentum is lost to them. Everything seems lighter
 //! from below, a lever tips over the wrong way, and what swings is damped.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
+use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::records::graph::Graph;
+use crate::engine::constraints::{Passes, Solver, SweepOrder};
+use crate::engine::contacts::Contact;
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -32,44 +35,60 @@ pub static SOLVER: Variant = Variant {
     source: "guendelman2003",
     summary: "sequential impulses, then a sweep from the ground up over immovable bodies",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::BAUMGARTE],
-    softness: None,
-    by_levels: true,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Momentum, "in the last sweep bodies below do not answer"),
         (Law::Converges, "the last sweep solves another problem"),
         (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not feel that what it bears leans"),
     ],
-    step,
+    make: || Box::new(Shock::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
-    let budget = passes.budget();
-    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        passes.warm_start();
-        for _ in 0..budget.velocity_iterations {
-            passes.sweep(Phase::Solve, &rule);
-            passes.iteration_done();
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct Shock {
+    graph: Graph,
+    masses: ScaledMasses,
+}
+
+impl Solver for Shock {
+    fn levels(&mut self, bodies: &Bodies, contacts: &[Contact]) -> Option<&Graph> {
+        let ends = contacts.iter().map(|c| [c.body_a, c.body_b]);
+        self.graph.build(bodies.len(), ends, |body| bodies.is_dynamic(body as usize));
+        Some(&self.graph)
+    }
+
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let budget = passes.budget();
+        let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+        let Shock { graph, masses } = self;
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            passes.warm_start();
+            for _ in 0..budget.velocity_iterations {
+                passes.sweep(Phase::Solve, &rule);
+                passes.iteration_done();
+            }
+            for level in 1..passes.levels() {
+                passes.set_order(SweepOrder::Level(level));
+                // The world and what hangs free of it have no level that is below another.
+                let factor = |body| if graph.levels()[body] < level { 0.0 } else { 1.0 };
+                passes.scale_masses(Phase::Solve, masses, factor);
+                passes.sweep(Phase::Solve, &rule);
+                passes.restore_masses(Phase::Solve, masses);
+            }
+            passes.set_order(SweepOrder::Forward);
+            passes.integrate_positions();
+            passes.end_substep(substep);
         }
-        for level in 1..passes.levels() {
-            passes.set_order(SweepOrder::Level(level));
-            // The world and what hangs free of it have no level that is below another.
-            passes.scale_masses(
-                Phase::Solve,
-                |body, graph| if graph.levels()[body] < level { 0.0 } else { 1.0 },
-            );
-            passes.sweep(Phase::Solve, &rule);
-            passes.restore_masses(Phase::Solve);
-        }
-        passes.set_order(SweepOrder::Forward);
-        passes.integrate_positions();
-        passes.end_substep(substep);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.graph.held_bytes() + self.masses.held_bytes()
     }
 }

@@ -6,7 +6,7 @@
 //! `macklin2019` (substeps instead of iterations).
 //!
 //! **Departures.** From the second substep on, the warm start is a pass over bodies, not
-//! over constraints (see [`crate::engine::constraints::motion::Motion::extrapolate_velocities`]);
+//! over constraints (see [`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]);
 //! in exact arithmetic the result is the same. Contacts with static and kinematic bodies are
 //! twice as stiff, as in the source.
 //!
@@ -20,9 +20,8 @@
 
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
 use crate::engine::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
@@ -32,15 +31,12 @@ pub static SOLVER: Variant = Variant {
     summary: "substeps, soft contacts and a relaxing sweep without position feedback",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::DAMPING_RATIO, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
-    breaks: &[],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

@@ -12,11 +12,10 @@
 //! (the second point of a box is half of the first) gain less, and from 2 on nothing converges. With
 //! few sweeps a large ω leaves larger errors than none.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -25,8 +24,6 @@ pub static SOLVER: Variant = Variant {
     source: "cottle1992",
     summary: "sequential impulses, over-relaxed",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
@@ -38,13 +35,9 @@ pub static SOLVER: Variant = Variant {
             trials: &[1.0, 1.2, 1.4, 1.6],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

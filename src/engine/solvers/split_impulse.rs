@@ -15,9 +15,9 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::{Rigid, Soft};
+use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
+use crate::engine::constraints::{Passes, Solver};
+use crate::engine::lanes::{BodyRow, held};
 use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -27,21 +27,37 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses; overlap by pseudo-velocities that are forgotten",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 4 },
     uses: Uses { velocity: true, relax: false, position: true },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter {
         meaning: "share of the overlap that pseudo-velocities remove per step",
         ..Parameter::CORRECTION
     }],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Box::new(SplitImpulse::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct SplitImpulse {
+    /// Rows as they were before bodies are pushed apart.
+    before: Vec<BodyRow>,
+}
+
+impl Solver for SplitImpulse {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        step(passes, &mut self.before);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        held(&self.before)
+    }
+}
+
+fn step(passes: &mut Passes<'_>, before: &mut Vec<BodyRow>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rigid = Rigid::rule(h);
     let push = Soft::baumgarte(passes.parameter(0), MAX_PUSH_SPEED, h).frictionless();
@@ -53,11 +69,41 @@ fn step(passes: &mut Passes<'_>) {
             passes.iteration_done();
         }
         passes.integrate_positions();
-        passes.with_pseudo_velocities(Phase::Position, |passes| {
+        with_pseudo_velocities(passes, before, |passes| {
             for _ in 0..budget.position_iterations {
                 passes.push_sweep(Phase::Position, &push);
             }
         });
         passes.end_substep(substep);
     }
+}
+
+/// Puts velocities and impulses aside, lets `solve` find others that begin at zero, moves bodies by
+/// them for one substep and brings back those that were put aside.
+fn with_pseudo_velocities(
+    passes: &mut Passes<'_>,
+    before: &mut Vec<BodyRow>,
+    solve: impl FnOnce(&mut Passes<'_>),
+) {
+    if !passes.runs(Phase::Position) {
+        return;
+    }
+    let (mut impulses, mut zero) = (passes.vector(), passes.vector());
+    let mut system = passes.system();
+    system.lane_impulses(&mut impulses);
+    system.set_lane_impulses(&mut zero);
+    let rows = &mut passes.parts().work.rows;
+    before.clone_from(rows);
+    rows.iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
+    solve(passes);
+    passes.over_bodies(Phase::Position, |rows, motion| {
+        motion.advance(rows);
+        for (row, before) in rows.iter_mut().zip(before.iter()) {
+            row.velocity = before.velocity;
+        }
+    });
+    passes.with_system(Phase::Position, |system| system.set_lane_impulses(&mut impulses));
+    passes.give_back([impulses, zero]);
+    let row = size_of::<BodyRow>() as f64;
+    passes.book_rows([2.0 * row, 2.0 * row]);
 }

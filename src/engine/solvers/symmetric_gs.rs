@@ -13,11 +13,10 @@
 //! **Fails when** [`super::pgs`] does. In natural order a column of discs converges by 0.957
 //! per iteration and by 0.976 per plain sweep, which is no gain per sweep; colours carry news by one contact a sweep either way.
 
-use super::{Law, Uses, Variant};
+use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Baumgarte;
-use crate::engine::constraints::{Passes, SweepOrder};
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{Passes, Schedule, SweepOrder};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -26,16 +25,10 @@ pub static SOLVER: Variant = Variant {
     source: "cottle1992",
     summary: "sequential impulses, forward and back again",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
-    uses: Uses { velocity: true, relax: false, position: false },
-    iterations: |k| Budget { velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::BAUMGARTE],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
-    step,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

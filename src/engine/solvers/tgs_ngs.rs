@@ -15,9 +15,8 @@
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kept::KeptSize;
-use crate::engine::constraints::rules::Rigid;
-use crate::engine::constraints::{Passes, PositionSweep};
+use crate::engine::constraints::kernels::velocity::rules::Rigid;
+use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
 
 /// See the [module](self).
@@ -27,15 +26,11 @@ pub static SOLVER: Variant = Variant {
     summary: "substeps of one rigid velocity sweep and one nonlinear position sweep",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: true, relax: false, position: true },
-    iterations: |k| Budget { substeps: 1, velocity_iterations: k, ..SOLVER.budget },
     parameters: &[Parameter::CORRECTION],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[(Law::Rest, "jitters at its standard budget")],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
 };
 
 fn step(passes: &mut Passes<'_>) {

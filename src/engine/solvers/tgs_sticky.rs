@@ -13,11 +13,15 @@
 //! **Fails when** stacks are tall: without a warm start each step begins cold, and 0.8 of an
 //! overlap per substep is pushed out as velocity.
 
+mod sweep;
+
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
+use crate::engine::constraints::records::kept::KeptSize;
+use crate::engine::constraints::step::StepParts;
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
 use crate::engine::params::{Budget, LINEAR_SLOP, Parameter};
+use sweep::{BookDrift, LoadDrift, Sticky, StickySweep};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -26,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     summary: "substeps; friction holds places instead of velocities; no warm start",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
-    iterations: |k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[
         Parameter {
             name: "baumgarte",
@@ -46,42 +50,83 @@ pub static SOLVER: Variant = Variant {
         },
         Parameter::push_speed(4.0),
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 1, per_body: 0 },
+    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
     breaks: &[
         (Law::Cone, "a point may take its share of the whole manifold's load"),
         (Law::Converges, "friction solves for places, which is another law"),
         (Law::Rest, "no warm start"),
     ],
-    step,
+    impacts: ImpactLaw::BOX2D,
+    make: || Box::new(TgsSticky::default()),
+    ..Variant::BASE
 };
 
 /// Points that are farther apart (m) do not stick.
 const REACH: f32 = 2.0 * LINEAR_SLOP;
 
-fn step(passes: &mut Passes<'_>) {
-    let budget = passes.budget();
-    let [fraction, stick, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-    passes.forget_impulses();
-    passes.load_drift();
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        for _ in 0..budget.velocity_iterations {
-            passes.sticky_sweep(Phase::Solve, fraction, push_speed, stick, REACH);
-            passes.iteration_done();
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct TgsSticky {
+    /// How far each point has drifted before the step (m), in the order of the lanes.
+    drifts: PointVector,
+}
+
+impl Solver for TgsSticky {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [fraction, stick, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
+        passes.forget_impulses();
+        self.load(passes);
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            for _ in 0..budget.velocity_iterations {
+                self.sweep(passes, Phase::Solve, Sticky { h, fraction, push_speed, stick, reach: REACH });
+                passes.iteration_done();
+            }
+            passes.integrate_positions();
+            if substep + 1 == budget.substeps {
+                for _ in 0..budget.relax_iterations {
+                    let relax = Sticky { h, fraction: 0.0, push_speed, stick: 0.0, reach: REACH };
+                    self.sweep(passes, Phase::Relax, relax);
+                }
+            }
+            passes.bounce(substep);
         }
-        passes.integrate_positions();
-        if substep + 1 == budget.substeps {
-            for _ in 0..budget.relax_iterations {
-                passes.sticky_sweep(Phase::Relax, 0.0, push_speed, 0.0, REACH);
+        // Impulses add up over the whole step, as nothing is applied twice.
+        passes.book_impulses();
+        if passes.rows_per_point() == 2 {
+            let drifts = passes.parts_of(&mut self.drifts);
+            passes.run(Phase::Store, &mut BookDrift { reach: REACH, drifts });
+        }
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.drifts.held_bytes()
+    }
+}
+
+impl TgsSticky {
+    /// Brings drifts into the order of the lanes, once a step and before all sweeps.
+    fn load(&mut self, passes: &mut Passes<'_>) {
+        if passes.runs(Phase::Prepare) {
+            self.drifts.clear();
+            if passes.rows_per_point() == 2 {
+                let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
+                self.drifts.reset([lanes, serial]);
+                let drifts = passes.parts_of(&mut self.drifts);
+                passes.run(Phase::Prepare, &mut LoadDrift { drifts });
             }
         }
-        passes.bounce(substep);
     }
-    // Impulses add up over the whole step, as nothing is applied twice.
-    passes.book_impulses();
-    passes.book_drift(REACH);
+
+    fn sweep(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky) {
+        let drifts = passes.parts_of(&mut self.drifts);
+        if passes.run(phase, &mut StickySweep { sticky, drifts }) {
+            passes.count_sweep(passes.rows_per_point());
+        }
+    }
 }

@@ -5,7 +5,7 @@
 //!
 //! **Departures.** Velocities are corrected by (x − x_before contacts)/h, which is (x − x₀)/h in exact
 //! arithmetic, so that contacts without overlap change no bit. Friction holds places of the start of the
-//! step (`catto2024solver2d`), not of the substep. Bounces are this crate's pass at the end of the step.
+//! step (`catto2024solver2d`), not of the substep.
 //!
 //! **Cost.** Per substep 4 body passes, `position_iterations` displacing sweeps, which gather bodies
 //! twice, and 1 velocity sweep. Sweeps of a step request 1873 B per contact.
@@ -15,10 +15,14 @@
 //! the limit's speed, and that speed stays. With compliance a load sinks in by α times its weight only
 //! while that is less than the limit's speed times h.
 
+mod displace;
+
 use super::{Law, Uses, Variant};
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kept::KeptSize;
+use crate::engine::clock::Phase;
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
+use crate::engine::lanes::{BodyRow, held};
 use crate::engine::params::{Budget, Parameter};
+use displace::{AfterDisplacing, Approach, Displace};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -27,7 +31,7 @@ pub static SOLVER: Variant = Variant {
     summary: "substeps of displacements; velocities follow positions",
     budget: Budget { substeps: 4, velocity_iterations: 0, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: false, relax: false, position: true },
-    iterations: |k| Budget { substeps: 1, position_iterations: k, ..SOLVER.budget },
+    iterations: |standard, k| Budget { substeps: 1, position_iterations: k, ..standard },
     parameters: &[
         Parameter::push_speed(4.0),
         Parameter {
@@ -39,33 +43,77 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    softness: None,
-    by_levels: false,
-    piles: false,
-    turning_frames: false,
-    kept: KeptSize { per_point: 0, per_body: 0 },
     breaks: &[
         (Law::Cone, "friction of positions and of velocities have a cone each"),
         (Law::Momentum, "corrections of velocities are in no impulse that it reports"),
         (Law::Converges, "the law that it solves is one of positions"),
         (Law::Rest, "no warm start"),
     ],
-    step,
+    impacts: ImpactLaw::Solver { per_contact: 0, per_point: 2 },
+    make: || Box::new(Xpbd::default()),
+    ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
-    let budget = passes.budget();
-    let [push_speed, compliance] = [0, 1].map(|i| passes.parameter(i));
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        passes.integrate_positions();
-        passes.begin_displacing();
-        for k in 0..budget.position_iterations {
-            passes.displacing_sweep(push_speed, compliance, k == 0);
-            passes.iteration_done();
+/// What it keeps.
+#[derive(Clone, Debug, Default)]
+struct Xpbd {
+    /// Rows as they were before a substep displaced them.
+    before: Vec<BodyRow>,
+    /// How fast points shall leave (m/s), as normal entries; empty where nothing bounces.
+    rebounds: PointVector,
+}
+
+impl Solver for Xpbd {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [push_speed, compliance] = [0, 1].map(|i| passes.parameter(i));
+        let Xpbd { before, rebounds } = self;
+        rebounds.clear();
+        if passes.law() == SOLVER.impacts {
+            let Workspace { lanes, serial, .. } = passes.parts().work;
+            rebounds.reset([lanes, serial]);
         }
-        passes.velocities_from_displacements();
-        passes.displaced_velocity_sweep();
-        passes.end_substep(substep);
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            if !rebounds.is_empty() {
+                let to = passes.parts_of(rebounds);
+                passes.run(Phase::Restitution, &mut Approach { to });
+            }
+            passes.integrate_positions();
+            passes.over_bodies(Phase::Integrate, |rows, motion| {
+                before.clone_from(rows);
+                motion.hidden_turns(before);
+            });
+            for k in 0..budget.position_iterations {
+                let mut pass = Displace { h, push_speed, compliance, first: k == 0, before };
+                if passes.run(Phase::Position, &mut pass) {
+                    passes.count_sweep(passes.rows_per_point());
+                }
+                passes.iteration_done();
+            }
+            passes.over_bodies(Phase::Integrate, |rows, _| velocities(rows, before, 1.0 / h));
+            let rebounds = passes.parts_of(rebounds);
+            if passes.run(Phase::Solve, &mut AfterDisplacing { rebounds }) {
+                passes.count_sweep(passes.rows_per_point());
+            }
+            passes.end_substep(substep);
+        }
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        held(&self.before) + self.rebounds.held_bytes()
+    }
+}
+
+/// v ← v + (x − x_before)/h.
+fn velocities(rows: &mut [BodyRow], before: &[BodyRow], inv_h: f32) {
+    for (row, before) in rows.iter_mut().zip(before) {
+        for k in 0..3 {
+            row.velocity[k] = (row.delta[k] - before.delta[k]).mul_add(inv_h, row.velocity[k]);
+        }
     }
 }

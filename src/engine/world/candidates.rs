@@ -1,46 +1,13 @@
 //! Pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
-use crate::engine::contacts::{Contact, pair_key};
+use crate::engine::contacts::pair_key;
 use crate::engine::narrowphase::batch::{Kind, NO_CONTACT};
+use crate::engine::narrowphase::candidate::Candidate;
 use crate::engine::params::SPECULATIVE_DISTANCE;
-
-/// A pair of shapes that may touch.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    /// Shapes a and b, in a contact's order.
-    pub shapes: [u32; 2],
-    /// Their bodies.
-    pub bodies: [u32; 2],
-    /// What the narrow phase calls the shapes.
-    pub numbers: [u32; 2],
-    /// Centres of mass farther apart than the root of this cannot be in touch (m²).
-    pub reach_squared: f32,
-    /// Mixed Coulomb coefficient.
-    pub friction: f32,
-    /// Mixed restitution.
-    pub restitution: f32,
-    /// Its contact, or [`NO_CONTACT`].
-    pub contact: u32,
-}
 
 /// Rounding of a squared distance (1).
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;
-
-impl Candidate {
-    /// A contact of this pair without a manifold.
-    pub fn without_manifold(&self) -> Contact {
-        Contact {
-            shape_a: self.shapes[0],
-            shape_b: self.shapes[1],
-            body_a: self.bodies[0],
-            body_b: self.bodies[1],
-            friction: self.friction,
-            restitution: self.restitution,
-            ..Contact::default()
-        }
-    }
-}
 
 impl World {
     /// Candidates from `self.pairs`; those that were there before keep their contact.
@@ -55,8 +22,8 @@ impl World {
         let mut kept = 0;
         for &[i, j] in &self.pairs {
             let key = pair_key(i, j);
-            while last.next_if(|old| pair_key(old.shapes[0], old.shapes[1]) < key).is_some() {}
-            let candidate = match last.next_if(|old| pair_key(old.shapes[0], old.shapes[1]) == key) {
+            while last.next_if(|old| old.pair() < key).is_some() {}
+            let candidate = match last.next_if(|old| old.pair() == key) {
                 Some(old) => *old,
                 None => {
                     let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };

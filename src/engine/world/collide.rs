@@ -1,16 +1,16 @@
 //! From candidates to contacts that remember their impulses.
 
 use super::World;
-use super::candidates::Candidate;
-use super::jams::Jams;
-use super::recycle::{Pairs, Recycled};
-use crate::engine::constraints::preload::GIVING;
-use crate::engine::contacts::{Contact, pair_key};
+use crate::engine::constraints::Solver;
+use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Quad, held};
 use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
-use crate::engine::narrowphase::frames::FrameTimes;
+use crate::engine::narrowphase::candidate::{Candidate, Candidates};
+use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::SPECULATIVE_DISTANCE;
+use glam::Vec2;
 
 /// What the narrow phase keeps from step to step.
 #[derive(Default)]
@@ -24,19 +24,16 @@ pub(super) struct Narrow {
     pub shapes: Shapes,
     /// The set of contacts is not that of the lanes.
     pub is_changed: bool,
-    /// Contacts came in the first step of one of their bodies.
-    pub is_placed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
-    /// Manifolds that are kept.
-    pub recycled: Recycled,
+    /// What the solver has asked of the collision.
+    asked: Collision,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,
     jobs: [Jobs; Kind::ALL.len()],
     /// New contacts, in the order in which they were met.
     fresh: Vec<Contact>,
     last_contacts: Vec<Contact>,
-    jams: Jams,
     /// Contacts there were after the last update.
     count: usize,
 }
@@ -52,14 +49,14 @@ impl World {
     ///
     /// Contacts are updated where they lie, and sorted again only if one came or went.
     pub(super) fn update_contacts(&mut self) {
-        self.scale_loads();
+        self.make_solver();
+        self.scale_impulses();
         let narrow = &mut self.narrow;
         if narrow.count != self.contacts.len() {
             // Somebody else changed the list: what candidates remember of it means nothing.
             self.contacts.clear();
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
             (narrow.is_changed, narrow.jobs_are_current) = (true, false);
-            narrow.recycled = Recycled::default();
         }
         if self.settings.record_impulses {
             self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
@@ -85,54 +82,81 @@ impl World {
         narrow.ways.extend((0..bodies.len()).map(|i| {
             Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
         }));
-        let distance = self.settings.solver.recycle_distance(&self.settings.parameters);
-        let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
-        let pairs = Pairs { candidates, of_kind, poses };
-        let mut points = recycled.update(&pairs, &mut self.contacts, distance);
-        narrow.list_jobs(self.contacts.len());
+        let mut asked = std::mem::take(&mut self.narrow.asked);
+        asked.keep.clear();
+        asked.rolling = None;
+        self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
+        let narrow = &mut self.narrow;
+        narrow.asked = asked;
+        let mut points = narrow.list_jobs(&self.contacts);
 
-        let Narrow { candidates, jobs, fresh, is_changed, is_placed, poses, ways, shapes, .. } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, asked, .. } = narrow;
         fresh.clear();
-        *is_placed = false;
-        let stepped = self.stepped;
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
             candidate.contact = if contact.manifold.count == 0 {
                 NO_CONTACT
             } else {
-                let was_placed = candidate.bodies.iter().any(|&body| body as usize >= stepped);
-                let least = || contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                *is_placed |= was_placed;
-                let [preload, wait] = if was_placed { [least(), -GIVING] } else { [0.0; 2] };
-                let Contact { manifold, turn, .. } = *contact;
-                fresh.push(Contact { manifold, preload, wait, turn, ..candidate.without_manifold() });
+                let Contact { manifold, radii, .. } = *contact;
+                fresh.push(Contact { manifold, radii, ..candidate.without_manifold() });
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;
         };
-        let times = self.settings.solver.turning_frames.then(|| FrameTimes {
-            middle: 0.5 * (1.0 - 1.0 / self.settings.budget.substeps as f32) / AHEAD,
-            step: 1.0 / AHEAD,
-            unit: dt,
-        });
-        let input = Input { poses, ways, times, shapes, speculative: SPECULATIVE_DISTANCE };
+        // Ways are longer than a step.
+        let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
+        let input = Input { poses, ways, rolling, shapes, speculative: SPECULATIVE_DISTANCE };
         for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);
         }
-        let Narrow { candidates, of_kind, poses, recycled, .. } = narrow;
-        recycled.take_up(&Pairs { candidates, of_kind, poses }, &mut self.contacts);
         narrow.count = self.contacts.len();
-        // Two bodies of one shape each have one contact.
-        if self.settings.solver.piles && self.shapes.len() > self.bodies.len() {
-            narrow.jams.release(&mut self.contacts);
-        }
-        self.counts.pairs = narrow.candidates.len();
+        let kept = &mut self.work.kept;
+        kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len(), narrow.is_changed);
+        self.with_scene(|solver, scene| solver.after_collision(scene));
+        self.counts.pairs = self.narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
         self.counts.points = points;
         self.counts.rows = if self.features.friction { 2 * points } else { points };
+    }
+
+    /// Makes the solver that the settings name, if they name another.
+    fn make_solver(&mut self) {
+        let solver = self.settings.solver;
+        if !std::ptr::eq(self.solver_is, solver) {
+            (self.solver, self.solver_is) = ((solver.make)(), solver);
+        }
+    }
+
+    /// Scales the impulses of the last substep to those of a coming one of another length: the same forces.
+    fn scale_impulses(&mut self) {
+        let h = self.settings.h();
+        let Some(old) = self.impulses_of.replace(h).filter(|old| *old != h) else { return };
+        for point in self.contacts.iter_mut().flat_map(|contact| &mut contact.manifold.points) {
+            point.normal_impulse *= h / old;
+            point.tangent_impulse *= h / old;
+        }
+    }
+
+    /// Calls a hook of the solver.
+    fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut Scene<'_>)) {
+        let Narrow { candidates, of_kind, poses, is_changed, .. } = &self.narrow;
+        let mut scene = Scene {
+            bodies: &self.bodies,
+            contacts: &mut self.contacts,
+            kept: &mut self.work.kept,
+            candidates: Candidates { all: candidates, of_kind, poses },
+            shapes: self.shapes.len(),
+            contacts_changed: *is_changed,
+            step_index: self.step_index,
+            parameters: &self.settings.parameters,
+            gravity: Vec2::from(self.settings.gravity),
+            dt: self.settings.dt,
+            substeps: self.settings.budget.substeps,
+        };
+        hook(self.solver.as_mut(), &mut scene);
     }
 }
 
@@ -141,19 +165,18 @@ impl Narrow {
     pub fn candidate_bytes(&self) -> usize {
         let lists: usize = self.of_kind.iter().map(held).sum();
         let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
-        let recycled = self.recycled.held_bytes();
         lists
             + jobs
             + held(&self.candidates)
             + held(&self.last_candidates)
             + held(&self.poses)
             + held(&self.ways)
-            + recycled
+            + held(&self.asked.keep)
     }
 
     /// Bytes held for contacts, besides the list itself.
     pub fn contact_bytes(&self) -> usize {
-        held(&self.fresh) + held(&self.last_contacts) + self.jams.held_bytes()
+        held(&self.fresh) + held(&self.last_contacts)
     }
 
     /// Lets candidates find their contacts in a list that was put in the place of the last one;
@@ -162,7 +185,7 @@ impl Narrow {
         self.last_contacts.clone_from(contacts);
         let mut last = self.last_contacts.iter().enumerate().peekable();
         for candidate in &mut self.candidates {
-            let key = pair_key(candidate.shapes[0], candidate.shapes[1]);
+            let key = candidate.pair();
             while last.next_if(|(_, contact)| contact.key() < key).is_some() {}
             let found = last.next_if(|(_, contact)| contact.key() == key);
             candidate.contact = found.map_or(NO_CONTACT, |(i, _)| i as u32);
@@ -170,32 +193,36 @@ impl Narrow {
         std::mem::swap(contacts, &mut self.last_contacts);
         self.sort_contacts(contacts);
         (self.is_changed, self.count) = (true, contacts.len());
-        self.recycled = Recycled::default();
     }
 
-    /// Lists the candidates that are worth a look.
+    /// Lists the candidates that are worth a look; returns the points of manifolds that are kept.
     ///
     /// Where most candidates do not touch, those whose centres are too far apart are left out
     /// before their shapes are read; where most do, the lists of the last step still hold.
-    fn list_jobs(&mut self, contacts: usize) {
-        let cull = 4 * contacts < 3 * self.candidates.len();
-        if self.recycled.is_used() {
+    fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
+        let cull = 4 * contacts.len() < 3 * self.candidates.len();
+        if !self.asked.keep.is_empty() {
             self.jobs_are_current = false;
             self.list::<true>(cull);
-        } else if !self.jobs_are_current || cull {
+            let kept = self.asked.keep.iter().zip(&self.candidates).filter(|(keep, _)| **keep);
+            return kept.map(|(_, c)| contacts[c.contact as usize].manifold.count as usize).sum();
+        }
+        if !self.jobs_are_current || cull {
             self.jobs_are_current = !cull;
             self.list::<false>(cull);
         }
+        0
     }
 
-    /// The same; `RECYCLES`: some manifolds may be kept.
-    fn list<const RECYCLES: bool>(&mut self, cull: bool) {
+    /// The same; `KEEPS`: some manifolds may be kept.
+    fn list<const KEEPS: bool>(&mut self, cull: bool) {
+        let keep = &self.asked.keep;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                let is_kept = RECYCLES && self.recycled.keeps(name);
+                let is_kept = KEEPS && keep[name as usize];
                 let is_near = is_kept | !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
                 if !is_near & (candidate.contact != NO_CONTACT) {
                     self.is_changed = true;

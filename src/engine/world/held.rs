@@ -18,15 +18,12 @@
 //!   be brought back by a reset, so that they remain those of a simulation.
 
 use super::World;
-use super::loads::LoadsOf;
-use super::piles::Found;
-use super::recycle::Recycled;
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::kept::Kept;
-use crate::engine::constraints::types::ConstraintType;
-use crate::engine::constraints::{Batches, Features, OppositeKind, WorkCount, Workspace};
+use crate::engine::constraints::kernels::types::ConstraintType;
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::constraints::{Batches, Features, OppositeKind, Solver, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
@@ -50,12 +47,9 @@ struct Saved {
     fat_boxes: FatBoxes,
     counts: StepCounts,
     kept: Kept,
-    recycled: Recycled,
-    found: Found,
-    loads_of: Option<LoadsOf>,
+    solver: Box<dyn Solver>,
+    impulses_of: Option<f32>,
     is_changed: bool,
-    /// Visits that impacts have spent.
-    spent: usize,
     types: Vec<Box<dyn ConstraintType>>,
 }
 
@@ -89,11 +83,9 @@ impl World {
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
             kept: self.work.kept.clone(),
-            recycled: self.narrow.recycled.clone(),
-            found: self.found,
-            loads_of: self.loads_of,
+            solver: self.solver.boxed(),
+            impulses_of: self.impulses_of,
             is_changed: self.narrow.is_changed,
-            spent: self.work.plastic.spent,
             types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
         };
         let timings = self.timings;
@@ -106,15 +98,15 @@ impl World {
     }
 
     /// Contacts as they were, linked to the present candidates.
-    fn put_back(&mut self, Saved { contacts, recycled, found, loads_of, is_changed, spent, .. }: &Saved) {
+    fn put_back(&mut self, Saved { contacts, kept, solver, impulses_of, is_changed, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
-        self.narrow.recycled.clone_from(recycled);
-        self.work.plastic.spent = *spent;
-        self.loads_of = *loads_of;
+        self.work.kept.clone_from(kept);
+        self.solver = solver.boxed();
+        self.impulses_of = *impulses_of;
         // The list is another, but no contact has come or gone.
-        (self.found, self.narrow.is_changed, self.lanes_are_for) = (*found, *is_changed, None);
+        (self.narrow.is_changed, self.lanes_are_for) = (*is_changed, None);
     }
 
     /// `phase` alone; with `counted`, one lane counts its operations.
@@ -300,7 +292,6 @@ impl Drop for HeldWorld<'_> {
         self.world.fat_boxes.clone_from(&self.before.fat_boxes);
         self.world.pairs_are_stale = true;
         self.world.counts = self.before.counts;
-        self.world.work.kept.clone_from(&self.before.kept);
         self.restore_types();
     }
 }

@@ -2,16 +2,14 @@
 
 use super::{Order, World};
 use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::assign::Sides;
-use crate::engine::constraints::bounces::Bounces;
+use crate::engine::constraints::records::assign::Sides;
 use crate::engine::constraints::{Features, OppositeKind};
 
 impl World {
     /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
-        let by_levels = self.settings.solver.by_levels;
         let widths = [self.settings.narrowest, self.settings.width];
-        let choice = Some((widths, self.settings.order, by_levels, *features));
+        let choice = Some((self.solver_is.name, widths, self.settings.order, *features));
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
@@ -23,26 +21,22 @@ impl World {
             BodyKind::Static => OppositeKind::Static,
         };
         let (work, contacts) = (&mut self.work, &self.contacts);
-        let mut graph = std::mem::take(&mut work.graph);
-        if by_levels {
-            let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
-            graph.build(kinds.len(), contacts.iter().map(|c| [c.body_a, c.body_b]), is_dynamic);
-        }
-        let sides = Sides { bodies: kinds.len(), opposite, levels: by_levels.then_some(&graph) };
+        let levels = self.solver.levels(&self.bodies, contacts);
+        let sides = Sides { bodies: kinds.len(), opposite, levels };
         match self.settings.order {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);
             }
             Order::Colored => self.assignment.colored(work, widths, features, contacts, &sides),
         }
-        work.graph = graph;
         self.counts.colors = self.assignment.colors;
         self.counts.overflow = self.assignment.overflow;
         self.counts.lane_slots = work.lanes.lanes() + work.serial.lanes();
         self.counts.constraint_bytes = work.lanes.bytes() + work.serial.bytes();
         if features.restitution {
             let points = if features.two_points { 2 } else { 1 };
-            self.counts.constraint_bytes += Bounces::bytes(self.counts.lane_slots, points);
+            let stride = self.settings.impact_law().stride(points);
+            self.counts.constraint_bytes += 4 * self.counts.lane_slots * stride;
         }
     }
 }

@@ -83,7 +83,7 @@ impl World {
         for batches in [&w.lanes, &w.serial] {
             records.extend(batches.memory());
         }
-        records.push(opaque(w.lane_bounces.held_bytes() + w.serial_bounces.held_bytes()));
+        records.push(opaque(w.impacts.held_bytes()));
         let mut components = vec![
             component("bodies", &bodies),
             component("shapes", &arrays![self.shapes, self.shape_body, self.surfaces]),
@@ -93,10 +93,10 @@ impl World {
             component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
             component("colouring", &[opaque(self.assignment.held_bytes())]),
             component("records", &records),
-            component("rows", &[arrays![w.rows][0], arrays![w.sums][0], opaque(w.motion.held_bytes())]),
+            component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
         ];
         // Most solvers keep nothing of their own.
-        let own = w.own_bytes() + self.piles.held_bytes();
+        let own = w.own_bytes() + self.solver.held_bytes();
         if own > 0 {
             components.push(component("solver", &[opaque(own)]));
         }

@@ -7,34 +7,28 @@
 use crate::engine::bodies::{Bodies, BodyDef, BodyKind};
 use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::assign::Assignment;
-use crate::engine::constraints::motion::{self, MotionInput};
-use crate::engine::constraints::observe::ObservedRule;
-use crate::engine::constraints::piles::Piles;
-use crate::engine::constraints::types::{ConstraintType, Joined};
-use crate::engine::constraints::{Features, StepInput, WorkCount, Workspace};
+use crate::engine::constraints::kernels::motion::{self, MotionInput};
+use crate::engine::constraints::kernels::observe::ObservedRule;
+use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
+use crate::engine::constraints::records::assign::Assignment;
+use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::{Shape, combine};
+use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
 use glam::Vec2;
-use loads::LoadsOf;
-use piles::Found;
 use traits::Traits;
 
 mod candidates;
 mod collide;
 mod counts;
 mod held;
-mod jams;
 mod lanes;
-mod loads;
 mod memory;
 mod pairs;
-mod piles;
-mod recycle;
 mod settings;
 mod traits;
 
@@ -74,8 +68,6 @@ pub struct World {
     pub counts: StepCounts,
     /// Steps taken.
     pub step_index: u64,
-    /// Bodies that have taken a step: the first ones.
-    stepped: usize,
     traits: Traits,
     features: Features,
     surfaces: Vec<Surface>,
@@ -87,11 +79,12 @@ pub struct World {
     narrow: Narrow,
     assignment: Assignment,
     /// What the present lanes were assigned for.
-    lanes_are_for: Option<([LaneWidth; 2], Order, bool, Features)>,
-    piles: Piles,
-    found: Found,
-    /// What the impulses of `contacts` belong to; none before there are any.
-    loads_of: Option<LoadsOf>,
+    lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
+    /// Substep that the impulses of `contacts` belong to (s); none before there are any.
+    impulses_of: Option<f32>,
+    /// The solver at work, and what it is one of.
+    solver: Box<dyn Solver>,
+    solver_is: &'static Variant,
     work: Workspace,
 }
 
@@ -104,11 +97,9 @@ impl World {
             shape_body: Vec::new(),
             contacts: Vec::new(),
             broadphase: BroadPhase::new(settings.broadphase),
-            settings,
             timings: Timings::default(),
             counts: StepCounts::default(),
             step_index: 0,
-            stepped: 0,
             traits: Traits::default(),
             features: Features::NONE,
             surfaces: Vec::new(),
@@ -119,10 +110,11 @@ impl World {
             narrow: Narrow::default(),
             assignment: Assignment::default(),
             lanes_are_for: None,
-            piles: Piles::default(),
-            found: Found::default(),
-            loads_of: None,
+            impulses_of: None,
+            solver: (settings.solver.make)(),
+            solver_is: settings.solver,
             work: Workspace::default(),
+            settings,
         }
     }
 
@@ -179,7 +171,6 @@ impl World {
         self.store();
         clock.lap(Phase::Store);
         self.step_index += 1;
-        self.stepped = self.bodies.len();
         self.timings = clock.stop();
         self.check()
     }
@@ -223,7 +214,6 @@ impl World {
         clock.lap(Phase::Pairs);
         self.update_contacts();
         clock.lap(Phase::Collide);
-        self.find_piles();
         self.assign_lanes(&self.kernel_features());
         clock.lap(Phase::Color);
         self.load_rows();
@@ -255,14 +245,11 @@ impl World {
             parameters: s.parameters,
             phases,
             record_impulses: s.record_impulses,
+            impacts: s.impact_law(),
             points: self.counts.points,
-            pile_modes: self.found.modes,
-            contacts_changed: self.found.contacts_changed,
-            timed_impacts: self.settings.solver.turning_frames,
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
-        self.work.kept.follow(s.solver.kept, &self.contacts, self.bodies.len());
-        s.solver.run(&mut self.work, &mut self.contacts, clock, &input, width)
+        solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
     }
 
     /// Lanes per instruction of the last step: as many as the settings allow and the colours fill.
@@ -275,6 +262,7 @@ impl World {
     fn kernel_features(&self) -> Features {
         let mut features = self.features.union(self.settings.extra_features);
         features.rotation |= features.friction || features.two_points;
+        features.restitution &= self.settings.impact_law() != ImpactLaw::None;
         features
     }
 

@@ -1,8 +1,8 @@
 //! What a run can choose.
 
 use crate::engine::broadphase::BroadPhaseKind;
-use crate::engine::constraints::Features;
-use crate::engine::constraints::motion::{Integrator, RotationUpdate};
+use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
+use crate::engine::constraints::{Features, ImpactLaw, Impacts};
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
@@ -38,6 +38,8 @@ pub struct Settings {
     pub dt: f32,
     /// The solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
+    /// Where bodies hit each other.
+    pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
@@ -67,6 +69,7 @@ impl Settings {
             gravity: [0.0, -10.0],
             dt: 1.0 / 60.0,
             parameters: solver.defaults(),
+            impacts: Impacts::Own,
             record_impulses: false,
             observe_rule: false,
             timed: false,
@@ -80,6 +83,11 @@ impl Settings {
     /// With `width` lanes, whatever the scene.
     pub fn exactly(self, width: LaneWidth) -> Self {
         Settings { width, narrowest: width, ..self }
+    }
+
+    /// What a step does where bodies hit each other.
+    pub fn impact_law(&self) -> ImpactLaw {
+        self.impacts.law(self.solver.impacts)
     }
 
     /// Substep (s).

@@ -179,7 +179,7 @@ impl Schedule {
     }
 
     fn budget(&self, iterations: u32) -> Budget {
-        let whole = (self.variant.iterations)(iterations);
+        let whole = self.variant.of_iterations(iterations);
         Budget { relax_iterations: if self.relaxes { whole.relax_iterations } else { 0 }, ..whole }
     }
 }

@@ -7,17 +7,16 @@
 
 use super::setup;
 use super::warm::STEPS;
+use crate::engine::bodies::Bodies;
 use crate::engine::clock::{Clock, PhaseFilter};
-use crate::engine::constraints::assign::{Assignment, Sides};
-use crate::engine::constraints::graph::Graph;
-use crate::engine::constraints::kept::{Kept, KeptSize};
-use crate::engine::constraints::motion::{Integrator, MotionInput, RotationUpdate};
-use crate::engine::constraints::piles::PileModes;
-use crate::engine::constraints::{OppositeKind, StepInput, Workspace};
+use crate::engine::constraints::kernels::motion::{Integrator, MotionInput, RotationUpdate};
+use crate::engine::constraints::records::assign::{Assignment, Sides};
+use crate::engine::constraints::records::kept::{Kept, KeptSize};
+use crate::engine::constraints::{ImpactLaw, OppositeKind, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
 use crate::engine::params::{Budget, Parameters};
-use crate::engine::solvers::Variant;
+use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
 use crate::lab::reference::residual::OwnRow;
 use crate::lab::reference::{ContactProblem, Pair, ProblemContact, Velocity};
@@ -114,8 +113,9 @@ pub struct Replay<'a> {
     input: StepInput,
     width: LaneWidth,
     sequence: Sequence,
-    /// Whether contacts are grouped by their level, as the solver of the last run wants it.
-    by_levels: bool,
+    bodies: Bodies,
+    /// The solver of the last run.
+    solver: Option<Box<dyn Solver>>,
 }
 
 impl<'a> Replay<'a> {
@@ -137,8 +137,7 @@ impl<'a> Replay<'a> {
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
         let phases = PhaseFilter::ALL;
-        // Nothing buckles or swings in one step.
-        let (record_impulses, pile_modes, contacts_changed) = (false, PileModes::default(), true);
+        let record_impulses = false;
         let input = StepInput {
             features,
             budget,
@@ -146,10 +145,8 @@ impl<'a> Replay<'a> {
             parameters,
             phases,
             record_impulses,
+            impacts: ImpactLaw::None,
             points,
-            pile_modes,
-            contacts_changed,
-            timed_impacts: false,
         };
         // The rows start at v*, and nothing is added to them: forces are in it already.
         let motion = MotionInput {
@@ -163,7 +160,7 @@ impl<'a> Replay<'a> {
         let mut rows = Vec::new();
         work.motion.load(&bodies, &mut rows, &motion);
         setup::check_range(h, &rows, &contacts)?;
-        let (scratch, by_levels, kept) = (Vec::new(), false, None);
+        let (scratch, solver, kept) = (Vec::new(), None, None);
         let rows_before = rows.clone();
         let mut replay = Replay {
             problem,
@@ -177,7 +174,8 @@ impl<'a> Replay<'a> {
             input,
             width,
             sequence,
-            by_levels,
+            bodies,
+            solver,
         };
         replay.assign_lanes();
         Ok(replay)
@@ -200,8 +198,7 @@ impl<'a> Replay<'a> {
         self.work.observe = true;
         self.work.last_rule = None;
         let input = StepInput { budget, ..self.input };
-        let count =
-            variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
+        let count = self.step(&input, &mut Clock::start(false));
         let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
         let bodies = self.problem.bodies.len();
         Outcome {
@@ -219,17 +216,21 @@ impl<'a> Replay<'a> {
         let input = StepInput { budget, ..self.input };
         let mut clock = Clock::start(false);
         let begin = Instant::now();
-        variant.run(&mut self.work, &mut self.scratch, &mut clock, &input, self.width);
+        self.step(&input, &mut clock);
         begin.elapsed()
     }
 
+    /// A step of the solver that was set by [`Self::reset`].
+    fn step(&mut self, input: &StepInput, clock: &mut Clock) -> WorkCount {
+        let Some(solver) = &mut self.solver else { return WorkCount::default() };
+        solvers::run(solver.as_mut(), &mut self.work, &mut self.scratch, clock, input, self.width)
+    }
+
     fn reset(&mut self, variant: &'static Variant, start: Start) {
-        if self.by_levels != variant.by_levels {
-            self.by_levels = variant.by_levels;
-            self.assign_lanes();
-        }
+        self.solver = Some((variant.make)());
+        self.assign_lanes();
         self.work.kept = Kept::default();
-        self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
+        self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), true);
         if start == Start::Warm && variant.kept != KeptSize::default() {
             self.keep(variant);
         }
@@ -250,10 +251,10 @@ impl<'a> Replay<'a> {
             self.scratch.clone_from(&self.contacts);
             for _ in 0..STEPS {
                 self.work.rows.clone_from(&self.rows_before);
-                self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
-                variant.run(&mut self.work, &mut self.scratch, &mut Clock::start(false), &input, self.width);
+                self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), false);
+                self.step(&input, &mut Clock::start(false));
             }
-            self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len());
+            self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), false);
             self.kept = Some((variant.name, self.work.kept.clone()));
             self.work.watch = watch;
         }
@@ -293,12 +294,8 @@ impl<'a> Replay<'a> {
     fn assign_lanes(&mut self) {
         let (problem, bodies) = (self.problem, self.problem.bodies.len());
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
-        let mut graph = Graph::default();
-        if self.by_levels {
-            let is_dynamic = |body| opposite(problem, body) == OppositeKind::Dynamic;
-            graph.build(bodies, contacts.iter().map(|c| [c.body_a, c.body_b]), is_dynamic);
-        }
-        let levels = self.by_levels.then_some(&graph);
+        let solver = self.solver.as_mut();
+        let levels = solver.and_then(|solver| solver.levels(&self.bodies, contacts));
         let sides = Sides { bodies, opposite: |body| opposite(problem, body), levels };
         let mut assignment = Assignment::default();
         if self.sequence == Sequence::Colored {
@@ -307,7 +304,6 @@ impl<'a> Replay<'a> {
             let order = self.sequence.order(contacts.len()).into_iter();
             assignment.serial(work, features, contacts, order, &sides);
         }
-        work.graph = graph;
     }
 }
 

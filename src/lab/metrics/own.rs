@@ -9,7 +9,7 @@
 //! ```
 //!
 //! for the impulses of the last substep, with the bias b and the compliance c that its rule
-//! answers with when it is [asked](crate::engine::constraints::observe). The residual is the natural
+//! answers with when it is [asked](crate::engine::constraints::kernels::observe). The residual is the natural
 //! map of that, with ρ_n = 1/(J M⁻¹ Jᵀ + c). A small one beside a large rigid one says
 //! that more sweeps will not help.
 //!
@@ -18,7 +18,7 @@
 
 use super::law::{BodyStep, PointStep, natural_map, tangent};
 use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::observe::{NormalLaw, ObservedRule};
+use crate::engine::constraints::kernels::observe::{NormalLaw, ObservedRule};
 use crate::engine::world::World;
 
 /// Bias of a row that its rule does not answer to (m/s): no body is as fast, so that its

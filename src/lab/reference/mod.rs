@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`problem`] states the problem, [`residual`] the law and how far from it an
 //! answer is. [`stewart_trinkle`] solves small problems exactly by Lemke's method
-//! ([`crate::engine::constraints::lemke`]);
+//! ([`crate::engine::constraints::numerics::lemke`]);
 //! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
 //! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
 //! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by

@@ -17,7 +17,7 @@
 //!
 //! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
 
-use crate::engine::constraints::matrix::Matrix;
+use crate::engine::constraints::numerics::matrix::Matrix;
 use serde::{Deserialize, Serialize};
 
 /// Velocity of a body: (m/s, m/s, rad/s).

@@ -2,15 +2,15 @@
 //!
 //! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997.
 //!
-//! The matrices are those of [`crate::engine::constraints::coulomb_lcp`], with the compliance of a target on
+//! The matrices are those of [`crate::engine::constraints::numerics::coulomb_lcp`], with the compliance of a target on
 //! the diagonal.
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
 
 use super::problem::{ContactProblem, Pair};
 use super::residual::{Target, natural_map};
-use crate::engine::constraints::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::lemke::Outcome;
+use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
+use crate::engine::constraints::numerics::lemke::Outcome;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;

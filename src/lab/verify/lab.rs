@@ -2,6 +2,7 @@
 
 use super::{Failure, Finding, Sweep, SweepRow};
 use crate::engine::bodies::BodyKind;
+use crate::engine::constraints::Impacts;
 use crate::engine::contacts::Contact;
 use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP};
 use crate::engine::solvers::Variant;
@@ -28,6 +29,12 @@ impl Lab {
     /// A laboratory for `solver` with its standard settings.
     pub fn new(solver: &'static Variant) -> Self {
         Lab { settings: Settings { record_impulses: true, ..Settings::new(solver) }, change: None }
+    }
+
+    /// The same laboratory under another treatment of impacts.
+    pub fn impacts(mut self, impacts: Impacts) -> Self {
+        self.settings.impacts = impacts;
+        self
     }
 
     /// The same laboratory, in which every scene is changed before it is built: to see that

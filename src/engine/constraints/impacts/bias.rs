@@ -1,0 +1,136 @@
+//! Restitution as a velocity bias: rows ask for the speed of the rebound.
+//!
+//! A point that comes in at v⁻ < −1 m/s and reaches the surface within the substep shall leave at u = e |v⁻|, so that its
+//! row is
+//!
+//! ```text
+//! λ ← max(0, λ − m_eff (v_n − u))
+//! ```
+//!
+//! instead of that of the solver's rule. Few points bounce in a step, so they have a sweep of their own after each
+//! sweep of the solver, which leaves them alone: their effective mass is in the side record meanwhile. Friction rows
+//! stay where they are. Scenes in which nothing bounces have neither the sweep nor the side records.
+//!
+//! Source: `catto2007box2d` (`b2ContactSolver`, velocity bias, Box2D 1 to 2.4).
+
+use super::restitution::{largest, point, restitution_of};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::bounces::Bounces;
+use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, Lanes};
+use crate::engine::params::RESTITUTION_THRESHOLD;
+
+/// Side record: per point u (m/s; zero where it does not bounce) and its effective mass (kg).
+pub(super) const fn stride(points: usize) -> usize {
+    2 * points
+}
+
+/// Finds what bounces in the coming substep.
+pub struct Begin {
+    /// Substep (s).
+    pub h: f32,
+    /// There are no masses to give back.
+    pub is_first: bool,
+    /// The fastest rebound (m/s); zero if nothing bounces.
+    pub fastest: f32,
+}
+
+/// One sweep over what bounces.
+pub struct BiasSweep;
+
+impl Pass for Begin {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 3 + layout.points * (layout.arms() + 4);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, 3 * layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        on.bounces.reserve(on.batches.lanes(), stride(F::POINTS));
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            begin::<L>(on.rows, batches, segment, layout, on.bounces, on.contacts, self);
+        });
+    }
+}
+
+impl Pass for BiasSweep {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_bodies(2 + layout.points * (layout.arms() / 2 + 3), layout.points, opposite)
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            sweep::<L>(on.rows, batches, segment, layout, on.bounces);
+        });
+    }
+}
+
+#[inline(never)]
+fn begin<L: Lanes>(
+    rows: &[BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+    contacts: &[Contact],
+    to: &mut Begin,
+) {
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
+    let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment));
+    let (zero, h) = (L::zero(), L::splat(to.h));
+    let mut most = zero;
+    for (batch, ((record, side), (contact, (row_a, row_b)))) in records.zip(indices).enumerate() {
+        let e = restitution_of::<L>(contacts, &contact.entries()[..segment.filled(batch, L::WIDTH)]);
+        for p in 0..layout.points {
+            let at = layout.at(p, layout.normal_mass);
+            if !to.is_first {
+                record[at] = side[2 * p].select_positive(side[2 * p + 1], record[at]);
+            }
+            let [v, gap] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let reaches = -v.mul_add(h, gap);
+            let is_hit = (L::splat(-RESTITUTION_THRESHOLD) - v).min(reaches).min(record[at]);
+            let target = is_hit.select_positive(-(e * v), zero);
+            (side[2 * p], side[2 * p + 1]) = (target, record[at]);
+            record[at] = target.select_positive(zero, record[at]);
+            most = most.max(target);
+        }
+    }
+    to.fastest = largest(most).max(to.fastest);
+}
+
+#[inline(never)]
+fn sweep<L: Lanes>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    bounces: &mut Bounces,
+) {
+    let pushes_a = segment.pushes_a();
+    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment));
+    for ((record, side), (row_a, row_b)) in records.zip(row_a.batches().zip(row_b.batches())) {
+        for p in 0..layout.points {
+            let (target, mass) = (side[2 * p], side[2 * p + 1]);
+            if !target.any_positive() {
+                continue;
+            }
+            let [vn, _] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let at = layout.at(p, layout.normal_impulse);
+            let old = record[at];
+            let new = mass.neg_mul_add(vn - target, old).max(L::zero());
+            record[at] = target.select_positive(new, old);
+            super::restitution::push::<L>(
+                rows,
+                record,
+                layout,
+                p,
+                [row_a, row_b],
+                pushes_a,
+                record[at] - old,
+            );
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Impacts: what happens when bodies hit each other.
+//!
+//! | law | what it does |
+//! |---|---|
+//! | [`ImpactLaw::None`] | nothing bounces, whatever the surfaces say |
+//! | [`ImpactLaw::Bias`] | the speed at which a point is to leave is the target of its row ([`bias`]) |
+//! | [`ImpactLaw::EndPass`] | one pass at the end of the step gives points that speed ([`restitution`]) |
+//! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave ([`waves`]) |
+//! | [`ImpactLaw::Solver`] | the solver's schedule does it |
+
+use crate::engine::constraints::records::bounces::Bounces;
+use crate::engine::params::RESTITUTION_THRESHOLD;
+
+pub mod bias;
+pub mod rebounds;
+pub mod restitution;
+pub(crate) mod touch;
+pub mod waves;
+
+/// Which treatment of impacts a run takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum Impacts {
+    /// That of the solver's source.
+    #[default]
+    Own,
+    /// Waves of impacts before the step.
+    Waves,
+    /// None: nothing bounces.
+    None,
+}
+
+impl Impacts {
+    /// Every treatment.
+    pub const ALL: [Impacts; 3] = [Impacts::Own, Impacts::Waves, Impacts::None];
+
+    /// Name on the command line and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Impacts::Own => "own",
+            Impacts::Waves => "waves",
+            Impacts::None => "none",
+        }
+    }
+
+    /// What a step does under a solver whose own law is `own`.
+    pub fn law(self, own: ImpactLaw) -> ImpactLaw {
+        match self {
+            Impacts::Own => own,
+            Impacts::Waves => ImpactLaw::Waves,
+            Impacts::None => ImpactLaw::None,
+        }
+    }
+}
+
+/// What a step does where bodies hit each other; see the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImpactLaw {
+    /// Nothing bounces.
+    None,
+    /// The rows of the step ask for the speed of the rebound.
+    Bias,
+    /// A pass at the end of the step.
+    EndPass {
+        /// Approach (m/s) that a point has to exceed to bounce.
+        threshold: f32,
+        /// Points that bore an impulse in the step before bounce only if e ≥ 1.
+        only_new: bool,
+    },
+    /// Waves before the step, and for what only others push together a pass at its end.
+    Waves,
+    /// The solver's own schedule, with side records of so many lane vectors per contact and per point.
+    Solver {
+        /// Of a contact.
+        per_contact: usize,
+        /// Of each of its points.
+        per_point: usize,
+    },
+}
+
+impl ImpactLaw {
+    /// As in Box2D 3 (`catto2024box2d`).
+    pub const BOX2D: ImpactLaw = ImpactLaw::EndPass { threshold: RESTITUTION_THRESHOLD, only_new: false };
+    /// As in rapier (`crozet2025rapier`).
+    pub const RAPIER: ImpactLaw = ImpactLaw::EndPass { threshold: 0.0, only_new: true };
+
+    /// One line for lists.
+    pub fn summary(self) -> &'static str {
+        match self {
+            ImpactLaw::None => "none",
+            ImpactLaw::Bias => "velocity bias of the rows",
+            ImpactLaw::EndPass { only_new: false, .. } => "pass at the end of the step",
+            ImpactLaw::EndPass { only_new: true, .. } => "pass at the end of the step, new points",
+            ImpactLaw::Waves => "waves before the step",
+            ImpactLaw::Solver { .. } => "part of the solver",
+        }
+    }
+
+    /// Lane vectors of a side record of a contact with so many points.
+    pub fn stride(self, points: usize) -> usize {
+        match self {
+            ImpactLaw::None => 0,
+            ImpactLaw::Bias => bias::stride(points),
+            ImpactLaw::EndPass { .. } => restitution::stride(points),
+            ImpactLaw::Waves => waves::stride(points),
+            ImpactLaw::Solver { per_contact, per_point } => per_contact + points * per_point,
+        }
+    }
+}
+
+/// Side records of what bounces.
+#[derive(Debug, Default)]
+pub struct ImpactRecords {
+    /// Of the coloured batches, and of the serial ones.
+    pub bounces: [Bounces; 2],
+    /// What waves of impacts may do to bodies.
+    pub rebounds: rebounds::Rebounds,
+}
+
+impl ImpactRecords {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        self.bounces.iter().map(Bounces::held_bytes).sum::<usize>() + self.rebounds.held_bytes()
+    }
+}

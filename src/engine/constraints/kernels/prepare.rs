@@ -1,0 +1,189 @@
+//! Contacts into constraint records at the start of a step, impulses back at its end.
+
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::stages::over_segments;
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::contacts::{Contact, quad};
+use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
+
+const INV_MASS: usize = 3;
+const INV_INERTIA: usize = 7;
+
+/// Batches between asking for contacts and reading them.
+const AHEAD: usize = 2;
+
+/// Fills the records of a segment, in lanes throughout: contacts are gathered by quads.
+///
+/// The arms are r × n and r × t = −(r·n); the effective masses 1/k with
+/// k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)², u = n and t.
+///
+/// Lanes without a contact, and points that a contact does not have, get effective mass
+/// zero and impulse zero: whatever velocity they see, their impulse stays zero.
+#[inline(always)]
+fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    contacts: &[Contact],
+) {
+    use quad::*;
+    let layout = const { Layout::of::<N, O>() };
+    let quads: &[Quad] = bytemuck::cast_slice(contacts);
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let records = records.chunks_exact_mut(layout.stride);
+    let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
+    for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
+        // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
+        let coming = contact.entries_of(batch + AHEAD, L::WIDTH);
+        prefetch_records::<STRIDE>(quads, coming.iter().copied());
+        // Only a segment's last batch has empty lanes. They read a contact and ignore it.
+        let mut present = L::splat(1.0);
+        let filled = segment.filled(batch, L::WIDTH);
+        if filled < L::WIDTH {
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut present));
+            floats[filled..].fill(0.0);
+        }
+        let [nx, ny, count, friction] = L::gather_quads::<STRIDE, HEADER>(quads, index);
+        let a = if O::HAS_ROW { L::gather(rows, row_a) } else { [L::zero(); 8] };
+        let b = L::gather(rows, row_b);
+        let filled = |value: L| present.select_positive(value, L::zero());
+        (record[0], record[1]) = (filled(nx), filled(ny));
+        if N::FRICTION {
+            record[layout.friction] = filled(friction);
+        }
+        let two = L::splat(2.0).integer_bits();
+        for p in 0..N::POINTS {
+            let ([ax, ay, bx, by], [separation, _, normal, tangent]) = if p == 0 {
+                (
+                    L::gather_quads::<STRIDE, ANCHORS_0>(quads, index),
+                    L::gather_quads::<STRIDE, STATE_0>(quads, index),
+                )
+            } else {
+                (
+                    L::gather_quads::<STRIDE, ANCHORS_1>(quads, index),
+                    L::gather_quads::<STRIDE, STATE_1>(quads, index),
+                )
+            };
+            // Counts are integers, compared as the bits of floats.
+            let active = if p == 0 {
+                count.select_equal(L::zero(), L::zero(), present)
+            } else {
+                count.select_equal(two, present, L::zero())
+            };
+            let only = |value: L| active.select_positive(value, L::zero());
+            let arms = |x: L, y: L| [only(x.mul_add(ny, -(y * nx))), only(-(x.mul_add(nx, y * ny)))];
+            let (arms_a, arms_b) = (arms(ax, ay), arms(bx, by));
+            let k = |axis: usize| {
+                let mut k = a[INV_MASS] + b[INV_MASS];
+                if N::ROTATION {
+                    k = (b[INV_INERTIA] * arms_b[axis]).mul_add(arms_b[axis], k);
+                    if O::HAS_ROW {
+                        k = (a[INV_INERTIA] * arms_a[axis]).mul_add(arms_a[axis], k);
+                    }
+                }
+                k
+            };
+            if N::ROTATION {
+                let at = layout.at(p, layout.arm_b);
+                [record[at], record[at + 1]] = arms_b;
+                if O::HAS_ROW {
+                    let at = layout.at(p, layout.arm_a);
+                    [record[at], record[at + 1]] = arms_a;
+                }
+            }
+            record[layout.at(p, layout.separation)] = only(separation);
+            record[layout.at(p, layout.normal_mass)] = only(L::splat(1.0) / k(0));
+            record[layout.at(p, layout.normal_impulse)] = only(normal);
+            if N::FRICTION {
+                record[layout.at(p, layout.tangent_mass)] = only(L::splat(1.0) / k(1));
+                record[layout.at(p, layout.tangent_impulse)] = only(tangent);
+            }
+        }
+    }
+}
+
+/// Fills the records of all batches from the contacts.
+pub struct Prepare;
+
+impl Pass for Prepare {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // The index of the contact; the masses of bodies.
+        PerLane { halves: 0, ..PerLane::of_bodies(1, layout.stride, opposite) }
+    }
+
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        prepare::<L, F>(on.rows, on.batches, on.contacts);
+    }
+}
+
+/// Fills the records of all segments.
+#[inline(never)]
+pub fn prepare<L: Lanes, N: KernelFeatures>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    contacts: &[Contact],
+) {
+    over_segments!(prepare_segment, L, N; rows, batches, contacts);
+}
+
+/// Writes accumulated impulses back to the contacts.
+pub struct Store;
+
+impl Pass for Store {
+    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
+        let impulses = layout.points * if layout.has_friction { 2 } else { 1 };
+        PerLane { floats_read: 1 + impulses, ..PerLane::default() }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        store::<L, F>(on.batches, on.contacts);
+    }
+}
+
+/// Writes the accumulated impulses of all segments back to their contacts.
+pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut [Contact]) {
+    batches.each_segment(N::layout, |batches, segment, layout| {
+        store_segment::<L>(batches, segment, layout, contacts);
+    });
+}
+
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width
+/// alone: this pass waits for memory, and a branch on the layout per batch costs nothing.
+#[inline(never)]
+fn store_segment<L: Lanes>(
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    contacts: &mut [Contact],
+) {
+    use quad::*;
+    let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride);
+    for (batch, (record, index)) in records.zip(contact.batches()).enumerate() {
+        let impulses = |p: usize| {
+            let tangent =
+                if layout.has_friction { record[layout.at(p, layout.tangent_impulse)] } else { L::zero() };
+            [record[layout.at(p, layout.normal_impulse)], tangent]
+        };
+        let ([n0, t0], [n1, t1]) =
+            (impulses(0), if layout.points == 2 { impulses(1) } else { [L::zero(); 2] });
+        let filled = segment.filled(batch, L::WIDTH);
+        if filled == L::WIDTH {
+            let quads = bytemuck::cast_slice_mut(contacts);
+            L::scatter_halves::<STRIDE, STATE_0, STATE_1>(quads, index, [n0, t0, n1, t1]);
+            continue;
+        }
+        let floats = [n0, t0, n1, t1];
+        let floats: &[f32] = bytemuck::cast_slice(&floats);
+        for (lane, &contact) in index.entries()[..filled].iter().enumerate() {
+            let at = |k: usize| floats[k * L::WIDTH + lane];
+            let [first, second] = &mut contacts[contact as usize].manifold.points;
+            (first.normal_impulse, first.tangent_impulse) = (at(0), at(1));
+            (second.normal_impulse, second.tangent_impulse) = (at(2), at(3));
+        }
+    }
+}

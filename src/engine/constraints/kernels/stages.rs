@@ -1,0 +1,220 @@
+//! How a kernel goes through the batches of a segment: one by one, or several together in stages.
+//!
+//! A sweep gathers bodies and forms rows, solves the rows, and applies and scatters: three stages. One batch needs more
+//! registers than there are, and its chain of a hundred dependent instructions fills the window of out-of-order
+//! execution. Where several batches are in the same stage, a stage needs fewer registers, and its short chain overlaps
+//! with that of the next batch. So at four and at eight lanes eight batches go together:
+//!
+//! ```text
+//! large_pyramid          8 lanes, 16 registers   8 lanes, 32   4 lanes, 32   16 lanes, 32: by 2, by 4
+//! soft_step   soft              −12 %                −7 %         −11 %            +1      −1 %
+//!             relaxing          −12 %                −8 %          −9 %            +1       0 %
+//! shim        soft              −13 %                −4 %          −6 %            +4      −2 %
+//!             relaxing           −1 %                −2 %          −1 %           +11      +5 %
+//! ```
+//!
+//! At sixteen lanes batches go one by one, as they do in segments of fewer than eight, where sweeps
+//! take 0 to 8 % longer than before there were stages (`pyramid:10`, `stack:20`). In other numbers, with 16
+//! registers and eight lanes (`soft_step`, four stages): 2, 4, 8 and 16 batches gained 1, 3, 4 and 3 %. Four stages cost
+//! 4 % more than three where gathering is apart from forming rows, 4 and 6 % where positions are apart from velocities.
+
+use crate::engine::constraints::kernels::frame::{
+    BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame,
+};
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::features::{KernelFeatures, Layout, Opposite};
+use crate::engine::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
+
+/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
+macro_rules! over_segments {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        $crate::engine::lanes::align_frame();
+        for i in 0..$batches.visits().len() {
+            let segment = $batches.visits()[i];
+            match segment.opposite {
+                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                _ => $kernel::<$l, $n, OnMoving $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            }
+        }
+    };
+}
+pub(crate) use over_segments;
+
+/// Prefetch distance of records, in batches. Without, 150 000 contacts cost 2 to 5 times as
+/// much, as their records come from memory; with two batches 5 %, with eight nothing more. Asking only
+/// where records exceed a cache gains nothing below, and costs soft sweeps 8 %.
+const PREFETCH_BATCHES: usize = 4;
+
+/// Walks the batches of a segment: `visit(rows, record, row_a, row_b)`.
+#[inline(always)]
+pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowStore + ?Sized>(
+    rows: &mut S,
+    batches: &mut Batches,
+    segment: &Segment,
+    mut visit: impl FnMut(&mut S, &mut [L], LaneIndex<L::Index>, LaneIndex<L::Index>),
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    if O::HAS_ROW {
+        rows.assert_rows(row_a);
+    }
+    for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {
+        let (record, later) = records.split_at_mut(layout.stride);
+        prefetch(later, (PREFETCH_BATCHES - 1) * layout.stride..PREFETCH_BATCHES * layout.stride);
+        visit(rows, record, row_a, row_b);
+        records = later;
+    }
+}
+
+/// Two bodies while the rows of their contact are solved, and what the rows have applied.
+#[derive(Clone, Copy)]
+pub(crate) struct PairState<L> {
+    /// Velocities (m/s) and inverse masses (1/kg) of bodies a and b: `[vx, vy, m⁻¹]`, as they were.
+    linear: [[L; 3]; 2],
+    /// Inverse inertias of a and b (1/(kg·m²)).
+    pub(crate) inertia: [L; 2],
+    /// Spins of a and b so far (rad/s).
+    pub(crate) w: [L; 2],
+    /// Impulses along n and along t (N·s).
+    pub(crate) sum: [L; 2],
+}
+
+impl<L: Lanes> PairState<L> {
+    #[inline(always)]
+    fn zero() -> Self {
+        let pair = [L::zero(); 2];
+        PairState { linear: [[L::zero(); 3]; 2], inertia: pair, w: pair, sum: pair }
+    }
+
+    /// Reads all but the impulses.
+    #[inline(always)]
+    fn read(&mut self, BodyPair { a, b }: &BodyPair<L>) {
+        self.linear = [[a[VX], a[VY], a[INV_MASS]], [b[VX], b[VY], b[INV_MASS]]];
+        self.inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        self.w = [a[W], b[W]];
+    }
+
+    /// m_a⁻¹ + m_b⁻¹ (1/kg).
+    #[inline(always)]
+    pub(crate) fn mass_sum<O: Opposite>(&self) -> L {
+        let [[.., mass_a], [.., mass_b]] = self.linear;
+        if O::HAS_ROW { mass_a + mass_b } else { mass_b }
+    }
+
+    /// Velocities of b against a along n and t, by motion without spin, as they were (m/s).
+    #[inline(always)]
+    pub(crate) fn along<O: Opposite>(&self, record: &[L]) -> [L; 2] {
+        let [a, b] = self.linear;
+        to_frame::<L, O>([a[0], a[1]], [b[0], b[1]], [record[0], record[1]])
+    }
+
+    /// The bodies with all that was applied.
+    #[inline(always)]
+    fn moved<O: Opposite>(&self, record: &[L]) -> BodyPair<L> {
+        let (mut a, mut b) = ([L::zero(); 8], [L::zero(); 8]);
+        for (row, linear) in [&mut a, &mut b].into_iter().zip(self.linear) {
+            [row[VX], row[VY], row[INV_MASS]] = linear;
+        }
+        apply::<L, O>(&mut a, &mut b, [record[0], record[1]], self.sum, self.w);
+        BodyPair { a, b }
+    }
+}
+
+/// A kernel in stages: what it does between gathering bodies and scattering them.
+pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
+    /// What it keeps of a batch from one stage to the next, besides the bodies.
+    type Begun: Copy;
+
+    fn nothing() -> Self::Begun;
+
+    /// With the bodies at hand: forms the rows. The impulses in `state` are of no meaning yet.
+    fn begin(
+        self,
+        bodies: &BodyPair<L>,
+        record: &mut [L],
+        pushes_a: bool,
+        state: &mut PairState<L>,
+        begun: &mut Self::Begun,
+    );
+
+    /// Solves them, and sets the impulses.
+    fn solve(self, begun: &Self::Begun, record: &mut [L], state: &mut PairState<L>);
+}
+
+/// Batches that go through the stages together.
+const GROUP: usize = 8;
+
+/// Runs a kernel over a segment: all contacts of a batch at once.
+#[inline(always)]
+pub(crate) fn in_stages<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
+where
+    L: Lanes,
+    N: KernelFeatures,
+    O: Opposite,
+    K: Stages<L, N, O>,
+    S: RowStore + ?Sized,
+{
+    if const { L::WIDTH > 1 && L::WIDTH < 16 } && segment.disjoint && segment.batches >= GROUP {
+        return together::<L, N, O, K, S>(rows, batches, segment, kernel);
+    }
+    let pushes_a = segment.pushes_a();
+    for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let bodies = BodyPair::gather::<O, S>(rows, row_a, row_b);
+        let (mut state, mut begun) = (PairState::zero(), K::nothing());
+        state.read(&bodies);
+        kernel.begin(&bodies, record, pushes_a, &mut state, &mut begun);
+        kernel.solve(&begun, record, &mut state);
+        state.moved::<O>(record).scatter_velocities::<O, S>(rows, row_a, row_b, pushes_a);
+    });
+}
+
+/// As batch by batch, but `GROUP` batches together; the bits are the same, since no two contacts of the segment push the
+/// same body.
+#[inline(never)]
+fn together<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
+where
+    L: Lanes,
+    N: KernelFeatures,
+    O: Opposite,
+    K: Stages<L, N, O>,
+    S: RowStore + ?Sized,
+{
+    align_frame();
+    let layout = const { Layout::of::<N, O>() };
+    let stride = layout.stride;
+    let pushes_a = segment.pushes_a();
+    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    rows.assert_rows(row_b);
+    if O::HAS_ROW {
+        rows.assert_rows(row_a);
+    }
+    let mut group = [(PairState::<L>::zero(), K::nothing()); GROUP];
+    for first in (0..segment.batches).step_by(GROUP) {
+        let count = GROUP.min(segment.batches - first);
+        let lanes = first * L::WIDTH..(first + count) * L::WIDTH;
+        let (row_a, row_b) = (row_a.part(lanes.clone()), row_b.part(lanes));
+        let bodies = || row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());
+        let mut coming = &mut *records;
+        for ((state, begun), (row_a, row_b)) in group.iter_mut().zip(bodies()) {
+            let (record, later) = coming.split_at_mut(stride);
+            prefetch(later, (PREFETCH_BATCHES - 1) * stride..PREFETCH_BATCHES * stride);
+            let bodies = BodyPair::gather_whole::<O, S>(rows, row_a, row_b);
+            state.read(&bodies);
+            kernel.begin(&bodies, record, pushes_a, state, begun);
+            coming = later;
+        }
+        let (now, later) = records.split_at_mut(count * stride);
+        for ((state, begun), record) in group.iter_mut().zip(now.chunks_exact_mut(stride)) {
+            // A copy, so that spins stay in registers while records are written.
+            let mut copy = *state;
+            kernel.solve(begun, record, &mut copy);
+            (state.w, state.sum) = (copy.w, copy.sum);
+        }
+        for ((state, _), (record, (row_a, row_b))) in group.iter().zip(now.chunks_exact(stride).zip(bodies()))
+        {
+            state.moved::<O>(record).scatter_velocities::<O, S>(rows, row_a, row_b, pushes_a);
+        }
+        records = later;
+    }
+}

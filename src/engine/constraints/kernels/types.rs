@@ -1,0 +1,127 @@
+//! Constraints of other types than contacts, which join passes, colours and batches.
+//!
+//! A type says which bodies its constraints are on and brings its own kernel. Its constraints are
+//! coloured together with the contacts, so that the lanes of a colour push different bodies
+//! whatever they are of, and every pass of a solver runs over both: within a colour the other types
+//! come first, then the contacts. No solver knows which types there are, nor a type which solver runs:
+//! [`TypeRows`] reads and writes bodies as the pass wants it, so that one kernel serves Gauss–Seidel and
+//! Jacobi sweeps.
+//!
+//! What is no pass knows contacts alone: vectors over contact points ([`crate::engine::constraints::records::point_vector`]) and block descent
+//! (`solvers/avbd/descent.rs`), which would need positions, forces and penalties of a row. Under solvers that use vectors other
+//! types are as their sweeps leave them; under `avbd`, which has no sweeps, they do nothing.
+
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::pass::{PassMode, PassWidth};
+use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
+use crate::engine::constraints::records::batches::Batches;
+use crate::engine::constraints::records::order::SweepOrder;
+use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use std::fmt;
+
+/// A pass over the constraints of one type.
+pub struct TypeInput<'a> {
+    /// What the pass is for: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
+    /// feedback), [`Phase::Relax`] (without), [`Phase::Position`] or [`Phase::Store`].
+    pub phase: Phase,
+    /// Whether only effective masses are asked for, and the factor on increments in a Jacobi sweep.
+    pub mode: PassMode,
+    /// Substep (s).
+    pub h: f32,
+    /// Lanes that the pass runs at.
+    pub width: PassWidth,
+    /// The rows of all bodies.
+    pub rows: TypeRows<'a>,
+    /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
+    pub batches: &'a mut Batches,
+}
+
+/// One row per body, and an inert one at the end: gathered and written in place or, in a Jacobi sweep,
+/// gathered as they were before it, while what is written is summed up.
+pub struct TypeRows<'a>(Access<'a>);
+
+enum Access<'a> {
+    InPlace(&'a mut [BodyRow]),
+    Summed(SummedRows<'a>),
+}
+
+impl<'a> TypeRows<'a> {
+    pub(crate) fn new(rows: &'a mut [BodyRow], sums: &'a mut [BodyRow], mode: PassMode) -> Self {
+        TypeRows(match mode {
+            PassMode::Jacobi { .. } => Access::Summed(SummedRows { before: rows, sums }),
+            PassMode::InTurn | PassMode::Masses => Access::InPlace(rows),
+        })
+    }
+}
+
+impl RowStore for TypeRows<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        match &self.0 {
+            Access::InPlace(rows) => rows.assert_rows(index),
+            Access::Summed(rows) => rows.assert_rows(index),
+        }
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        match &self.0 {
+            Access::InPlace(rows) => L::gather(rows, index),
+            Access::Summed(rows) => rows.gather::<L>(index),
+        }
+    }
+
+    #[inline(always)]
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        match &mut self.0 {
+            Access::InPlace(rows) => L::scatter_velocity(rows, index, velocity),
+            Access::Summed(rows) => rows.scatter_velocity(index, velocity),
+        }
+    }
+}
+
+/// A type of constraint between two bodies.
+pub trait ConstraintType: fmt::Debug + Send {
+    /// Bodies a and b of each constraint; b is dynamic.
+    fn ends(&self) -> &[[u32; 2]];
+
+    /// Lane vectors of a record.
+    fn stride(&self) -> usize;
+
+    /// Runs one pass. Every width is to give the same bits.
+    ///
+    /// In [`PassMode::Masses`] it recomputes the effective masses in its records from the rows, whatever the
+    /// phase; in [`PassMode::Jacobi`] it multiplies its increments by `relaxation`.
+    fn run(&mut self, on: TypeInput<'_>);
+
+    /// A copy, with what it keeps from step to step: a world that is held still gets it back.
+    fn boxed(&self) -> Box<dyn ConstraintType>;
+}
+
+/// A type and the lanes of its constraints.
+#[derive(Debug)]
+pub struct Joined {
+    /// The type.
+    pub kind: Box<dyn ConstraintType>,
+    /// Coloured batches at the width of the step.
+    pub(crate) lanes: Batches,
+    /// What is solved one after the other.
+    pub(crate) serial: Batches,
+}
+
+impl Joined {
+    /// A type that no lanes have been assigned for.
+    pub fn new(kind: Box<dyn ConstraintType>) -> Self {
+        Joined { kind, lanes: Batches::default(), serial: Batches::default() }
+    }
+
+    /// Its batches, coloured and serial.
+    pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
+        [&mut self.lanes, &mut self.serial]
+    }
+
+    pub(crate) fn arrange(&mut self, order: SweepOrder) {
+        self.lanes.arrange(order);
+        self.serial.arrange(order);
+    }
+}

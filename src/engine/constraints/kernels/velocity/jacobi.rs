@@ -1,0 +1,99 @@
+//! The Jacobi sweep: all contacts read the velocities from before the sweep, and what they add
+//! to a body is summed up and applied afterwards.
+//!
+//! Within a contact the rows are still solved one after the other (`catto2024solver2d`,
+//! `solve_jacobi`). Sums have an order: colour by colour, so that they have the same bits at every
+//! width; in exact arithmetic no order matters. The kernel is that of [`crate::engine::constraints::kernels::velocity::sweep`], given a store
+//! of rows that reads from one place and adds up in another.
+
+use crate::engine::constraints::kernels::frame::{INV_MASS, VX, VY, W};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::engine::constraints::kernels::stages::over_segments;
+use crate::engine::constraints::kernels::velocity::rules::{Relaxed, Soft};
+use crate::engine::constraints::kernels::velocity::sweep::sweep_segment;
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind,
+};
+use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+
+/// A Jacobi sweep under the soft rule, which without springs is the rigid one.
+#[derive(Debug)]
+pub(crate) struct JacobiSweep<'a> {
+    pub rule: Soft,
+    pub relaxation: f32,
+    /// Sums of velocity increments. `[rows]`
+    pub sums: &'a mut [BodyRow],
+}
+
+impl Pass for JacobiSweep<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Both bodies once for their velocities and once for their sums.
+        let sweep = PerLane::of_sweep(layout, true, opposite);
+        PerLane { rows: sweep.rows + sweep.halves, ..sweep }
+    }
+
+    fn mode(&self) -> PassMode {
+        PassMode::Jacobi { relaxation: self.relaxation }
+    }
+
+    fn sums(&mut self) -> &mut [BodyRow] {
+        self.sums
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        let mut store = SummedRows { before: on.rows, sums: self.sums };
+        let rule = Relaxed { rule: self.rule, factor: self.relaxation };
+        over_segments!(sweep_segment, L, F, Relaxed<Soft>, SummedRows; &mut store, on.batches, rule);
+    }
+}
+
+/// Sums start at zero.
+pub(crate) fn begin(rows: &[BodyRow], sums: &mut Vec<BodyRow>) {
+    sums.clear();
+    sums.resize(rows.len(), BodyRow::default());
+}
+
+/// v ← v + Σ Δv, for every row. Of a body that was split into n copies, each with the n-th part of its
+/// mass, the mean of the copies: v + Σ Δv/n. `masses` are the inverse masses and inertias of the whole
+/// bodies, or empty.
+pub(crate) fn finish(rows: &mut [BodyRow], sums: &[BodyRow], masses: &[[f32; 2]]) {
+    for (i, (row, sum)) in rows.iter_mut().zip(sums).enumerate() {
+        let split = row.velocity[INV_MASS];
+        let share = match masses.get(i) {
+            Some(whole) if split > 0.0 => whole[0] / split,
+            _ => 1.0,
+        };
+        for k in [VX, VY, W] {
+            row.velocity[k] = share.mul_add(sum.velocity[k], row.velocity[k]);
+        }
+    }
+}
+
+/// Reads velocities from before the sweep; a write adds the difference to the sums.
+pub(crate) struct SummedRows<'a> {
+    pub(crate) before: &'a [BodyRow],
+    pub(crate) sums: &'a mut [BodyRow],
+}
+
+impl RowStore for SummedRows<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        self.before.assert_rows(index);
+        self.sums.assert_rows(index);
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self.before, index)
+    }
+
+    #[inline(always)]
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        let (old, mut sum) = (L::gather(self.before, index), L::gather(self.sums, index));
+        for k in [VX, VY, W] {
+            sum[k] = sum[k] + (velocity[k] - old[k]);
+        }
+        L::scatter_velocity(self.sums, index, [sum[VX], sum[VY], sum[W], sum[INV_MASS]]);
+    }
+}

@@ -1,0 +1,102 @@
+//! Effective masses for bodies whose masses are scaled for a while.
+//!
+//! Mass splitting solves each contact as if it had a part of its bodies' masses to itself; shock
+//! propagation as if what it stands on could not move. Both scale the inverse masses in the rows, and
+//! the effective masses 1/k in the records must follow, k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² +
+//! I_b⁻¹ (r_b × u)².
+
+use crate::engine::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::engine::constraints::records::batches::{Batches, Segment};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::lanes::{BodyRow, Lanes, held};
+
+/// Inverse masses and inertias of bodies while they are scaled.
+#[derive(Clone, Debug, Default)]
+pub struct ScaledMasses {
+    /// As they are without any factor; empty while they are not scaled. `[bodies]`
+    whole: Vec<[f32; 2]>,
+}
+
+impl ScaledMasses {
+    /// Multiplies those of the rows by `factor(body)`, from what they are without any.
+    pub(crate) fn scale(&mut self, rows: &mut [BodyRow], factor: impl Fn(usize) -> f32) {
+        if self.whole.is_empty() {
+            self.whole.extend(rows.iter().map(|row| [row.velocity[3], row.delta[3]]));
+        }
+        let bodies = rows.len() - 1;
+        for (i, (row, whole)) in rows[..bodies].iter_mut().zip(&self.whole).enumerate() {
+            let factor = factor(i);
+            (row.velocity[3], row.delta[3]) = (factor * whole[0], factor * whole[1]);
+        }
+    }
+
+    /// They are not scaled any more.
+    pub(crate) fn forget(&mut self) {
+        self.whole.clear();
+    }
+
+    /// Without any factor; empty while they are not scaled. `[bodies]`
+    pub(crate) fn whole(&self) -> &[[f32; 2]] {
+        &self.whole
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        held(&self.whole)
+    }
+}
+
+/// Recomputes the effective masses of all records from the rows.
+pub(crate) struct EffectiveMasses;
+
+impl Pass for EffectiveMasses {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let masses = layout.points * if layout.has_friction { 2 } else { 1 };
+        let read = layout.points * layout.arms() + masses;
+        PerLane { halves: 0, ..PerLane::of_bodies(read, masses, opposite) }
+    }
+
+    fn mode(&self) -> PassMode {
+        PassMode::Masses
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        over_segments!(segment, L, F; on.rows, on.batches);
+    }
+}
+
+#[inline(always)]
+fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        for p in 0..N::POINTS {
+            for (axis, at) in [layout.normal_mass, layout.tangent_mass].into_iter().enumerate() {
+                if axis == 1 && !N::FRICTION {
+                    continue;
+                }
+                let arm = arms::<L, N, O>(record, &layout, p, axis);
+                let mut k = mass_sum;
+                if N::ROTATION {
+                    k = (b[INV_INERTIA] * arm[1]).mul_add(arm[1], k);
+                    if O::HAS_ROW {
+                        k = (a[INV_INERTIA] * arm[0]).mul_add(arm[0], k);
+                    }
+                }
+                // A point that is not there has no mass, and keeps none.
+                let at = layout.at(p, at);
+                record[at] = record[at].select_positive(L::splat(1.0) / k, L::zero());
+            }
+        }
+    });
+}

@@ -1,0 +1,34 @@
+//! Rigid contacts: no velocity into the contact, no position feedback.
+
+use super::Rule;
+use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::engine::lanes::Lanes;
+
+/// λ ← max(0, λ − m_eff (v_n + max(s, 0)/h)): gaps may close and no more; no position feedback.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rigid {
+    /// 1/h (1/s)
+    pub inv_h: f32,
+}
+
+impl Rigid {
+    /// In substeps of `h` (s).
+    pub fn new(h: f32) -> Self {
+        Rigid { inv_h: 1.0 / h }
+    }
+
+    /// As [`Self::new`], as a value.
+    pub fn rule(h: f32) -> Rule {
+        Rule::Rigid(Sweep(Self::new(h)))
+    }
+}
+
+impl NormalRule for Rigid {
+    const FRICTION: bool = true;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, _against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        let gap = separation.max(L::zero()) * L::splat(self.inv_h);
+        [mass.neg_mul_add(gap, old), mass]
+    }
+}

@@ -1,0 +1,28 @@
+//! Rigid contacts at points that touch.
+
+use super::Rule;
+use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::engine::lanes::Lanes;
+
+/// λ ← max(0, λ − m_eff v_n) at points that touch, s < slop; others keep their impulse. No friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touching {
+    /// Largest gap of a point that counts as touching (m).
+    pub slop: f32,
+}
+
+impl Touching {
+    /// Points within `slop` (m).
+    pub fn rule(slop: f32) -> Rule {
+        Rule::Touching(Sweep(Touching { slop }))
+    }
+}
+
+impl NormalRule for Touching {
+    const FRICTION: bool = false;
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, _against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        [old, (L::splat(self.slop) - separation).select_positive(mass, L::zero())]
+    }
+}

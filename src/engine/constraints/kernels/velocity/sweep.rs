@@ -1,0 +1,379 @@
+//! The contact sweep: one text for every width, every need, every solver. Bodies and rows are as in [`crate::engine::constraints::kernels::frame`].
+//!
+//! # Coupling
+//!
+//! An impulse δ of row p changes the velocity along row q of the same contact by k_pq δ,
+//!
+//! ```text
+//! k_pq = [p and q along the same axis] (m_a⁻¹ + m_b⁻¹) + I_a⁻¹ A_ap A_aq + I_b⁻¹ A_bp A_bq
+//! ```
+//!
+//! with the arms A = r × u. So Gauss–Seidel over the rows needs no body: each row keeps what
+//! its impulse would be, unclamped, at the velocity so far, λ_q = c_q − s_q v_q, and a row
+//! before it takes s_q k_pq δ_p away. From one row to the next it is then one multiply-add,
+//! one clamp and one difference. Against updating `along_n`, `along_t`, ω_a and ω_b after each
+//! row that is 12 % faster, or 6 % with k between points alone. The k are formed in registers.
+//!
+//! # Floor, and how far from it
+//!
+//! Two points with friction against a dynamic body, 16 lanes, one Zen 5 core (AVX-512) at up to
+//! 3.8 GHz. A contact is 92 bytes to read and 16 to write; a batch is about 430 instructions
+//! (relaxing; 470 with soft contacts), of which 104 shuffle body rows and 110 to 130 are
+//! arithmetic. Issued at 8 per cycle that is 0.9 to 1.0 ns per contact; 92 bytes are 0.9 ns at the
+//! 100 GB/s of the third-level cache and 2.5 ns at the 37 GB/s of memory. Measured, soft and
+//! relaxing: 2.3 and 2.2 ns with 1 300 contacts, 2.4 and 2.3 with 15 000, 2.9 and 2.7 with
+//! 150 000. So memory is nearly the bound there, and elsewhere the kernel is at 2.4 times its
+//! floor: a batch fills the window of out-of-order execution, so that the chain from a row's
+//! load through four clamps to its store overlaps with little of the next batch. What pays is
+//! a shorter chain and fewer instructions, not fewer bytes.
+//!
+//! With 16 registers (AVX2, `x86-64-v3`), eight lanes, relaxing: a batch is 412 instructions instead of the 349
+//! that it is with 32. Of these 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have an
+//! operand in it instead of 6; 72 shuffles and some 120 of arithmetic are the same. On the same core that takes 11 %
+//! longer, soft contacts 15 %. Where the stack lay cost more than that (`align_frame`). [`crate::engine::constraints::kernels::stages`] is the answer.
+//!
+//! Tried without gain, without stages: the k of coupling in the record (53 instructions less; −5 and −3 %, preparing +18 %), friction
+//! rows that wait for the spins (41 less; −3 and −2 %), reading records again instead of keeping them on the stack (0 and
+//! −1 %), and a barrier that keeps an inverse mass in one register, not in the two that it is shuffled from (0, −2 %).
+//!
+//! # Order of rows
+//!
+//! Both normal rows, then both friction rows. Point by point (normal, friction, normal, friction) costs the same
+//! and converges faster: on a pyramid of base 20 by 0.9967 instead of 0.9974 per sweep, and `soft_step` left
+//! 1.4 µm/s instead of 313 on `pyramid:40`. But then the first friction row answers to a spin that the second normal
+//! row would have taken away: boxes wander sideways, one on an incline drifts (A1.stick, A1.slip fail), and a pile
+//! under `pgs` falls (B3.pile). More in `papers/solver2d.md`.
+//!
+//! Tried without gain: row indices stored as multiples that the addressing mode takes (32
+//! instructions less, relaxing −3 %, soft 0 %; left to itself the compiler then forms addresses
+//! in vectors, +20 %).
+//! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
+//! (gather, solve, scatter by colour); the contact frame is this crate's own.
+
+use crate::engine::constraints::kernels::frame::{
+    BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
+};
+use crate::engine::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::engine::constraints::records::batches::{Batches, Segment};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+
+/// How a normal row's state becomes its new accumulated impulse.
+///
+/// `against_static` tells that body a is static or kinematic.
+pub trait NormalRule: Copy + Send + Sync + 'static {
+    /// Whether the sweep solves the friction rows as well.
+    const FRICTION: bool;
+    /// Whether the rule reads the separation.
+    const SEPARATION: bool = true;
+    /// Whether arms turn with their bodies within the step.
+    const TURNED: bool = false;
+
+    /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
+    /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
+    ///
+    /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
+
+    /// The same slope (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
+    #[inline(always)]
+    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
+        mass
+    }
+
+    /// The new accumulated impulse (N·s), ≥ 0, at the normal velocity `vn` (m/s).
+    #[inline(always)]
+    fn normal_impulse<L: Lanes>(&self, against_static: bool, vn: L, separation: L, mass: L, old: L) -> L {
+        let [constant, slope] = self.line(against_static, separation, mass, old);
+        slope.neg_mul_add(vn, constant).max(L::zero())
+    }
+
+    /// One velocity sweep under this rule over all segments, in order.
+    ///
+    /// A method of the rule, so that the compiler puts its instances beside the rule: rules in
+    /// files of their own are compiled side by side, and again only if they change.
+    #[inline(never)]
+    fn sweep<L: Lanes, N: KernelFeatures>(self, rows: &mut [BodyRow], batches: &mut Batches) {
+        over_segments!(sweep_segment, L, N, Self, [BodyRow]; rows, batches, self);
+    }
+}
+
+/// The velocity sweep under a rule: Gauss–Seidel on the accumulated impulses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep<R>(pub R);
+
+impl<R: NormalRule> Pass for Sweep<R> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
+
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        self.0.sweep::<L, F>(on.rows, on.batches);
+    }
+}
+
+/// A velocity sweep under some rule: a pass that can say which law it solves.
+pub trait VelocitySweep: AnyPass {
+    /// Whether friction rows are solved.
+    fn has_friction(&self) -> bool;
+
+    /// [`NormalRule::normal_impulse`] of one row.
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32;
+
+    /// The same sweep, owned.
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync>;
+}
+
+impl<R: NormalRule> VelocitySweep for Sweep<R> {
+    fn has_friction(&self) -> bool {
+        R::FRICTION
+    }
+
+    fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32 {
+        self.0.normal_impulse(against_static, vn, separation, mass, old)
+    }
+
+    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync> {
+        Box::new(*self)
+    }
+}
+/// The rows of a contact along one axis.
+pub(crate) struct Rows<L> {
+    /// Of bodies a and b, per point.
+    arm: [[L; 2]; 2],
+    /// s: what a unit of velocity takes away (kg).
+    slope: [L; 2],
+    /// c − s v, unclamped, at the velocity so far (N·s).
+    impulse: [L; 2],
+    /// Accumulated impulse before the sweep (N·s).
+    old: [L; 2],
+    /// What the rows have applied (N·s).
+    pub(crate) sum: L,
+}
+
+impl<L: Lanes> Rows<L> {
+    pub(crate) fn new() -> Self {
+        let pair = [L::zero(); 2];
+        Rows { arm: [pair; 2], slope: pair, impulse: pair, old: pair, sum: L::zero() }
+    }
+
+    /// Row `q` after the impulse `delta` at a row with arms `from`; `direct` is the part of k
+    /// that is not by rotation.
+    #[inline(always)]
+    pub(crate) fn answer<N: KernelFeatures, O: Opposite>(
+        &mut self,
+        q: usize,
+        direct: L,
+        inertia: [L; 2],
+        from: [L; 2],
+        delta: L,
+    ) {
+        let mut k = direct;
+        if N::ROTATION {
+            k = (inertia[1] * from[1]).mul_add(self.arm[q][1], k);
+            if O::HAS_ROW {
+                k = (inertia[0] * from[0]).mul_add(self.arm[q][0], k);
+            }
+        }
+        self.impulse[q] = (self.slope[q] * k).neg_mul_add(delta, self.impulse[q]);
+    }
+
+    /// Reads the friction row of point `p`, whose arms are `arm`; `impulse` is its [`unbounded_friction`].
+    #[inline(always)]
+    pub(crate) fn load_friction<R: NormalRule>(
+        &mut self,
+        p: usize,
+        record: &[L],
+        layout: &Layout,
+        rule: R,
+        arm: [L; 2],
+        impulse: L,
+    ) {
+        self.slope[p] = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
+        self.old[p] = record[layout.at(p, layout.tangent_impulse)];
+        (self.arm[p], self.impulse[p]) = (arm, impulse);
+    }
+
+    /// Solves the friction rows one after the other, bounded by `normal` impulses.
+    #[inline(always)]
+    pub(crate) fn solve_friction<N: KernelFeatures, O: Opposite>(
+        &mut self,
+        record: &mut [L],
+        layout: &Layout,
+        normal: [L; 2],
+        mass_sum: L,
+        state: &mut PairState<L>,
+    ) {
+        let inertia = state.inertia;
+        let friction = record[layout.friction];
+        for p in 0..N::POINTS {
+            let bound = friction * normal[p];
+            let new = self.impulse[p].min(bound).max(-bound);
+            record[layout.at(p, layout.tangent_impulse)] = new;
+            let delta = new - self.old[p];
+            self.sum = self.sum + delta;
+            let arm = self.arm[p];
+            for q in p + 1..N::POINTS {
+                self.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+            }
+            spin::<L, N, O>(&mut state.w, inertia, arm, delta);
+        }
+    }
+}
+
+/// c − s v of the friction row of point `p`, which slides at `vt` (m/s): its impulse (N·s) before the cone bounds it.
+#[inline(always)]
+pub(crate) fn unbounded_friction<L: Lanes, R: NormalRule>(
+    record: &[L],
+    layout: &Layout,
+    p: usize,
+    rule: R,
+    vt: L,
+) -> L {
+    let slope = rule.tangent_slope(record[layout.at(p, layout.tangent_mass)]);
+    slope.neg_mul_add(vt, record[layout.at(p, layout.tangent_impulse)])
+}
+
+/// The sweep as a kernel: Gauss–Seidel within a contact.
+#[derive(Clone, Copy)]
+struct RowByRow<R>(R);
+
+/// See [`Stages::Begun`].
+#[derive(Clone, Copy)]
+struct Begun<L> {
+    /// sin Δθ, and 1 − cos Δθ, of a and b; only where arms turn.
+    turn: [[L; 2]; 2],
+    /// Of the normal rows: what a unit of velocity takes away (kg).
+    slope: [L; 2],
+    /// Of the rows along n, and along t: c − s v, unclamped (N·s).
+    impulse: [[L; 2]; 2],
+}
+
+impl<L: Lanes> Begun<L> {
+    /// Arms of bodies a and b at point `p` along n, and along t, as the rule has them.
+    #[inline(always)]
+    fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
+        let layout = const { Layout::of::<N, O>() };
+        let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+        if R::TURNED { turned(arm_n, arm_t, self.turn[0], self.turn[1]) } else { [arm_n, arm_t] }
+    }
+}
+
+impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for RowByRow<R> {
+    type Begun = Begun<L>;
+
+    #[inline(always)]
+    fn nothing() -> Begun<L> {
+        let pair = [L::zero(); 2];
+        Begun { turn: [pair; 2], slope: pair, impulse: [pair; 2] }
+    }
+
+    #[inline(always)]
+    fn begin(
+        self,
+        BodyPair { a, b }: &BodyPair<L>,
+        record: &mut [L],
+        pushes_a: bool,
+        state: &mut PairState<L>,
+        begun: &mut Begun<L>,
+    ) {
+        let (layout, rule) = (const { Layout::of::<N, O>() }, self.0);
+        let [along_n, along_t] = state.along::<O>(record);
+        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], [record[0], record[1]])[0];
+        let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+        let (sine, versine) = ([sine_a, sine_b], [versine_a, versine_b]);
+        if R::TURNED {
+            begun.turn = [sine, versine];
+        }
+        for p in 0..N::POINTS {
+            let mut s = L::zero();
+            if R::SEPARATION {
+                s = separation::<L, N, O>(record, p, moved, sine, versine);
+            }
+            let [arm_n, arm_t] = begun.arms::<N, O, R>(record, p);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let old = record[layout.at(p, layout.normal_impulse)];
+            let [constant, slope] = rule.line(!pushes_a, s, mass, old);
+            let vn = with_arms::<L, N, O>(along_n, state.w, arm_n);
+            begun.impulse[0][p] = slope.neg_mul_add(vn, constant);
+            begun.slope[p] = slope;
+            if const { N::FRICTION && R::FRICTION } {
+                let vt = with_arms::<L, N, O>(along_t, state.w, arm_t);
+                begun.impulse[1][p] = unbounded_friction(record, &layout, p, rule, vt);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn solve(self, begun: &Begun<L>, record: &mut [L], state: &mut PairState<L>) {
+        let layout = const { Layout::of::<N, O>() };
+        let friction_rows = const { N::FRICTION && R::FRICTION };
+        let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());
+        let (inertia, mass_sum) = (state.inertia, state.mass_sum::<O>());
+        for p in 0..N::POINTS {
+            let [arm_n, arm_t] = begun.arms::<N, O, R>(record, p);
+            normal.arm[p] = arm_n;
+            normal.slope[p] = begun.slope[p];
+            normal.impulse[p] = begun.impulse[0][p];
+            normal.old[p] = record[layout.at(p, layout.normal_impulse)];
+            if friction_rows {
+                tangent.load_friction(p, record, &layout, self.0, arm_t, begun.impulse[1][p]);
+            }
+        }
+        for p in 0..N::POINTS {
+            let new = normal.impulse[p].max(L::zero());
+            normal.impulse[p] = new;
+            record[layout.at(p, layout.normal_impulse)] = new;
+            let delta = new - normal.old[p];
+            normal.sum = normal.sum + delta;
+            let arm = normal.arm[p];
+            for q in p + 1..N::POINTS {
+                normal.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+            }
+            if friction_rows {
+                for q in 0..N::POINTS {
+                    tangent.answer::<N, O>(q, L::zero(), inertia, arm, delta);
+                }
+            }
+            spin::<L, N, O>(&mut state.w, inertia, arm, delta);
+        }
+        if friction_rows {
+            tangent.solve_friction::<N, O>(record, &layout, normal.impulse, mass_sum, state);
+        }
+        state.sum = [normal.sum, tangent.sum];
+    }
+}
+
+/// One sweep over a segment.
+#[inline(always)]
+pub(crate) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
+    rows: &mut S,
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: R,
+) {
+    in_stages::<L, N, O, _, S>(rows, batches, segment, RowByRow(rule));
+}
+
+/// One velocity sweep over all segments, in order.
+pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    rule: R,
+) {
+    rule.sweep::<L, N>(rows, batches);
+}
+
+/// As [`sweep`], on rows that are kept in another way: to measure what that costs.
+#[inline(never)]
+pub fn sweep_store<L: Lanes, N: KernelFeatures, R: NormalRule, S: RowStore>(
+    rows: &mut S,
+    batches: &mut Batches,
+    rule: R,
+) {
+    over_segments!(sweep_segment, L, N, R, S; rows, batches, rule);
+}

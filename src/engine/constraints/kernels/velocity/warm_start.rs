@@ -1,0 +1,86 @@
+//! The warm start: impulses of the step before, as the first guess of this one.
+
+use crate::engine::constraints::kernels::frame::{
+    BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned,
+};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::engine::constraints::records::batches::{Batches, Segment};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::lanes::{BodyRow, Lanes};
+
+/// The warm start: applies the accumulated impulses, with the arms of the start of the step or with
+/// arms that turn with their bodies.
+pub struct WarmStart {
+    /// Arms turn.
+    pub turned: bool,
+}
+
+impl Pass for WarmStart {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Without friction only the arms along the normal.
+        let impulses = if layout.has_friction { 2 } else { 1 };
+        let arms = if layout.has_friction { layout.arms() } else { layout.arms() / 2 };
+        PerLane::of_bodies(2 + layout.points * (impulses + arms), 0, opposite)
+    }
+
+    #[inline(always)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        if self.turned {
+            warm_start_with::<L, F, true>(on.rows, on.batches);
+        } else {
+            warm_start_with::<L, F, false>(on.rows, on.batches);
+        }
+    }
+}
+
+/// Applies all accumulated impulses, with the arms of the start of the step.
+pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
+    warm_start_with::<L, N, false>(rows, batches);
+}
+
+#[inline(never)]
+fn warm_start_with<L: Lanes, N: KernelFeatures, const TURNED: bool>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+) {
+    over_segments!(warm_start_segment, L, N, TURNED; rows, batches);
+}
+
+/// Applies the accumulated impulses of a segment, as the first guess of a step.
+#[inline(always)]
+fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let pushes_a = segment.pushes_a();
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather_whole::<O, _>(rows, row_a, row_b);
+        let n = [record[0], record[1]];
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let mut w = [a[W], b[W]];
+        let (mut sum_n, mut sum_t) = (L::zero(), L::zero());
+        for p in 0..N::POINTS {
+            let mut arm_n = arms::<L, N, O>(record, &layout, p, 0);
+            let mut arm_t = arms::<L, N, O>(record, &layout, p, 1);
+            if TURNED && N::ROTATION {
+                let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+                [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+            }
+            let normal = record[layout.at(p, layout.normal_impulse)];
+            sum_n = sum_n + normal;
+            spin::<L, N, O>(&mut w, inertia, arm_n, normal);
+            if N::FRICTION {
+                let tangent = record[layout.at(p, layout.tangent_impulse)];
+                sum_t = sum_t + tangent;
+                spin::<L, N, O>(&mut w, inertia, arm_t, tangent);
+            }
+        }
+        apply::<L, O>(&mut a, &mut b, n, [sum_n, sum_t], w);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
+    });
+}

@@ -1,0 +1,144 @@
+//! Coulomb's law as a linear complementarity problem: in the plane it *is* one.
+//!
+//! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997 (solvability, copositive A). In 3D
+//! their friction cone is a pyramid, an approximation; in 2D it has just the two edges ±t, so
+//! nothing is lost.
+//!
+//! Split λt = β⁺ − β⁻ with β ≥ 0 and let σ be the slip speed. With u = G λ + b, b being the relative velocity
+//! without impulses and what the law adds to it:
+//!
+//! ```text
+//! 0 ≤ λn ⊥ un                   ≥ 0
+//! 0 ≤ β⁺ ⊥  ut + σ              ≥ 0
+//! 0 ≤ β⁻ ⊥ −ut + σ              ≥ 0
+//! 0 ≤ σ  ⊥ µ λn − β⁺ − β⁻       ≥ 0
+//! ```
+//!
+//! Sliding with ut > 0 makes the second row positive, so β⁺ = 0, then σ = ut > 0 by the third, and
+//! λt = −µ λn by the fourth. Sticking has ut = σ = 0. So w = A z + q; a frictionless contact has only its
+//! first row.
+//!
+//! A is scaled by S = 1/√G_ii on both sides of impulse rows and by the inverse on σ: G gets a unit
+//! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn). q is divided by its largest
+//! entry, which gives tolerances a meaning: the problem is homogeneous in (z, q).
+
+use crate::engine::constraints::numerics::lemke::{Outcome, lemke};
+use crate::engine::constraints::numerics::matrix::Matrix;
+
+/// `[normal, tangential]` of one contact point.
+pub type Pair = [f64; 2];
+
+/// The law of all contact points; see the [module](self).
+#[derive(Clone, Debug)]
+pub struct CoulombLcp {
+    a: Matrix,
+    q: Vec<f64>,
+    /// What q was divided by.
+    unit: f64,
+    /// 1/√G_ii
+    scale: Vec<Pair>,
+    /// The points that have friction.
+    frictional: Vec<usize>,
+}
+
+impl CoulombLcp {
+    /// The law of points with these Coulomb coefficients. `diagonal` and `free` are G_ii (1/kg) and b (m/s) of each;
+    /// `g(row, column)` are the entries of G, whose rows and columns are (n₀, t₀, n₁, t₁, …).
+    pub fn new(friction: &[f64], diagonal: &[Pair], free: &[Pair], g: impl Fn(usize, usize) -> f64) -> Self {
+        let frictional: Vec<usize> = (0..friction.len()).filter(|&i| friction[i] > 0.0).collect();
+        let (points, nf) = (friction.len(), frictional.len());
+        let n = points + 3 * nf;
+        let scale: Vec<Pair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
+        // Normal rows of all points; then β⁺ and β⁻ of each that has friction; then σ.
+        // An impulse row is a (point, direction, sign); a σ row has none.
+        let impulse_row = |row: usize| {
+            if row < points {
+                Some((row, 0, 1.0))
+            } else if row < points + 2 * nf {
+                let k = row - points;
+                Some((frictional[k / 2], 1, if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
+            } else {
+                None
+            }
+        };
+        let slip = |k: usize| points + 2 * nf + k;
+        let mut a = Matrix::from_fn(n, n, |row, column| match (impulse_row(row), impulse_row(column)) {
+            (Some((i, di, si)), Some((j, dj, sj))) => {
+                si * sj * g(2 * i + di, 2 * j + dj) * scale[i][di] * scale[j][dj]
+            }
+            _ => 0.0,
+        });
+        let mut q = vec![0.0; n];
+        for (row, q) in q.iter_mut().enumerate().take(points + 2 * nf) {
+            if let Some((i, direction, sign)) = impulse_row(row) {
+                *q = sign * scale[i][direction] * free[i][direction];
+            }
+        }
+        for (k, &i) in frictional.iter().enumerate() {
+            for beta in [points + 2 * k, points + 2 * k + 1] {
+                a[(beta, slip(k))] = 1.0;
+                a[(slip(k), beta)] = -1.0;
+            }
+            a[(slip(k), i)] = friction[i] * scale[i][0] / scale[i][1];
+        }
+        let unit = q.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        if unit > 0.0 {
+            q.iter_mut().for_each(|x| *x /= unit);
+        }
+        CoulombLcp { a, q, unit, scale, frictional }
+    }
+
+    /// Rows: one of each point, and three more of each with friction.
+    pub fn rows(&self) -> usize {
+        self.q.len()
+    }
+
+    /// (λn, λt) of all points (N·s) by Lemke's method with this covering vector, by at most `pivots` pivots, or
+    /// why there is no answer.
+    ///
+    /// # Panics
+    /// If `covering` is not [`Self::rows`] long.
+    pub fn solve(&self, covering: &[f64], pivots: usize) -> Result<Vec<Pair>, Outcome> {
+        let z = match lemke(&self.a, &self.q, covering, pivots).outcome {
+            Outcome::Solution(z) => z,
+            other => return Err(other),
+        };
+        let (scale, unit, points) = (&self.scale, self.unit, self.scale.len());
+        let mut impulses: Vec<Pair> = (0..points).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
+        for (k, &i) in self.frictional.iter().enumerate() {
+            impulses[i][1] = unit * scale[i][1] * (z[points + 2 * k] - z[points + 2 * k + 1]);
+        }
+        Ok(impulses)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mass point of 2 kg that is pushed onto a floor, and along it by `along` (m/s), at µ = 0.5.
+    fn pushed(along: f64) -> Pair {
+        let g = |row, column| if row == column { 0.5 } else { 0.0 };
+        let law = CoulombLcp::new(&[0.5], &[[0.5; 2]], &[[-3.0, along]], g);
+        assert_eq!(law.rows(), 4);
+        law.solve(&vec![1.0; law.rows()], 100).unwrap()[0]
+    }
+
+    #[test]
+    fn points_stick_within_the_cone_and_slip_on_its_edge() {
+        for (along, tangent) in [(1.0, -2.0), (-1.0, 2.0), (2.0, -3.0), (-4.0, 3.0)] {
+            let [normal, found] = pushed(along);
+            assert!((normal - 6.0).abs() < 1e-14 && (found - tangent).abs() < 1e-14, "{along}: {found}");
+        }
+    }
+
+    #[test]
+    fn only_points_with_friction_have_rows_of_slip() {
+        // Two points of masses 1 and 4 kg; the second parts by itself.
+        let mass = [1.0, 1.0, 0.25, 0.25];
+        let g = |row: usize, column| if row == column { mass[row] } else { 0.0 };
+        let law = CoulombLcp::new(&[0.0, 0.3], &[[1.0; 2], [0.25; 2]], &[[-2.0, 5.0], [1.0, 1.0]], g);
+        assert_eq!(law.rows(), 5);
+        assert_eq!(law.solve(&[1.0; 5], 100).unwrap(), [[2.0, 0.0], [0.0, 0.0]]);
+    }
+}

@@ -1,0 +1,7 @@
+//! Pure mathematics: no body, no contact.
+
+pub mod cone;
+pub mod coulomb_lcp;
+pub mod lemke;
+pub mod matrix;
+pub(crate) mod supports;

@@ -1,0 +1,152 @@
+//! What the points under a body bear at rest.
+//!
+//! The loads F of the points balance a force f and a torque τ as well as their laws allow: with the columns
+//! (u, r × u/ρ) of the unit normals and tangents u in A, and ρ the radius of gyration,
+//!
+//! ```text
+//! least |A F + (f, τ/ρ)|,   F_n ≥ 0,   |F_t| ≤ µ F_n
+//! ```
+//!
+//! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
+//! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = W Aᵀ (A W Aᵀ + ε)⁻¹ b, with the weight of a
+//! friction as large as the load of its point: points with one normal reach their cones together. Points that would pull
+//! are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times. No point gets more than
+//! [`GREATEST`] times the force, as wedges would ask for.
+
+use glam::{DMat3, DVec2, DVec3};
+
+/// Solutions per body, each for what the last one has left out.
+const ROUNDS: usize = 4;
+
+/// Greatest load of a point over the force on the body (1).
+const GREATEST: f64 = 2.0;
+
+/// What is added to the diagonal of A Aᵀ, which has numbers of the order of 1.
+const RIDGE: f64 = 1e-6;
+
+/// A point on which a body stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Support {
+    /// Index of its contact.
+    pub contact: u32,
+    /// Which of its points it is.
+    pub point: usize,
+    /// Unit normal towards the body.
+    pub normal: DVec2,
+    /// From the body's centre of mass (m).
+    pub arm: DVec2,
+    /// Coulomb coefficient (1).
+    pub friction: f64,
+    /// Along the normal and along (n_y, −n_x) of it (N).
+    pub load: [f64; 2],
+}
+
+impl Support {
+    /// (n_y, −n_x) of the normal.
+    fn tangent(&self) -> DVec2 {
+        -self.normal.perp()
+    }
+
+    /// Friction is at its bound.
+    fn slides(&self) -> bool {
+        self.load[1].abs() >= self.friction * self.load[0]
+    }
+
+    /// What it pushes the body with (N).
+    pub fn force(&self) -> DVec2 {
+        self.load[0] * self.normal + self.load[1] * self.tangent()
+    }
+}
+
+/// Loads `supports` with a force (N) and a torque (N·m) on a body of this radius of gyration (m).
+pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration: f64) {
+    let column = |s: &Support, u: DVec2| {
+        DVec3::new(u.x, u.y, if gyration > 0.0 { s.arm.perp_dot(u) / gyration } else { 0.0 })
+    };
+    let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
+    let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
+    supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
+    let greatest = GREATEST * force.length();
+    for round in 0..ROUNDS {
+        let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
+        let (mut matrix, mut rest) = (DMat3::from_diagonal(DVec3::splat(RIDGE)), all);
+        for support in supports.iter().filter(|s| s.load[0] > 0.0) {
+            matrix += outer(column(support, support.normal));
+            let tangent = column(support, support.tangent());
+            match support.slides() {
+                true => rest -= support.load[1] * tangent,
+                false => matrix += support.load[0] / most * outer(tangent),
+            }
+        }
+        let solution = matrix.inverse() * rest;
+        for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
+            let normal = column(support, support.normal).dot(solution).clamp(0.0, greatest);
+            let tangent = match support.slides() {
+                true => support.load[1],
+                false => support.load[0] / most * column(support, support.tangent()).dot(solution),
+            };
+            let bound = support.friction * normal;
+            // Before the first round nothing is known of how points share a load.
+            let tangent = if round == 0 { 0.0 } else { tangent.clamp(-bound, bound) };
+            support.load = [normal, tangent];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(normal: DVec2, arm: DVec2, friction: f64) -> Support {
+        Support { contact: 0, point: 0, normal, arm, friction, load: [0.0; 2] }
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-4 * (1.0 + expected.abs())
+    }
+
+    /// A box of half width ½ whose weight of 10 N stands x beside its middle: ½ ± x of it, as levers say.
+    #[test]
+    fn two_corners_share_by_their_levers() {
+        for x in [-0.25, 0.0, 0.4] {
+            let mut corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.0));
+            load(&mut corners, DVec2::new(0.0, -10.0), -10.0 * x, 0.4);
+            let loads = corners.map(|corner| corner.load[0]);
+            assert!(close(loads[0], 10.0 * (0.5 - x)) && close(loads[1], 10.0 * (0.5 + x)), "{x}: {loads:?}");
+        }
+    }
+
+    /// Beyond a corner all of it is on that one.
+    #[test]
+    fn no_corner_pulls() {
+        let mut corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.0));
+        load(&mut corners, DVec2::new(0.0, -10.0), -10.0 * 0.8, 0.4);
+        assert_eq!(corners[0].load[0], 0.0);
+        assert!(corners[1].load[0] > 9.0);
+    }
+
+    /// A disc on an incline rolls: friction is a third of what drives it, or µ times the load if that is less.
+    #[test]
+    fn a_disc_on_an_incline_has_a_third_of_its_drive_as_friction() {
+        let (sin, cos) = (0.3f64.sin(), 0.3f64.cos());
+        for friction in [1.0, 0.05] {
+            let mut touching = [point(DVec2::Y, DVec2::new(0.0, -0.5), friction)];
+            load(&mut touching, 10.0 * DVec2::new(sin, -cos), 0.0, 0.5 / 2.0f64.sqrt());
+            let [normal, tangent] = touching[0].load;
+            let expected = (10.0 * sin / 3.0).min(friction * 10.0 * cos);
+            assert!(close(normal, 10.0 * cos) && close(-tangent, expected), "{friction}: {normal} {tangent}");
+        }
+    }
+
+    /// Between two walls at 60° a disc of 10 N asks each for 10 N/(2 cos 60°); in a narrower wedge for more than is
+    /// given.
+    #[test]
+    fn a_wedge_gets_what_it_asks_for_up_to_a_bound() {
+        for (angle, expected) in [(60f64, 10.0), (89.0, 20.0)] {
+            let (sin, cos) = angle.to_radians().sin_cos();
+            let mut walls = [sin, -sin].map(|x| point(DVec2::new(x, cos), -0.5 * DVec2::new(x, cos), 0.0));
+            load(&mut walls, DVec2::new(0.0, -10.0), 0.0, 0.35);
+            assert!(walls.iter().all(|wall| close(wall.load[0], expected)), "{angle}: {walls:?}");
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! Which constraint goes to which lane: by colours, or one after the other.
+
+use crate::engine::coloring::{Coloring, EXEMPT};
+use crate::engine::constraints::records::batches::Place;
+use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::engine::constraints::{
+    records::features::Features, records::features::Layout, records::features::OppositeKind, step::Workspace,
+};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{LaneWidth, held};
+
+/// One constraint on its way into a lane.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Level of the contact graph; 0 unless they are grouped by it.
+    level: u32,
+    /// 0 for contacts, k for type k − 1 of [`Workspace::types`].
+    kind: u32,
+    index: u32,
+    /// Rows of a and b.
+    rows: [u32; 2],
+}
+
+impl Entry {
+    /// Entries of one segment have this in common.
+    fn place(&self) -> (u32, u32) {
+        (self.level, self.kind)
+    }
+}
+
+/// Constraints against one kind of body, and their colours.
+#[derive(Debug, Default)]
+struct Group {
+    entries: Vec<Entry>,
+    /// Their rows, with a exempt unless it is dynamic.
+    edges: Vec<[u32; 2]>,
+    coloring: Coloring,
+}
+
+/// Gives constraints their lanes; keeps its memory from call to call.
+#[derive(Debug, Default)]
+pub struct Assignment {
+    /// By [`OppositeKind`].
+    groups: [Group; 3],
+    /// Entries of one colour.
+    color: Vec<Entry>,
+    /// Colours in use.
+    pub colors: usize,
+    /// Constraints that got no colour and are solved one by one.
+    pub overflow: usize,
+}
+
+/// What lanes are assigned for.
+pub struct Sides<'a, F> {
+    /// Number of bodies; the row of this number is the inert one.
+    pub bodies: usize,
+    /// What stands opposite the dynamic body b of a contact, given the body a.
+    pub opposite: F,
+    /// Where contacts are grouped by level, the graph that has the levels.
+    pub levels: Option<&'a Graph>,
+}
+
+impl<F> Sides<'_, F> {
+    /// A contact's level: that of its upper body; 0 for contacts without support.
+    fn level(&self, rows: [u32; 2]) -> u32 {
+        let Some(graph) = self.levels else { return 0 };
+        let of = |body: u32| graph.levels().get(body as usize).copied().unwrap_or(0);
+        let level = of(rows[0]).max(of(rows[1]));
+        if level == UNSUPPORTED { 0 } else { level }
+    }
+}
+
+/// Cost of a batch's arithmetic, if that of gathering one of its lanes is 1.
+const BATCH_COST: usize = 12;
+
+/// Colours of all groups are fewer than this.
+const STAGES_PER_LEVEL: u32 = 256;
+
+impl Assignment {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let one = |g: &Group| held(&g.entries) + held(&g.edges) + g.coloring.held_bytes();
+        self.groups.iter().map(one).sum::<usize>() + held(&self.color)
+    }
+
+    /// Forgets all colours, so that the next call recomputes them even for the same contacts.
+    pub fn forget(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.coloring.forget());
+    }
+
+    /// Lanes colour by colour, as many as pay and the two `widths` allow; what gets no colour goes one after
+    /// the other.
+    pub fn colored(
+        &mut self,
+        work: &mut Workspace,
+        widths: [LaneWidth; 2],
+        features: &Features,
+        contacts: &[Contact],
+        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+    ) {
+        (self.colors, self.overflow) = (0, 0);
+        for group in &mut self.groups {
+            group.entries.clear();
+            group.edges.clear();
+        }
+        let all = contacts.iter().map(|c| [c.body_a, c.body_b]).enumerate().map(|(i, rows)| (0, i, rows));
+        let types = work.types.iter().enumerate().flat_map(|(k, joined)| {
+            joined.kind.ends().iter().enumerate().map(move |(i, &rows)| (k as u32 + 1, i, rows))
+        });
+        for (kind, index, rows) in all.chain(types) {
+            let opposite = (sides.opposite)(rows[0]);
+            let group = &mut self.groups[opposite as usize];
+            group.entries.push(Entry { level: sides.level(rows), kind, index: index as u32, rows });
+            let a = if opposite == OppositeKind::Dynamic { rows[0] } else { EXEMPT };
+            group.edges.push([a, rows[1]]);
+        }
+        for Group { edges, coloring, .. } in &mut self.groups {
+            coloring.assign(edges, sides.bodies);
+        }
+        work.clear_lanes(self.fitting(widths).lanes());
+        let is_simple = sides.levels.is_none() && work.types.is_empty();
+        let inert = sides.bodies as u32;
+        let color = &mut self.color;
+        let mut stage = 0;
+        for (Group { entries, coloring, .. }, opposite) in self.groups.iter_mut().zip(OppositeKind::ALL) {
+            for of_color in 0..=coloring.colors() {
+                let serial = of_color == coloring.colors();
+                let edges = if serial { coloring.overflow() } else { coloring.color(of_color) };
+                color.clear();
+                color.extend(edges.iter().map(|&edge| entries[edge as usize]));
+                if !is_simple {
+                    color.sort_unstable_by_key(|e| (e.place(), e.index));
+                }
+                for run in color.chunk_by(|a, b| a.place() == b.place()) {
+                    let Entry { level, kind, .. } = run[0];
+                    let place =
+                        Place { opposite, stage: level * STAGES_PER_LEVEL + stage, level, disjoint: !serial };
+                    work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), inert);
+                }
+                self.overflow += if serial { edges.len() } else { 0 };
+                stage += 1;
+            }
+            self.colors += coloring.colors();
+        }
+        work.finish_lanes();
+    }
+
+    /// The width of the cheapest sweep. A batch of W lanes costs about 12 + W: its arithmetic, which is
+    /// the same at every width, and its lanes, which are gathered one by one (measured on piles of 5 to 180
+    /// contacts).
+    fn fitting(&self, [narrowest, widest]: [LaneWidth; 2]) -> LaneWidth {
+        let cost = |width: LaneWidth| {
+            let slots: usize = self.groups.iter().map(|g| g.coloring.lane_slots(width.lanes())).sum();
+            slots / width.lanes() * (BATCH_COST + width.lanes())
+        };
+        let allowed = LaneWidth::ALL.into_iter().rev().filter(|w| (narrowest..=widest).contains(w));
+        allowed.min_by_key(|&w| cost(w)).unwrap_or(widest)
+    }
+
+    /// One after the other, in `order`, after the constraints of other types.
+    pub fn serial(
+        &mut self,
+        work: &mut Workspace,
+        features: &Features,
+        contacts: &[Contact],
+        order: impl Iterator<Item = u32>,
+        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+    ) {
+        work.clear_lanes(1);
+        (self.colors, self.overflow) = (0, 0);
+        let list = &mut self.color;
+        list.clear();
+        for (k, joined) in work.types.iter().enumerate() {
+            let entry = |(i, &rows): (usize, &[u32; 2])| Entry {
+                level: sides.level(rows),
+                kind: k as u32 + 1,
+                index: i as u32,
+                rows,
+            };
+            list.extend(joined.kind.ends().iter().enumerate().map(entry));
+        }
+        let rows = |i: u32| [contacts[i as usize].body_a, contacts[i as usize].body_b];
+        list.extend(order.map(|i| Entry { level: sides.level(rows(i)), kind: 0, index: i, rows: rows(i) }));
+        if sides.levels.is_some() {
+            list.sort_by_key(|e| e.level);
+        }
+        let place = |e: &Entry| (e.place(), (sides.opposite)(e.rows[0]));
+        for (stage, run) in list.chunk_by(|i, j| place(i) == place(j)).enumerate() {
+            let ((level, kind), opposite) = place(&run[0]);
+            let place = Place { opposite, stage: stage as u32, level, disjoint: false };
+            work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), sides.bodies as u32);
+        }
+        work.finish_lanes();
+    }
+}
+
+impl Workspace {
+    fn clear_lanes(&mut self, width: usize) {
+        let types = self.types.iter_mut().map(|t| (&mut t.lanes, &mut t.serial));
+        for (lanes, serial) in types.chain([(&mut self.lanes, &mut self.serial)]) {
+            lanes.clear(width);
+            serial.clear(1);
+        }
+    }
+
+    fn push(
+        &mut self,
+        kind: u32,
+        place: Place,
+        features: &Features,
+        entries: impl Iterator<Item = (u32, [u32; 2])>,
+        inert: u32,
+    ) {
+        let (batches, stride) = match self.types.get_mut((kind as usize).wrapping_sub(1)) {
+            Some(t) => ([&mut t.lanes, &mut t.serial], t.kind.stride()),
+            None => {
+                let layout = Layout::for_features(features, place.opposite);
+                ([&mut self.lanes, &mut self.serial], layout.stride)
+            }
+        };
+        batches[usize::from(!place.disjoint)].push(place, stride, entries, inert);
+    }
+
+    fn finish_lanes(&mut self) {
+        let types = self.types.iter_mut().flat_map(|t| [&mut t.lanes, &mut t.serial]);
+        types.chain([&mut self.lanes, &mut self.serial]).for_each(|batches| {
+            batches.sort_by_stage();
+            batches.reserve_buffer();
+        });
+    }
+}

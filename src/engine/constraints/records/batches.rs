@@ -1,0 +1,380 @@
+//! Which contact is in which lane: batches, segments, and the buffer that holds records.
+
+use crate::engine::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
+use crate::engine::constraints::records::order::SweepOrder;
+pub use crate::engine::constraints::records::segment::Segment;
+use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
+use std::mem::size_of_val;
+use std::ops::Range;
+
+/// Where a segment comes: what [`Segment`] says of it besides its records.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub opposite: OppositeKind,
+    pub stage: u32,
+    pub level: u32,
+    pub disjoint: bool,
+}
+
+/// Constraint records of one width, with the lane each contact has.
+///
+/// Lanes without a contact repeat the first contact of their batch, and their rows are the inert one:
+/// whatever is gathered by these indices exists if contacts and rows do.
+#[derive(Clone, Debug, Default)]
+pub struct Batches {
+    width: usize,
+    segments: Vec<Segment>,
+    /// `segments` in the order of a sweep, and which of them are run now.
+    visits: Vec<Segment>,
+    focus: Range<usize>,
+    order: SweepOrder,
+    contact: Indices,
+    row_a: Indices,
+    row_b: Indices,
+    /// Records, `stride × width` floats each.
+    buffer: Vec<Block>,
+    /// Lane vectors in use of the buffer.
+    vectors: usize,
+    /// Places in vectors over contact points.
+    slots: usize,
+}
+
+/// The records of a segment, and by what they gather.
+pub struct SegmentRecords<'a, L> {
+    /// `[batches × stride]`
+    pub records: &'a mut [L],
+    /// `[batches × width]`
+    pub contact: IndexList<'a>,
+    /// `[batches × width]`
+    pub row_a: IndexList<'a>,
+    /// `[batches × width]`
+    pub row_b: IndexList<'a>,
+}
+
+/// The two sets of batches of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Coloured, at the width of the step.
+    Lanes,
+    /// One after the other.
+    Serial,
+}
+
+impl Part {
+    /// This one of both.
+    pub(crate) fn of<'b>(self, lanes: &'b mut Batches, serial: &'b mut Batches) -> &'b mut Batches {
+        match self {
+            Part::Lanes => lanes,
+            Part::Serial => serial,
+        }
+    }
+}
+
+/// Contacts are added by so many at a time, since the bound of a list is found in lanes.
+const PART: usize = 64;
+
+impl Batches {
+    /// Lanes per batch.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// All segments, as they were pushed.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// What a pass runs over, in order: all segments unless [`Self::arrange`] said otherwise.
+    pub fn visits(&self) -> &[Segment] {
+        &self.visits[self.focus.clone()]
+    }
+
+    /// Calls `visit` with each segment that a pass runs over, in order, and with the layout of its records.
+    #[inline(always)]
+    pub(crate) fn each_segment(
+        &mut self,
+        layout_of: LayoutOf,
+        mut visit: impl FnMut(&mut Self, &Segment, &Layout),
+    ) {
+        for i in 0..self.visits().len() {
+            let segment = self.visits()[i];
+            visit(self, &segment, &layout_of(segment.opposite));
+        }
+    }
+
+    /// Brings what passes run over into an order.
+    pub fn arrange(&mut self, order: SweepOrder) {
+        if order != self.order {
+            order.arrange(&self.segments, self.width, &mut self.visits);
+            self.order = order;
+        }
+        self.focus = 0..self.visits.len();
+    }
+
+    /// The rank of the first visit after those that passes run over; none if there is no other.
+    pub(crate) fn next_rank(&self) -> Option<u64> {
+        self.visits.get(self.focus.end).map(|s| self.order.rank(s.stage))
+    }
+
+    /// Makes passes run over nothing; [`Self::focus_on`] goes on from the beginning.
+    pub(crate) fn unfocus(&mut self) {
+        self.focus = 0..0;
+    }
+
+    /// Makes passes run over the visits of this rank that come next.
+    pub(crate) fn focus_on(&mut self, rank: u64) {
+        let start = self.focus.end;
+        let of_rank = |s: &&Segment| self.order.rank(s.stage) == rank;
+        let count = self.visits[start..].iter().take_while(of_rank).count();
+        self.focus = start..start + count;
+    }
+
+    /// Contact in each lane; padding repeats one. `[lanes]`
+    pub fn contact(&self) -> &[u32] {
+        &self.contact
+    }
+
+    /// Row of body a in each lane; the inert row where there is no contact. `[lanes]`
+    pub fn row_a(&self) -> &[u32] {
+        &self.row_a
+    }
+
+    /// Row of body b in each lane; the inert row where there is no contact. `[lanes]`
+    pub fn row_b(&self) -> &[u32] {
+        &self.row_b
+    }
+
+    /// Lanes of all segments, padding included.
+    pub fn lanes(&self) -> usize {
+        self.contact.len()
+    }
+
+    /// The part of the buffer that holds records, in whole blocks.
+    ///
+    /// # Panics
+    /// As [`Self::records_of`] without a buffer.
+    pub fn records(&self) -> &[Block] {
+        &self.buffer[..self.blocks()]
+    }
+
+    /// As [`Self::records`], to write.
+    pub fn records_mut(&mut self) -> &mut [Block] {
+        let blocks = self.blocks();
+        &mut self.buffer[..blocks]
+    }
+
+    fn blocks(&self) -> usize {
+        (self.vectors * self.width).div_ceil(16)
+    }
+
+    /// Empties the batches for a new step.
+    ///
+    /// # Panics
+    /// If the width is 0.
+    pub fn clear(&mut self, width: usize) {
+        assert!(width > 0, "batches without lanes");
+        self.width = width;
+        self.segments.clear();
+        self.visits.clear();
+        (self.focus, self.order) = (0..0, SweepOrder::Forward);
+        self.contact.clear();
+        self.row_a.clear();
+        self.row_b.clear();
+        (self.vectors, self.slots) = (0, 0);
+    }
+
+    /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
+    /// batches with lanes that point at the `inert` row: a colour of a stage of its own, or with one
+    /// lane to a batch contacts that follow each other.
+    ///
+    /// # Panics
+    /// If the batches have no width yet ([`Self::clear`]).
+    pub fn push_segment(
+        &mut self,
+        opposite: OppositeKind,
+        layout: &Layout,
+        contacts: impl Iterator<Item = (u32, [u32; 2])>,
+        inert: u32,
+    ) {
+        let (stage, disjoint) = (self.segments.len() as u32, self.width > 1);
+        self.push(Place { opposite, stage, level: 0, disjoint }, layout.stride, contacts, inert);
+    }
+
+    /// Appends one segment of constraints of any type with records of `stride` lane vectors; see
+    /// [`Self::push_segment`].
+    pub(crate) fn push(
+        &mut self,
+        Place { opposite, stage, level, disjoint }: Place,
+        stride: usize,
+        contacts: impl Iterator<Item = (u32, [u32; 2])>,
+        inert: u32,
+    ) {
+        assert!(self.width > 0, "batches without lanes: `clear` gives them their width");
+        let first_lane = self.contact.len();
+        let mut contacts = contacts;
+        let mut part = [[0; PART]; 3];
+        loop {
+            let mut count = 0;
+            for (k, (contact, [a, b])) in (0..PART).zip(&mut contacts) {
+                (part[0][k], part[1][k], part[2][k]) = (contact, a, b);
+                count = k + 1;
+            }
+            let lists = [&mut self.contact, &mut self.row_a, &mut self.row_b];
+            lists.into_iter().zip(&part).for_each(|(list, part)| list.extend(&part[..count]));
+            if count < PART {
+                break;
+            }
+        }
+        let contacts = self.contact.len() - first_lane;
+        if contacts == 0 {
+            return;
+        }
+        let batches = contacts.div_ceil(self.width);
+        let end = first_lane + batches * self.width;
+        self.contact.fill_to(end, self.contact[end - self.width]);
+        self.row_a.fill_to(end, inert);
+        self.row_b.fill_to(end, inert);
+        let first_vector = self.vectors;
+        // At every width the same place: what is disjoint may be of any width, what is not is of one lane.
+        let first_slot = if disjoint { self.slots.next_multiple_of(16) } else { self.slots };
+        self.slots = first_slot + contacts;
+        let segment = Segment {
+            opposite,
+            first_lane,
+            contacts,
+            batches,
+            first_slot,
+            first_vector,
+            stride,
+            stage,
+            level,
+            disjoint,
+        };
+        self.segments.push(segment);
+        self.visits.push(segment);
+        (self.focus, self.order) = (0..self.visits.len(), SweepOrder::Forward);
+        self.vectors += batches * stride;
+    }
+
+    /// Brings segments into the order of their stages; their records stay where they are.
+    pub(crate) fn sort_by_stage(&mut self) {
+        let is_later = |pair: &[Segment]| pair[0].stage > pair[1].stage;
+        if self.segments.windows(2).any(is_later) {
+            self.segments.sort_by_key(|s| s.stage);
+            self.visits.clone_from(&self.segments);
+        }
+    }
+
+    /// Makes room in the buffer for the records of all segments.
+    pub fn reserve_buffer(&mut self) {
+        let blocks = self.blocks();
+        if self.buffer.len() < blocks {
+            self.buffer.resize(blocks, Block::default());
+        }
+    }
+
+    /// Whether these are batches for kernels of `width` lanes, and all their rows and contacts exist.
+    ///
+    /// Gathers and scatters see to that themselves; this says it before a step has begun.
+    ///
+    /// # Panics
+    /// If not.
+    pub fn assert_fits(&self, width: usize, rows: usize, contacts: usize) {
+        if self.segments.is_empty() {
+            return;
+        }
+        assert!(self.width == width, "batches of {} lanes for kernels of {width}", self.width);
+        let bound = self.row_a.list().bound().max(self.row_b.list().bound());
+        assert!(bound <= rows, "batches name row {} of {rows}", bound - 1);
+        let bound = self.contact.list().bound();
+        assert!(bound <= contacts, "batches name contact {} of {contacts}", bound - 1);
+    }
+
+    /// The records of a segment of these batches for a kernel of as many lanes and of the same layout.
+    ///
+    /// # Panics
+    /// If the batches are of another width or layout, or have no buffer ([`Self::reserve_buffer`]).
+    #[inline(always)]
+    pub fn records_of<L: Lanes>(&mut self, segment: &Segment, layout: &Layout) -> SegmentRecords<'_, L> {
+        self.records_with_stride(segment, layout.stride)
+    }
+
+    /// As [`Self::records_of`], for records that are `stride` lane vectors long.
+    ///
+    /// # Panics
+    /// As [`Self::records_of`].
+    #[inline(always)]
+    pub fn records_with_stride<L: Lanes>(
+        &mut self,
+        segment: &Segment,
+        stride: usize,
+    ) -> SegmentRecords<'_, L> {
+        assert!(self.width == L::WIDTH, "batches of {} lanes for a kernel of {}", self.width, L::WIDTH);
+        assert!(segment.stride == stride, "records of another kernel's layout");
+        let lanes = segment.first_lane..segment.first_lane + segment.batches * L::WIDTH;
+        let vectors = segment.first_vector..segment.first_vector + segment.batches * segment.stride;
+        let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut self.buffer);
+        assert!(vectors.end <= buffer.len(), "no room for records: `reserve_buffer` makes it");
+        SegmentRecords {
+            records: &mut buffer[vectors],
+            contact: self.contact.list().part(lanes.clone()),
+            row_a: self.row_a.list().part(lanes.clone()),
+            row_b: self.row_b.list().part(lanes),
+        }
+    }
+
+    /// Groups of sixteen places in vectors over contact points.
+    pub(crate) fn groups(&self) -> usize {
+        self.slots.div_ceil(16)
+    }
+
+    /// Bytes of records and indices, padding included.
+    pub fn bytes(&self) -> usize {
+        let static_lanes: usize = self
+            .segments
+            .iter()
+            .filter(|s| s.opposite == OppositeKind::Static)
+            .map(|s| s.batches * self.width)
+            .sum();
+        4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
+    }
+
+    /// Per array, bytes held and bytes in use.
+    pub fn memory(&self) -> [(usize, usize); 6] {
+        let of = |list: &Indices| (list.held_bytes(), size_of_val::<[u32]>(list));
+        [
+            (held(&self.segments), size_of_val(self.segments.as_slice())),
+            (held(&self.visits), size_of_val(self.visits.as_slice())),
+            of(&self.contact),
+            of(&self.row_a),
+            of(&self.row_b),
+            (held(&self.buffer), 4 * self.vectors * self.width),
+        ]
+    }
+
+    /// Calls `visit(contact, record, lane)` for every lane that holds a contact, where
+    /// quantity `q` of the contact is `record[q · width + lane]`.
+    ///
+    /// # Panics
+    /// If the records were laid out for other features, or have no buffer ([`Self::reserve_buffer`]).
+    pub fn for_each_lane(
+        &mut self,
+        features: &Features,
+        mut visit: impl FnMut(u32, &Layout, &mut [f32], usize),
+    ) {
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut self.buffer);
+        for segment in &self.segments {
+            let layout = Layout::for_features(features, segment.opposite);
+            assert!(segment.stride == layout.stride, "records of another layout");
+            let record_floats = layout.stride * self.width;
+            let start = segment.first_vector * self.width;
+            for batch in 0..segment.batches {
+                let record = &mut floats[start + batch * record_floats..][..record_floats];
+                let lanes = &self.contact[segment.first_lane + batch * self.width..];
+                for (lane, &contact) in lanes[..segment.filled(batch, self.width)].iter().enumerate() {
+                    visit(contact, &layout, record, lane);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Numbers that a solver keeps from step to step, per contact, per contact point and per body.
+//!
+//! Multipliers, penalties, rest lengths: what they mean is the solver's affair. A contact point
+//! is recognised by its shape pair and its feature id, as its impulses are; a new one starts with
+//! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
+
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{LaneVec, held};
+
+/// How many numbers a solver keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KeptSize {
+    /// Floats per contact, a multiple of four.
+    pub per_contact: usize,
+    /// Floats per contact point.
+    pub per_point: usize,
+    /// Floats per body.
+    pub per_body: usize,
+}
+
+impl KeptSize {
+    /// Nothing.
+    pub const NONE: KeptSize = KeptSize { per_contact: 0, per_point: 0, per_body: 0 };
+}
+
+/// The numbers; see the [module](self).
+#[derive(Clone, Debug, Default)]
+pub struct Kept {
+    size: KeptSize,
+    /// Shape pair and feature ids of each contact that the numbers belong to.
+    names: Vec<(u64, [u32; 2])>,
+    /// `[contacts × per_contact]`
+    contacts: LaneVec,
+    /// `[2 × contacts × per_point]`, first points of all contacts before second ones.
+    points: LaneVec,
+    /// `[bodies × per_body]`
+    bodies: Vec<f32>,
+    last_names: Vec<(u64, [u32; 2])>,
+    last_contacts: LaneVec,
+    last_points: LaneVec,
+}
+
+/// The feature id of a point that is not in use: no contact has it.
+const UNUSED: u32 = u32::MAX;
+
+impl Kept {
+    /// Floats per contact, contact point and body.
+    pub fn size(&self) -> KeptSize {
+        self.size
+    }
+
+    /// What is kept of contact `contact`.
+    ///
+    /// # Panics
+    /// If there is no such contact, or nothing is kept.
+    pub fn contact(&mut self, contact: usize) -> &mut [f32] {
+        let size = self.size.per_contact;
+        &mut self.contacts[contact * size..][..size]
+    }
+
+    /// All numbers of contacts, `[contacts × per_contact]`, for gathers by contact.
+    pub fn contacts(&mut self) -> &mut [f32] {
+        &mut self.contacts
+    }
+
+    /// What is kept at point `point` (0 or 1) of contact `contact`.
+    ///
+    /// # Panics
+    /// If there is no such contact, or nothing is kept.
+    pub fn point(&mut self, contact: usize, point: usize) -> &mut [f32] {
+        assert!(point < 2, "a contact has points 0 and 1, not {point}");
+        let size = self.size.per_point;
+        &mut self.points[(point * self.names.len() + contact) * size..][..size]
+    }
+
+    /// What is kept of body `body`.
+    ///
+    /// # Panics
+    /// If there is no such body, or nothing is kept.
+    pub fn body(&mut self, body: usize) -> &mut [f32] {
+        let size = self.size.per_body;
+        &mut self.bodies[body * size..][..size]
+    }
+
+    /// All numbers of contact points, `[2 × contacts × per_point]`, first points of all contacts before second ones.
+    pub fn points(&mut self) -> &mut [f32] {
+        &mut self.points
+    }
+
+    /// The numbers of all first and of all second points, `[contacts × per_point]` each, for gathers by contact.
+    pub fn by_point(&mut self) -> [&mut [f32]; 2] {
+        let seconds = self.points.len() / 2;
+        self.points.split_at_mut(seconds).into()
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let lists = [&self.contacts, &self.points, &self.last_contacts, &self.last_points];
+        let names = held(&self.names) + held(&self.last_names);
+        names + lists.map(LaneVec::bytes).iter().sum::<usize>() + held(&self.bodies)
+    }
+
+    /// Takes the numbers on to the contacts of the coming step, which are sorted by shape pair. `changed`: contacts may have
+    /// come or gone since the last call.
+    pub fn follow(&mut self, size: KeptSize, contacts: &[Contact], bodies: usize, changed: bool) {
+        if size != self.size {
+            *self = Kept { size, ..Kept::default() };
+        }
+        self.bodies.resize(bodies * size.per_body, 0.0);
+        let is_same = !changed && self.names.len() == contacts.len();
+        // Points may be others in the same contact.
+        if size.per_point == 0 && (size.per_contact == 0 || is_same) {
+            return;
+        }
+        std::mem::swap(&mut self.names, &mut self.last_names);
+        std::mem::swap(&mut self.contacts, &mut self.last_contacts);
+        std::mem::swap(&mut self.points, &mut self.last_points);
+        self.names.clear();
+        for (list, length) in [
+            (&mut self.contacts, contacts.len() * size.per_contact),
+            (&mut self.points, contacts.len() * 2 * size.per_point),
+        ] {
+            list.resize(0);
+            list.resize(length);
+        }
+        let mut last = self.last_names.iter().enumerate().peekable();
+        for (i, contact) in contacts.iter().enumerate() {
+            let m = &contact.manifold;
+            let ids = [0, 1].map(|p| if p < m.count as usize { m.points[p].feature_id } else { UNUSED });
+            let key = contact.key();
+            self.names.push((key, ids));
+            // Both lists are sorted: one pass over them finds all pairs.
+            while last.next_if(|(_, (k, _))| *k < key).is_some() {}
+            let Some((j, (_, old_ids))) = last.next_if(|(_, (k, _))| *k == key) else { continue };
+            copy(&mut self.contacts, i, &self.last_contacts, j, size.per_contact);
+            for (p, id) in ids.into_iter().enumerate().filter(|&(_, id)| id != UNUSED) {
+                if let Some(q) = old_ids.iter().position(|&old| old == id) {
+                    let (to, from) = (p * contacts.len() + i, q * self.last_names.len() + j);
+                    copy(&mut self.points, to, &self.last_points, from, size.per_point);
+                }
+            }
+        }
+    }
+}
+
+/// Copies the `from`-th group of `size` floats to the `to`-th.
+fn copy(target: &mut [f32], to: usize, source: &[f32], from: usize, size: usize) {
+    target[to * size..][..size].copy_from_slice(&source[from * size..][..size]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact(shapes: [u32; 2], ids: &[u32]) -> Contact {
+        let mut contact = Contact { shape_a: shapes[0], shape_b: shapes[1], ..Contact::default() };
+        contact.manifold.count = ids.len() as u32;
+        for (point, &id) in contact.manifold.points.iter_mut().zip(ids) {
+            point.feature_id = id;
+        }
+        contact
+    }
+
+    #[test]
+    fn numbers_follow_the_feature_through_sorting_and_exchange() {
+        let size = KeptSize { per_contact: 4, per_point: 1, per_body: 2 };
+        let mut kept = Kept::default();
+        kept.follow(size, &[contact([0, 2], &[5, 9]), contact([1, 2], &[0])], 3, true);
+        kept.contact(0)[3] = 12.0;
+        kept.point(0, 0)[0] = 5.0;
+        kept.point(0, 1)[0] = 9.0;
+        kept.point(1, 0)[0] = 1.0;
+        kept.body(2).copy_from_slice(&[7.0, 8.0]);
+        // A new pair in front; the points of 0-2 exchanged; 1-2 gone and 1-3 come.
+        kept.follow(size, &[contact([0, 1], &[0]), contact([0, 2], &[9, 5]), contact([1, 3], &[0])], 4, true);
+        assert_eq!(kept.points(), [0.0, 9.0, 0.0, 0.0, 5.0, 0.0]);
+        assert_eq!(kept.contacts(), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!([kept.body(2), &mut [0.0, 0.0]], [&[7.0, 8.0], &[0.0, 0.0]]);
+        // Another feature of the same pair is another point.
+        kept.follow(size, &[contact([0, 2], &[9, 6])], 4, false);
+        assert_eq!(kept.points(), [9.0, 0.0]);
+        // Another solver, other numbers.
+        kept.follow(KeptSize::default(), &[contact([0, 2], &[9, 6])], 4, false);
+        assert!(kept.points().is_empty());
+    }
+}

@@ -1,0 +1,15 @@
+//! Records: where each number of each constraint is stored.
+//!
+//! [`features`] says which numbers a scene needs and where a record keeps them, [`batches`] and [`segment`] how records
+//! follow each other, [`assign`] which contact is in which lane, and [`order`] in which order a sweep visits them. [`graph`],
+//! [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
+
+pub mod assign;
+pub mod batches;
+pub mod bounces;
+pub mod features;
+pub mod graph;
+pub mod kept;
+pub mod order;
+pub mod point_vector;
+pub mod segment;

@@ -1,0 +1,162 @@
+//! Vectors over contact points in the order of the lanes: what is done entry by entry is done in lanes.
+//!
+//! Sixteen contacts that follow each other in a segment share four blocks: λn of their first points, λt of
+//! those, then the same of their second points. A segment of coloured batches begins with blocks of its own,
+//! whatever the width, and so a contact has one place at every width; contacts in natural order follow each
+//! other without gaps. Places without a point are zero. Sums are kept in sixteen parts, one for each place
+//! within a block, in `f64` and in the order of the blocks, and the parts are added in order: the
+//! result has the same bits at every width. For arithmetic entry by entry the width does not
+//! matter, so it is always [`Wide`], which a build lowers to what it has.
+
+use crate::engine::constraints::records::batches::Batches;
+use crate::engine::lanes::{Block, Lanes, held};
+use wide::f32x16;
+
+/// Lanes of entry-by-entry arithmetic.
+pub type Wide = f32x16;
+
+/// Sixteen points: their normal and their tangential entries.
+pub type Entry = [Wide; 2];
+
+/// Entries of all contact points; see the [module](self).
+#[derive(Debug, Default)]
+pub struct PointVector {
+    blocks: Vec<Block>,
+}
+
+impl Clone for PointVector {
+    fn clone(&self) -> Self {
+        PointVector { blocks: self.blocks.clone() }
+    }
+
+    /// Into the memory that there is.
+    fn clone_from(&mut self, from: &Self) {
+        self.blocks.clone_from(&from.blocks);
+    }
+}
+
+/// Blocks that sixteen contacts share.
+const SHARED: usize = 4;
+
+impl PointVector {
+    /// Zeros for the contacts of both sets of batches.
+    pub(crate) fn reset(&mut self, batches: [&Batches; 2]) {
+        self.blocks.clear();
+        self.blocks.resize(SHARED * batches.map(Batches::groups).iter().sum::<usize>(), Block::default());
+    }
+
+    /// The parts that belong to the contacts of either set of batches.
+    pub(crate) fn parts(&mut self, batches: [&Batches; 2]) -> [&mut [Block]; 2] {
+        let [lanes, serial] = batches.map(Batches::groups);
+        assert!(self.blocks.len() == SHARED * (lanes + serial), "a vector of other contacts");
+        self.blocks.split_at_mut(SHARED * lanes).into()
+    }
+
+    /// Removes all entries.
+    pub(crate) fn clear(&mut self) {
+        self.blocks.clear();
+    }
+
+    /// Whether it has no entries.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// All entries.
+    pub fn entries(&self) -> &[Entry] {
+        bytemuck::cast_slice(&self.blocks)
+    }
+
+    fn entries_mut(&mut self) -> &mut [Entry] {
+        bytemuck::cast_slice_mut(&mut self.blocks)
+    }
+
+    /// Bytes held.
+    pub(crate) fn held_bytes(&self) -> usize {
+        held(&self.blocks)
+    }
+}
+
+/// Where lane vector `[normal, tangential]` of point `point` is, in lane vectors of a part, of the batch that begins
+/// at place `slot` of its set of batches.
+#[inline(always)]
+pub(crate) fn places<L: Lanes>(slot: usize, point: usize) -> [usize; 2] {
+    let per_block = 16 / L::WIDTH;
+    let first = (SHARED * (slot / 16) + 2 * point) * per_block + slot % 16 / L::WIDTH;
+    [first, first + per_block]
+}
+
+/// Replaces every entry of `to` by what `f` makes of the old ones and of those of `from`.
+///
+/// # Panics
+/// If a vector is shorter than the first.
+#[inline(always)]
+pub fn update<const M: usize, const N: usize>(
+    to: [&mut PointVector; M],
+    from: [&PointVector; N],
+    f: impl Fn([Entry; M], [Entry; N]) -> [Entry; M],
+) {
+    let count = to.first().map_or(0, |v| v.entries().len());
+    let mut to = to.map(|v| &mut v.entries_mut()[..count]);
+    let from = from.map(|v| &v.entries()[..count]);
+    for i in 0..count {
+        let new = f(std::array::from_fn(|k| to[k][i]), std::array::from_fn(|k| from[k][i]));
+        to.iter_mut().zip(new).for_each(|(to, new)| to[i] = new);
+    }
+}
+
+/// x·y.
+pub fn dot(x: &PointVector, y: &PointVector) -> f64 {
+    sum_of_products([x, y], |both| both)
+}
+
+/// Sum over all entries of the product of the two that `f` makes of those of `from`.
+///
+/// # Panics
+/// If a vector is shorter than the first.
+#[inline(always)]
+pub fn sum_of_products<const N: usize>(from: [&PointVector; N], f: impl Fn([Entry; N]) -> [Entry; 2]) -> f64 {
+    let count = from.first().map_or(0, |v| v.entries().len());
+    let from = from.map(|v| &v.entries()[..count]);
+    let mut sums = [0.0_f64; 16];
+    for [x, y] in (0..count).map(|i| f(std::array::from_fn(|k| from[k][i]))) {
+        for (x, y) in x.iter().zip(&y) {
+            let (x, y) = (x.as_array(), y.as_array());
+            for k in 0..16 {
+                sums[k] += f64::from(x[k]) * f64::from(y[k]);
+            }
+        }
+    }
+    sums.iter().sum()
+}
+
+/// x + y.
+#[inline(always)]
+pub fn sum(x: Entry, y: Entry) -> Entry {
+    [x[0] + y[0], x[1] + y[1]]
+}
+
+/// x − y.
+#[inline(always)]
+pub fn difference(x: Entry, y: Entry) -> Entry {
+    [x[0] - y[0], x[1] - y[1]]
+}
+
+/// factor x.
+#[inline(always)]
+pub fn scaled(factor: f32, x: Entry) -> Entry {
+    let factor = Wide::splat(factor);
+    [factor * x[0], factor * x[1]]
+}
+
+/// x + factor y.
+#[inline(always)]
+pub fn plus_scaled(x: Entry, factor: f32, y: Entry) -> Entry {
+    sum(x, scaled(factor, y))
+}
+
+/// The same, entry by entry, of `x / y` where y > 0, and 0 elsewhere.
+#[inline(always)]
+pub fn quotient(x: Entry, y: Entry) -> Entry {
+    [0, 1].map(|axis| Lanes::select_positive(y[axis], x[axis] / y[axis], Wide::zero()))
+}

@@ -1,0 +1,300 @@
+//! A step's problem, prepared: passes over bodies and over constraints, which a solver calls in its own order.
+//!
+//! [`Passes`] is all that a solver sees. Its methods are in files by what they work on: `bodies`, `sweeps`,
+//! `impacts` and `vectors`; here is what runs a pass.
+
+mod bodies;
+mod impacts;
+mod solver;
+mod sweeps;
+mod vectors;
+mod workspace;
+
+pub(crate) use impacts::AFTER_WAVES;
+pub use solver::{Collision, Scene, Schedule, Solver};
+pub use workspace::{Observer, StepInput, Watch, WorkCount, Workspace};
+
+use crate::engine::clock::{Clock, Phase};
+use crate::engine::constraints::impacts::ImpactLaw;
+use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassWidth, PerLane};
+use crate::engine::constraints::kernels::prepare::{Prepare, Store};
+use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::engine::constraints::records::batches::{Batches, Part};
+use crate::engine::constraints::records::features::Layout;
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::constraints::records::order::SweepOrder;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneWidth};
+use crate::engine::params::Budget;
+
+/// One step's problem, prepared.
+///
+/// Each method is one pass over all bodies or all constraints. Coloured batches run
+/// first, colour by colour; then the serial ones. Nothing here is generic: passes are
+/// compiled per width and features, schedules once.
+pub struct Passes<'a> {
+    work: &'a mut Workspace,
+    contacts: &'a mut [Contact],
+    clock: &'a mut Clock,
+    input: &'a StepInput,
+    width: LaneWidth,
+    count: WorkCount,
+    iterations: u32,
+    order: SweepOrder,
+    /// Something may bounce at the end of the step.
+    bounces: bool,
+    /// Rows ask for rebounds.
+    biased: bool,
+}
+
+/// What a solver's own passes over bodies and contacts work on.
+pub struct StepParts<'p> {
+    /// The workspace.
+    pub work: &'p mut Workspace,
+    /// The contacts of the step.
+    pub contacts: &'p mut [Contact],
+    /// What the step is given.
+    pub input: &'p StepInput,
+    /// Books what they read and write.
+    pub clock: &'p mut Clock,
+    /// Lanes of the coloured batches.
+    pub width: LaneWidth,
+}
+
+impl<'a> Passes<'a> {
+    /// Prepares the constraints of a step.
+    ///
+    /// # Panics
+    /// If a batch names a row or a contact that does not exist.
+    pub fn new(
+        work: &'a mut Workspace,
+        contacts: &'a mut [Contact],
+        clock: &'a mut Clock,
+        input: &'a StepInput,
+        width: LaneWidth,
+    ) -> Self {
+        let (count, order) = (WorkCount::default(), SweepOrder::Forward);
+        // A phase that is repeated finds the side records of the step before it.
+        let are_prepared = work.impacts.bounces[0].are_prepared();
+        let (bounces, biased) = (are_prepared, are_prepared);
+        let mut passes =
+            Passes { work, contacts, clock, input, width, count, iterations: 0, order, bounces, biased };
+        passes.bounces &= passes.law() != ImpactLaw::Bias;
+        passes.biased &= passes.law() == ImpactLaw::Bias;
+        passes.set_order(SweepOrder::Forward);
+        // A phase that is repeated finds the records, and the check, of the step before it.
+        if passes.input.phases.runs(Phase::Prepare) {
+            for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
+                batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
+            }
+            passes.over_batches(Phase::Prepare, &mut Prepare);
+            passes.begin_impacts();
+            passes.clock.lap(Phase::Prepare);
+        }
+        passes
+    }
+
+    /// Work allowed.
+    pub fn budget(&self) -> Budget {
+        self.input.budget
+    }
+
+    /// Substep (s).
+    pub fn h(&self) -> f32 {
+        self.input.h
+    }
+
+    /// Step (s).
+    pub fn dt(&self) -> f32 {
+        self.input.h * self.input.budget.substeps as f32
+    }
+
+    /// The solver's own parameter of this index in `Variant::parameters`.
+    pub fn parameter(&self, index: usize) -> f32 {
+        self.input.parameters[index]
+    }
+
+    /// Points of all contacts.
+    pub fn points(&self) -> usize {
+        self.input.points
+    }
+
+    /// Numbers that the solver keeps per contact, contact point and body, see `Variant::kept`.
+    pub fn kept(&mut self) -> &mut Kept {
+        &mut self.work.kept
+    }
+
+    /// Everything that a pass may work on, for solvers with passes of their own.
+    pub fn parts(&mut self) -> StepParts<'_> {
+        StepParts {
+            work: self.work,
+            contacts: self.contacts,
+            input: self.input,
+            clock: self.clock,
+            width: self.width,
+        }
+    }
+
+    /// Whether `phase` runs: in a step every one, else the one that is repeated alone.
+    pub fn runs(&self, phase: Phase) -> bool {
+        self.input.phases.runs(phase)
+    }
+
+    /// Constraint pass of the solver's own, booked on `phase`; returns whether it ran, which it
+    /// does not while another phase is repeated alone. What solves rows is counted by
+    /// [`Self::count_sweep`].
+    pub fn run(&mut self, phase: Phase, pass: &mut dyn AnyPass) -> bool {
+        if !self.input.phases.runs(phase) {
+            return false;
+        }
+        self.over_batches(phase, pass);
+        self.clock.lap(phase);
+        true
+    }
+
+    /// The order of the passes that follow, until the next call or the end of the step.
+    pub fn set_order(&mut self, order: SweepOrder) {
+        let Workspace { lanes, serial, types, .. } = &mut *self.work;
+        lanes.arrange(order);
+        serial.arrange(order);
+        types.iter_mut().for_each(|joined| joined.arrange(order));
+        self.order = order;
+    }
+
+    /// Levels of the contact graph: 1 unless the solver groups contacts by them.
+    pub fn levels(&self) -> u32 {
+        let segments = self.work.lanes.segments().iter().chain(self.work.serial.segments());
+        1 + segments.map(|s| s.level).max().unwrap_or(0)
+    }
+
+    /// Ends an iteration, in the solver's own sense of the word.
+    pub fn iteration_done(&mut self) {
+        self.iterations += 1;
+        if let Some(mut watch) = self.work.watch.take() {
+            let iteration = self.iterations;
+            (watch.0)(iteration, &mut self.system());
+            self.work.watch = Some(watch);
+        }
+    }
+
+    /// Counts a sweep that solved `rows_per_point` rows at each contact point.
+    pub fn count_sweep(&mut self, rows_per_point: usize) {
+        self.count.sweeps += 1;
+        self.count.row_updates += rows_per_point * self.input.points;
+    }
+
+    /// Rows that a sweep with friction solves at a contact point.
+    pub fn rows_per_point(&self) -> usize {
+        if self.input.features.friction { 2 } else { 1 }
+    }
+
+    /// Writes accumulated impulses back to the contacts; returns what was done.
+    pub fn finish(mut self) -> WorkCount {
+        self.set_order(SweepOrder::Forward);
+        if self.input.phases.runs(Phase::Store) {
+            self.forget_bounced();
+            self.over_batches(Phase::Store, &mut Store);
+            self.clock.lap(Phase::Store);
+        }
+        self.count
+    }
+
+    /// Coloured batches at the width of the step, then serial ones at one lane; in reverse order the
+    /// other way round. Constraints of other types take part.
+    fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
+        if self.work.types.is_empty() {
+            return self.over_contacts(pass);
+        }
+        for part in self.parts_in_order() {
+            let order = self.order;
+            for batches in self.all(part) {
+                batches.unfocus();
+            }
+            while let Some(rank) = self.all(part).filter_map(|batches| batches.next_rank()).min() {
+                self.over_types(phase, pass, part, rank);
+                let batches = part.of(&mut self.work.lanes, &mut self.work.serial);
+                if batches.next_rank() == Some(rank) {
+                    batches.focus_on(rank);
+                    self.over_part(part, pass);
+                }
+            }
+            self.all(part).for_each(|batches| batches.arrange(order));
+        }
+    }
+
+    /// As [`Self::over_batches`], over contacts alone.
+    pub(crate) fn over_contacts(&mut self, pass: &mut dyn AnyPass) {
+        for part in self.parts_in_order() {
+            self.over_part(part, pass);
+        }
+    }
+
+    /// Constraints of other types that come at this rank.
+    fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
+        let (width, mode) = (self.width_of(part), pass.mode_of());
+        let Workspace { rows, types, .. } = &mut *self.work;
+        for Joined { kind, lanes, serial } in types {
+            let batches = part.of(lanes, serial);
+            if batches.next_rank() == Some(rank) {
+                batches.focus_on(rank);
+                let rows = TypeRows::new(rows, pass.sums_of(), mode);
+                kind.run(TypeInput { phase, mode, h: self.input.h, width, rows, batches });
+            }
+        }
+    }
+
+    pub(crate) fn over_part(&mut self, part: Part, pass: &mut dyn AnyPass) {
+        let width = self.width_of(part);
+        let Workspace { rows, motion, lanes, serial, impacts, kept, .. } = &mut *self.work;
+        let batches = part.of(lanes, serial);
+        if self.input.phases.counted {
+            for segment in batches.visits() {
+                let layout = Layout::for_features(&self.input.features, segment.opposite);
+                let PerLane { floats_read, floats_written, rows, halves } =
+                    pass.traffic_of(&layout, segment.opposite);
+                let each = [floats_read, floats_written, rows, halves];
+                self.clock.book(segment.opposite as usize, segment.contacts, each);
+            }
+        }
+        let on = PassInput {
+            rows,
+            batches,
+            part,
+            bounces: &mut impacts.bounces[part as usize],
+            contacts: self.contacts,
+            increments: motion.velocity_increments(),
+            kept,
+        };
+        pass.run_at(width, &self.input.features, on);
+    }
+
+    fn parts_in_order(&self) -> [Part; 2] {
+        match self.order {
+            SweepOrder::Reverse => [Part::Serial, Part::Lanes],
+            _ => [Part::Lanes, Part::Serial],
+        }
+    }
+
+    fn width_of(&self, part: Part) -> PassWidth {
+        match part {
+            Part::Lanes => PassWidth { width: self.width, counted: self.input.phases.counted },
+            Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+        }
+    }
+
+    /// Batches of every type of constraint.
+    fn all(&mut self, part: Part) -> impl Iterator<Item = &mut Batches> {
+        let Workspace { lanes, serial, types, .. } = &mut *self.work;
+        let types = types.iter_mut().map(move |t| part.of(&mut t.lanes, &mut t.serial));
+        types.chain([part.of(lanes, serial)])
+    }
+
+    /// Books bytes read and written of each row.
+    pub fn book_rows(&mut self, bytes: [f64; 2]) {
+        let rows = self.work.rows.len() as f64;
+        self.clock.book_bytes(bytes.map(|b| rows * b));
+    }
+}
+
+/// Bytes of a body's row.
+const ROW: f64 = size_of::<BodyRow>() as f64;

@@ -1,0 +1,109 @@
+//! A solver at work: its schedule, and what it does around collision.
+
+use super::Passes;
+use crate::engine::bodies::Bodies;
+use crate::engine::constraints::records::graph::Graph;
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::contacts::Contact;
+use crate::engine::narrowphase::candidate::Candidates;
+use crate::engine::narrowphase::circles::Rolling;
+use crate::engine::params::Parameters;
+use glam::Vec2;
+use std::fmt;
+
+/// A solver at work in one world: its schedule, and what it keeps from step to step.
+///
+/// A world calls the hooks in the order in which they are listed. Most solvers are a schedule and nothing else:
+/// [`Schedule`].
+pub trait Solver: fmt::Debug + Send {
+    /// Before candidates are collided: the contacts are those of the last step.
+    fn before_collision(&mut self, _scene: &mut Scene<'_>, _collision: &mut Collision) {}
+
+    /// After they were, and impulses were handed on: the contacts are those of the coming step.
+    fn after_collision(&mut self, _scene: &mut Scene<'_>) {}
+
+    /// The contact graph, where contacts are to be grouped by its levels; asked before they get their lanes.
+    fn levels(&mut self, _bodies: &Bodies, _contacts: &[Contact]) -> Option<&Graph> {
+        None
+    }
+
+    /// All passes of one step.
+    fn step(&mut self, passes: &mut Passes<'_>);
+
+    /// A copy with all that it keeps.
+    fn boxed(&self) -> Box<dyn Solver>;
+
+    /// Bytes held.
+    fn held_bytes(&self) -> usize {
+        0
+    }
+}
+
+/// What a solver sees of a world around a collision.
+pub struct Scene<'a> {
+    /// At the beginning of the step.
+    pub bodies: &'a Bodies,
+    /// Sorted by shape pair.
+    pub contacts: &'a mut [Contact],
+    /// What the solver keeps per contact, contact point and body, in the order of `contacts`.
+    pub kept: &'a mut Kept,
+    /// Pairs of shapes that may touch.
+    pub candidates: Candidates<'a>,
+    /// Shapes of all bodies.
+    pub shapes: usize,
+    /// Contacts have come or gone since contacts got their lanes; known after the collision.
+    pub contacts_changed: bool,
+    /// Steps taken.
+    pub step_index: u64,
+    /// The solver's own parameters.
+    pub parameters: &'a Parameters,
+    /// m/s²
+    pub gravity: Vec2,
+    /// Step (s).
+    pub dt: f32,
+    /// Substeps in it.
+    pub substeps: u32,
+}
+
+impl Scene<'_> {
+    /// Substep (s).
+    pub fn h(&self) -> f32 {
+        self.dt / self.substeps as f32
+    }
+}
+
+/// What a solver asks of the collision that comes.
+#[derive(Debug, Default)]
+pub struct Collision {
+    /// By candidate, whether its manifold is left as it is; empty if all are found again.
+    pub keep: Vec<bool>,
+    /// What rolls, if radii of curvature are to be found ([`Contact::radii`]).
+    pub rolling: Option<Rolling>,
+}
+
+/// A solver that is a schedule and keeps nothing.
+#[derive(Clone, Copy)]
+pub struct Schedule(pub fn(&mut Passes<'_>));
+
+impl Schedule {
+    /// A solver that runs these passes.
+    pub fn boxed(step: fn(&mut Passes<'_>)) -> Box<dyn Solver> {
+        Box::new(Schedule(step))
+    }
+}
+
+impl fmt::Debug for Schedule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Schedule")
+    }
+}
+
+impl Solver for Schedule {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        (self.0)(passes);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(*self)
+    }
+}

@@ -1,0 +1,121 @@
+//! Passes over constraints: warm starts, velocity sweeps and position sweeps.
+
+use super::{Passes, ROW};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::observe::ObservedRule;
+use crate::engine::constraints::kernels::position::PositionSweep;
+use crate::engine::constraints::kernels::velocity::block::BlockSweep;
+use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
+use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
+use crate::engine::constraints::kernels::velocity::sweep::{Sweep, VelocitySweep};
+use crate::engine::constraints::kernels::velocity::warm_start::WarmStart;
+use crate::engine::lanes::BodyRow;
+
+impl Passes<'_> {
+    /// Sets all accumulated impulses to zero, for solvers without warm starting.
+    pub fn forget_impulses(&mut self) {
+        if !self.input.phases.runs(Phase::Prepare) {
+            return;
+        }
+        let mut zero = self.vector();
+        self.system().set_lane_impulses(&mut zero);
+        self.give_back([zero]);
+        self.clock.lap(Phase::Prepare);
+    }
+
+    /// Constraint pass: applies the accumulated impulses.
+    pub fn warm_start(&mut self) {
+        self.run(Phase::WarmStart, &mut WarmStart { turned: false });
+    }
+
+    /// As [`Self::warm_start`], with arms that have turned with their bodies since the step began.
+    pub fn warm_start_turned(&mut self) {
+        self.run(Phase::WarmStart, &mut WarmStart { turned: true });
+    }
+
+    /// Constraint pass: one velocity sweep under `rule`, Gauss–Seidel, booked on `phase`.
+    pub fn sweep(&mut self, phase: Phase, rule: &Rule) {
+        self.velocity_sweep(phase, { *rule }.sweep());
+    }
+
+    /// As [`Self::sweep`], under a rule of the solver's own.
+    pub fn velocity_sweep(&mut self, phase: Phase, sweep: &mut dyn VelocitySweep) {
+        if self.run(phase, sweep) {
+            self.sweep_bias(phase);
+            self.solved(sweep);
+        }
+    }
+
+    /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
+    /// together; see [`crate::engine::constraints::kernels::velocity::block`].
+    pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
+        if self.run(phase, &mut BlockSweep::<_, false>(rule)) {
+            self.sweep_bias(phase);
+            self.solved(&Sweep(rule));
+        }
+    }
+
+    /// Constraint pass: as [`Self::block_sweep`], but friction rows come last, bounded by the new impulses.
+    pub fn block_sweep_normal_first<R: NormalRule>(&mut self, phase: Phase, rule: R) {
+        if self.run(phase, &mut BlockSweep::<_, true>(rule)) {
+            self.sweep_bias(phase);
+            self.solved(&Sweep(rule));
+        }
+    }
+
+    /// Constraint pass: every contact reads the velocities from before the pass, and what all of
+    /// them add to a body, times `relaxation`, is summed up in `sums`; see
+    /// [`crate::engine::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
+    pub fn jacobi_sweep(
+        &mut self,
+        phase: Phase,
+        rule: Soft,
+        relaxation: f32,
+        sums: &mut Vec<BodyRow>,
+        split: Option<&ScaledMasses>,
+    ) {
+        if !self.input.phases.runs(phase) {
+            return;
+        }
+        jacobi::begin(&self.work.rows, sums);
+        self.over_batches(phase, &mut JacobiSweep { rule, relaxation, sums });
+        // Sums are cleared, read, and added to velocities.
+        self.book_rows([ROW, 1.5 * ROW]);
+        jacobi::finish(&mut self.work.rows, sums, split.map_or(&[], ScaledMasses::whole));
+        self.clock.lap(phase);
+        self.solved(&Sweep(rule));
+    }
+
+    /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart; the law of the
+    /// solver is that of its other sweeps.
+    pub fn push_sweep(&mut self, phase: Phase, rule: &Rule) {
+        let mut rule = *rule;
+        let sweep = rule.sweep();
+        if self.run(phase, sweep) {
+            let rows = if sweep.has_friction() { self.rows_per_point() } else { 1 };
+            self.count_sweep(rows);
+        }
+    }
+
+    /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.
+    pub fn position_sweep(&mut self, mut sweep: PositionSweep) {
+        if self.run(Phase::Position, &mut sweep) {
+            self.count_sweep(1);
+        }
+    }
+
+    /// Says which law was solved, where no sweep did: that of this one.
+    pub fn solves(&mut self, sweep: &dyn VelocitySweep) {
+        if self.work.observe {
+            self.work.last_rule = Some(ObservedRule::of(sweep, &self.work.rows));
+        }
+    }
+
+    /// Counts a velocity sweep, and keeps its rule if `observe` is set.
+    pub fn solved(&mut self, sweep: &dyn VelocitySweep) {
+        let rows = if sweep.has_friction() { self.rows_per_point() } else { 1 };
+        self.count_sweep(rows);
+        self.solves(sweep);
+    }
+}

@@ -1,0 +1,54 @@
+//! The step's problem as vectors.
+
+use super::{Passes, Workspace};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::records::point_vector::PointVector;
+use crate::engine::constraints::vectors::system::System;
+use crate::engine::lanes::Block;
+
+impl Passes<'_> {
+    /// All impulses and velocities as vectors, in an order that no width changes.
+    pub fn system(&mut self) -> System<'_> {
+        let Workspace { rows, lanes, serial, .. } = &mut *self.work;
+        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock, self.width)
+    }
+
+    /// The greatest violation of the rigid contact law now (N·s), see [`System::residual`].
+    pub fn residual(&mut self) -> f64 {
+        let h = self.h();
+        self.system().residual(h)
+    }
+
+    /// A vector over contact points, all zero. Given back by [`Self::give_back`], it is not allocated
+    /// again in the next step.
+    pub fn vector(&mut self) -> PointVector {
+        let mut vector = self.work.vectors.pop().unwrap_or_default();
+        vector.reset([&self.work.lanes, &self.work.serial]);
+        vector
+    }
+
+    /// What of a vector belongs to the coloured and to the serial batches; empty if it is.
+    pub(crate) fn parts_of<'v>(&self, vector: &'v mut PointVector) -> [&'v mut [Block]; 2] {
+        if vector.is_empty() {
+            [&mut [], &mut []]
+        } else {
+            vector.parts([&self.work.lanes, &self.work.serial])
+        }
+    }
+
+    /// Takes vectors back.
+    pub fn give_back<const N: usize>(&mut self, vectors: [PointVector; N]) {
+        // The last one out is the first one in, so that each finds its own length again.
+        self.work.vectors.extend(vectors.into_iter().rev());
+    }
+
+    /// Work on vectors, booked on `phase`; not done while another phase is repeated alone.
+    pub fn with_system<T: Default>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
+        if !self.input.phases.runs(phase) {
+            return T::default();
+        }
+        let result = work(&mut self.system());
+        self.clock.lap(phase);
+        result
+    }
+}

@@ -1,0 +1,92 @@
+//! What a step works on, what it is given, and what it counts.
+
+use crate::engine::clock::PhaseFilter;
+use crate::engine::constraints::impacts::{ImpactLaw, ImpactRecords};
+use crate::engine::constraints::kernels::motion::Motion;
+use crate::engine::constraints::kernels::observe::ObservedRule;
+use crate::engine::constraints::kernels::types::Joined;
+use crate::engine::constraints::records::batches::Batches;
+use crate::engine::constraints::records::features::Features;
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::constraints::records::point_vector::PointVector;
+use crate::engine::constraints::vectors::system::System;
+use crate::engine::lanes::BodyRow;
+use crate::engine::params::{Budget, Parameters};
+use std::fmt;
+
+/// Everything a step works on, kept from step to step so that nothing is allocated.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    /// One row per body, and an inert one at the end.
+    pub rows: Vec<BodyRow>,
+    /// Forces, damping, integration.
+    pub motion: Motion,
+    /// Coloured batches at the chosen width.
+    pub lanes: Batches,
+    /// What is solved one after the other: everything in natural order, else the overflow.
+    pub serial: Batches,
+    /// Constraints of other types than contacts.
+    pub types: Vec<Joined>,
+    /// Numbers that a solver keeps per contact, per contact point and per body.
+    pub kept: Kept,
+    /// Side records of what bounces; empty in scenes without restitution.
+    pub impacts: ImpactRecords,
+    /// Vectors that solvers have given back.
+    pub vectors: Vec<PointVector>,
+    /// Called after each iteration of a solver.
+    pub watch: Option<Watch>,
+    /// Keep the rule of the last velocity sweep in `last_rule`.
+    pub observe: bool,
+    /// See `observe`.
+    pub last_rule: Option<ObservedRule>,
+}
+
+/// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
+pub struct Watch(pub Box<Observer>);
+
+/// Is given the number of an iteration and the problem after it.
+pub type Observer = dyn FnMut(u32, &mut System<'_>) + Send;
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Watch")
+    }
+}
+
+impl Workspace {
+    /// Bytes held by what only some solvers have.
+    pub fn own_bytes(&self) -> usize {
+        self.kept.held_bytes() + self.vectors.iter().map(PointVector::held_bytes).sum::<usize>()
+    }
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WorkCount {
+    /// Passes over all constraints that solve something; warm starts are not counted.
+    pub sweeps: usize,
+    /// Rows solved in all sweeps: a normal row per point, and a tangential one where the
+    /// sweep has friction.
+    pub row_updates: usize,
+}
+
+/// What a step is given besides the workspace.
+#[derive(Clone, Copy, Debug)]
+pub struct StepInput {
+    /// What the scene has.
+    pub features: Features,
+    /// Work per step.
+    pub budget: Budget,
+    /// Substep (s).
+    pub h: f32,
+    /// The solver's own parameters.
+    pub parameters: Parameters,
+    /// Which phases run.
+    pub phases: PhaseFilter,
+    /// Sum impulses into [`crate::engine::contacts::Contact::step_impulse`].
+    pub record_impulses: bool,
+    /// Where bodies hit each other.
+    pub impacts: ImpactLaw,
+    /// Points of all contacts, to count rows by.
+    pub points: usize,
+}

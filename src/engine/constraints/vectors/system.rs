@@ -1,0 +1,324 @@
+//! The step's problem as vectors: λ of all contact points, v of all bodies, and J between them.
+//!
+//! For methods that need more than one row at a time: conjugate gradients, projected gradients,
+//! acceleration, stopping by a residual. Vectors are of two kinds. A [`PointVector`] has the order of the
+//! lanes, and all that is done with it is done in lanes. A list of [`Pair`]s is in contact order with two
+//! points a contact, absent points zero, for who looks at single contacts. Sums over either have
+//! the same bits at every width. One entry of a λ or of a relative velocity is `[normal, tangential]`,
+//! along n and t = (n_y, −n_x) on body b.
+
+use crate::engine::clock::Clock;
+use crate::engine::constraints::kernels::pass::at_width;
+use crate::engine::constraints::records::batches::Batches;
+use crate::engine::constraints::records::features::{Features, Layout};
+use crate::engine::constraints::records::point_vector::PointVector;
+use crate::engine::constraints::vectors::passes::{self, On};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneWidth};
+
+/// `[normal, tangential]` of one contact point.
+pub type Pair = [f32; 2];
+
+/// A view of the step's problem; see the [module](self).
+pub struct System<'a> {
+    rows: &'a mut [BodyRow],
+    batches: [&'a mut Batches; 2],
+    contacts: &'a [Contact],
+    features: &'a Features,
+    clock: &'a mut Clock,
+    width: LaneWidth,
+}
+
+impl<'a> System<'a> {
+    pub(crate) fn new(
+        rows: &'a mut [BodyRow],
+        batches: [&'a mut Batches; 2],
+        contacts: &'a [Contact],
+        features: &'a Features,
+        clock: &'a mut Clock,
+        width: LaneWidth,
+    ) -> Self {
+        System { rows, batches, contacts, features, clock, width }
+    }
+
+    /// Reads all accumulated impulses (N·s), in lanes.
+    pub fn lane_impulses(&mut self, to: &mut PointVector) {
+        let of = |layout: &Layout| [layout.normal_impulse, layout.tangent_impulse];
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
+    }
+
+    /// Replaces all accumulated impulses (N·s), in lanes; velocities stay as they are.
+    pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(from, |width, on| at_width!(width, passes::write_impulses(on)));
+    }
+
+    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes; of the
+    /// normal row alone in a scene without friction.
+    pub fn lane_masses(&mut self, to: &mut PointVector) {
+        let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
+    }
+
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes.
+    pub fn lane_surfaces(&mut self, to: &mut PointVector) {
+        self.book_points([8.0, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, passes::read_surfaces(on)));
+    }
+
+    /// J v: how fast the surfaces part and slide at each point (m/s), in lanes.
+    pub fn lane_velocities(&mut self, to: &mut PointVector) {
+        self.book_points([GEOMETRY, 8.0]);
+        self.over_lanes(to, |width, on| at_width!(width, passes::read_velocities(on)));
+    }
+
+    /// v ← v + M⁻¹ Jᵀ Δλ, in lanes, in the order of the lanes. Accumulated impulses stay as they are.
+    pub fn push_lanes(&mut self, delta: &mut PointVector) {
+        self.book_points([8.0 + GEOMETRY, 32.0]);
+        self.over_lanes(delta, |width, on| at_width!(width, passes::push(on)));
+    }
+
+    /// Coloured batches at their width, then serial ones at one lane.
+    ///
+    /// # Panics
+    /// If the vector is of other contacts.
+    fn over_lanes(&mut self, vector: &mut PointVector, pass: impl Fn(LaneWidth, On<'_>)) {
+        let [lanes, serial] = &mut self.batches;
+        let parts = vector.parts([lanes, serial]);
+        for (batches, (width, vector)) in
+            [lanes, serial].into_iter().zip([self.width, LaneWidth::W1].into_iter().zip(parts))
+        {
+            pass(width, On { rows: self.rows, batches, features: self.features, vector });
+        }
+    }
+
+    /// Entries of every vector over contact points: two a contact.
+    pub fn len(&self) -> usize {
+        2 * self.contacts.len()
+    }
+
+    /// Whether there are no contacts.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// Velocities and inverse masses, a row per body and an inert one at the end.
+    pub fn rows(&mut self) -> &mut [BodyRow] {
+        self.rows
+    }
+
+    /// Reads all accumulated impulses (N·s).
+    pub fn impulses(&mut self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        self.book_points([8.0, 8.0]);
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
+            to[at] = [*normal, tangent.map_or(0.0, |t| *t)];
+        });
+    }
+
+    /// Replaces all accumulated impulses (N·s); velocities stay as they are.
+    ///
+    /// # Panics
+    /// If `from` is not [`Self::len`] long.
+    pub fn set_impulses(&mut self, from: &[Pair]) {
+        assert_eq!(from.len(), self.len(), "a vector over contact points has two entries a contact");
+        self.book_points([8.0, 8.0]);
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
+            *normal = from[at][0];
+            if let Some(tangent) = tangent {
+                *tangent = from[at][1];
+            }
+        });
+    }
+
+    /// J v: how fast the surfaces part and slide at each point (m/s).
+    pub fn relative_velocities(&mut self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        self.book_points([GEOMETRY, 8.0]);
+        let view = self.view();
+        for (at, bodies, axes, arms) in view.points() {
+            to[at] = view.velocity(bodies, axes, arms);
+        }
+    }
+
+    /// v ← v + M⁻¹ Jᵀ Δλ, point after point. Accumulated impulses stay as they are.
+    ///
+    /// # Panics
+    /// If `delta` is not [`Self::len`] long.
+    pub fn apply(&mut self, delta: &[Pair]) {
+        assert_eq!(delta.len(), self.len(), "a vector over contact points has two entries a contact");
+        self.book_points([8.0 + GEOMETRY, 32.0]);
+        for contact in 0..self.contacts.len() {
+            for p in 0..self.contacts[contact].manifold.count as usize {
+                let (at, [a, b], [n, t], [arms_n, arms_t]) = self.view().point(contact, p);
+                let [normal, tangent] = delta[at];
+                let push = [normal * n[0] + tangent * t[0], normal * n[1] + tangent * t[1]];
+                for (body, sign, side) in [(a, -1.0, 0), (b, 1.0, 1)] {
+                    let Some(row) = self.rows.get_mut(body as usize) else { continue };
+                    let (inv_mass, inv_inertia) = (row.velocity[3], row.delta[3]);
+                    row.velocity[0] += sign * inv_mass * push[0];
+                    row.velocity[1] += sign * inv_mass * push[1];
+                    row.velocity[2] += sign * inv_inertia * (normal * arms_n[side] + tangent * arms_t[side]);
+                }
+            }
+        }
+    }
+
+    /// The greatest violation of the rigid contact law, in N·s: over all points the natural map
+    ///
+    /// ```text
+    /// λn − max(0, λn − m_n (vn + max(s, 0)/h)),   λt − clamp(λt − m_t vt, ±µ λn)
+    /// ```
+    ///
+    /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly
+    /// where a rigid sweep would change nothing.
+    pub fn residual(&mut self, h: f32) -> f64 {
+        self.book_points([128.0, 0.0]);
+        let view = Points { rows: self.rows, contacts: self.contacts, features: self.features };
+        let mut worst = 0.0_f64;
+        each_record(&mut self.batches, self.features, |at, normal, tangent| {
+            let contact = &self.contacts[at / 2];
+            if at % 2 >= contact.manifold.count as usize {
+                return;
+            }
+            let (_, bodies, axes, arms) = view.point(at / 2, at % 2);
+            let [vn, vt] = view.velocity(bodies, axes, arms).map(f64::from);
+            let gap = contact.manifold.points[at % 2].separation.max(0.0) / h;
+            let (normal, tangent) = (f64::from(*normal), tangent.map_or(0.0, |t| f64::from(*t)));
+            let mass = arms.map(|arms| view.effective_mass(bodies, arms));
+            let wanted = (normal - mass[0] * (vn + f64::from(gap))).max(0.0);
+            let bound = f64::from(contact.friction) * normal.max(0.0);
+            let held = (tangent - mass[1] * vt).max(-bound).min(bound);
+            let friction = if self.features.friction { (tangent - held).abs() } else { 0.0 };
+            worst = worst.max((normal - wanted).abs()).max(friction);
+        });
+        worst
+    }
+
+    /// x·y, summed in `f64` in contact order.
+    pub fn dot(x: &[Pair], y: &[Pair]) -> f64 {
+        let product =
+            |(x, y): (&Pair, &Pair)| f64::from(x[0]) * f64::from(y[0]) + f64::from(x[1]) * f64::from(y[1]);
+        x.iter().zip(y).map(product).sum()
+    }
+
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point; zero of absent ones.
+    pub fn gaps_and_friction(&self, to: &mut Vec<Pair>) {
+        to.clear();
+        to.resize(self.len(), [0.0; 2]);
+        for (at, ..) in self.view().points() {
+            let contact = &self.contacts[at / 2];
+            let friction = if self.features.friction { contact.friction } else { 0.0 };
+            to[at] = [contact.manifold.points[at % 2].separation, friction];
+        }
+    }
+
+    /// What the Jacobian of a point is made of; see [`PointRows`].
+    pub fn point_rows(&self) -> impl Iterator<Item = PointRows> {
+        self.view().points().map(|(at, bodies, axes, arms)| PointRows { at, bodies, axes, arms })
+    }
+
+    fn view(&self) -> Points<'_> {
+        Points { rows: self.rows, contacts: self.contacts, features: self.features }
+    }
+
+    /// Books bytes read and written of each contact point.
+    fn book_points(&mut self, bytes: [f64; 2]) {
+        let points = self.len() as f64;
+        self.clock.book_bytes(bytes.map(|b| points * b));
+    }
+}
+
+/// The normal and the tangential row of one contact point.
+#[derive(Clone, Copy, Debug)]
+pub struct PointRows {
+    /// Its place in vectors.
+    pub at: usize,
+    /// Bodies a and b; what is no row is the world.
+    pub bodies: [u32; 2],
+    /// n and t.
+    pub axes: [[f32; 2]; 2],
+    /// `[r_a × u, r_b × u]` for u = n and t (m).
+    pub arms: [Pair; 2],
+}
+
+/// Bytes of a point's geometry and its two bodies.
+const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
+
+/// What does not change while impulses do.
+#[derive(Clone, Copy)]
+struct Points<'a> {
+    rows: &'a [BodyRow],
+    contacts: &'a [Contact],
+    features: &'a Features,
+}
+
+impl<'a> Points<'a> {
+    /// 1/(J M⁻¹ Jᵀ) of one row (kg).
+    fn effective_mass(&self, [a, b]: [u32; 2], arms: Pair) -> f64 {
+        let (a, b) = (self.row(a), self.row(b));
+        let turned = |row: BodyRow, arm: f32| f64::from(row.delta[3]) * f64::from(arm) * f64::from(arm);
+        let k = f64::from(a.velocity[3]) + f64::from(b.velocity[3]) + turned(a, arms[0]) + turned(b, arms[1]);
+        if k > 0.0 { 1.0 / k } else { 0.0 }
+    }
+
+    /// A body's row; what is no body does not move.
+    fn row(&self, body: u32) -> BodyRow {
+        self.rows.get(body as usize).copied().unwrap_or_default()
+    }
+
+    /// How fast the surfaces part and slide at a point (m/s).
+    fn velocity(&self, [a, b]: [u32; 2], [n, t]: [[f32; 2]; 2], [arms_n, arms_t]: [Pair; 2]) -> Pair {
+        let (va, vb) = (self.row(a).velocity, self.row(b).velocity);
+        let d = [vb[0] - va[0], vb[1] - va[1]];
+        let along = |u: [f32; 2], arms: Pair| u[0] * d[0] + u[1] * d[1] + vb[2] * arms[1] - va[2] * arms[0];
+        [along(n, arms_n), along(t, arms_t)]
+    }
+
+    /// Every point in use, see [`Self::point`].
+    fn points(self) -> impl Iterator<Item = (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2])> + use<'a> {
+        self.contacts
+            .iter()
+            .enumerate()
+            .flat_map(move |(contact, c)| (0..c.manifold.count as usize).map(move |p| self.point(contact, p)))
+    }
+
+    /// Its place in vectors, its bodies, n and t, and the arms `[r_a × u, r_b × u]` for u = n and t.
+    fn point(&self, contact: usize, p: usize) -> (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2]) {
+        let c = &self.contacts[contact];
+        let (n, point) = (c.manifold.normal, &c.manifold.points[p]);
+        let t = glam::Vec2::new(n.y, -n.x);
+        let turns = if self.features.rotation { 1.0 } else { 0.0 };
+        let arms = |u: glam::Vec2| [point.anchor_a, point.anchor_b].map(|r| turns * r.perp_dot(u));
+        (2 * contact + p, [c.body_a, c.body_b], [n.to_array(), t.to_array()], [arms(n), arms(t)])
+    }
+}
+
+/// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point of every record.
+fn each_record(
+    batches: &mut [&mut Batches; 2],
+    features: &Features,
+    mut visit: impl FnMut(usize, &mut f32, Option<&mut f32>),
+) {
+    for batches in batches {
+        let width = batches.width();
+        batches.for_each_lane(features, |contact, layout, record, lane| {
+            for p in 0..layout.points.min(2) {
+                let normal = layout.at(p, layout.normal_impulse) * width + lane;
+                let tangent = layout.at(p, layout.tangent_impulse) * width + lane;
+                let at = 2 * contact as usize + p;
+                if layout.has_friction {
+                    let [normal, tangent] =
+                        record.get_disjoint_mut([normal, tangent]).expect("two places in a record");
+                    visit(at, normal, Some(tangent));
+                } else {
+                    visit(at, &mut record[normal], None);
+                }
+            }
+        });
+    }
+}

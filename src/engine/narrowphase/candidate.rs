@@ -1,0 +1,65 @@
+//! A pair of shapes whose bounds overlap.
+
+use super::batch::Kind;
+use super::lanes::PoseRow;
+use crate::engine::contacts::{Contact, pair_key};
+
+/// A pair of shapes that may touch.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// Shapes a and b, in a contact's order.
+    pub shapes: [u32; 2],
+    /// Their bodies.
+    pub bodies: [u32; 2],
+    /// What the narrow phase calls the shapes.
+    pub numbers: [u32; 2],
+    /// Centres of mass farther apart than the root of this cannot be in touch (m²).
+    pub reach_squared: f32,
+    /// Mixed Coulomb coefficient.
+    pub friction: f32,
+    /// Mixed restitution.
+    pub restitution: f32,
+    /// Its contact, or [`super::batch::NO_CONTACT`].
+    pub contact: u32,
+}
+
+impl Candidate {
+    /// The shape pair as a sortable number.
+    pub fn pair(&self) -> u64 {
+        pair_key(self.shapes[0], self.shapes[1])
+    }
+
+    /// A contact of this pair without a manifold.
+    pub fn without_manifold(&self) -> Contact {
+        Contact {
+            shape_a: self.shapes[0],
+            shape_b: self.shapes[1],
+            body_a: self.bodies[0],
+            body_b: self.bodies[1],
+            friction: self.friction,
+            restitution: self.restitution,
+            ..Contact::default()
+        }
+    }
+}
+
+/// All candidates of a step.
+#[derive(Clone, Copy)]
+pub struct Candidates<'a> {
+    /// Sorted by shape pair.
+    pub all: &'a [Candidate],
+    /// Places in `all` by [`Kind`], sorted by pair.
+    pub of_kind: &'a [Vec<u32>; Kind::ALL.len()],
+    /// Poses by body.
+    pub poses: &'a [PoseRow],
+}
+
+impl<'a> Candidates<'a> {
+    /// Place, candidate and poses of all of a kind, sorted by pair.
+    pub fn of(self, kind: Kind) -> impl Iterator<Item = (u32, &'a Candidate, [&'a PoseRow; 2])> {
+        self.of_kind[kind as usize].iter().map(move |&place| {
+            let candidate = &self.all[place as usize];
+            (place, candidate, candidate.bodies.map(|body| &self.poses[body as usize]))
+        })
+    }
+}

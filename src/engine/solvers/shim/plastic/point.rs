@@ -1,0 +1,261 @@
+//! Contact points that may be hit, and the rows and records that they are of.
+
+use super::NONE;
+use crate::engine::constraints::impacts::touch::{Frame, Round, couplings, write_arms};
+use crate::engine::constraints::kernels::frame::turn;
+use crate::engine::constraints::records::batches::Batches;
+use crate::engine::constraints::records::features::{Features, Layout};
+use crate::engine::constraints::records::segment::Segment;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, Lanes};
+
+/// What is known of a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Body {
+    /// Its first end; see `next`.
+    pub first: u32,
+    /// When it was last pushed (s); −∞ for never.
+    pub time: f32,
+    pub is_queued: bool,
+    /// Normal impulses of its points in the last substep (N·s).
+    pub borne: f32,
+    /// `time` when only what arrives had been solved (s).
+    pub begun: f32,
+    /// Its velocity before anything pushed it (m/s, m/s, rad/s).
+    pub flown: [f32; 3],
+    /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
+    pub rounded: [f32; 3],
+}
+
+/// A body that nothing has pushed.
+pub const STILL: Body = Body {
+    first: NONE,
+    time: f32::NEG_INFINITY,
+    is_queued: false,
+    borne: 0.0,
+    flown: [0.0; 3],
+    begun: f32::NEG_INFINITY,
+    rounded: [0.0; 3],
+};
+
+/// A contact point that may be hit.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Point {
+    pub lane: u32,
+    pub index: u32,
+    pub contact: u32,
+    /// Rows of a and b.
+    pub rows: [u32; 2],
+    /// Impulses change a.
+    pub pushes_a: bool,
+    pub normal: [f32; 2],
+    /// r × n and r × t of a and b (m), and the same of the contact's frame.
+    pub arms: [[f32; 2]; 2],
+    pub own_arms: [[f32; 2]; 2],
+    /// k_nn, k_tt, k_nt (1/kg).
+    pub k: [f32; 3],
+    /// 1/k_nn (kg).
+    pub mass: f32,
+    pub friction: f32,
+    /// At the beginning of the step (m).
+    pub separation: f32,
+    /// Impulses so far, along n and t (N·s).
+    pub impulse: [f32; 2],
+    /// Impulses of the last substep, along both (N·s).
+    pub borne: [f32; 2],
+    /// When it is hit (s).
+    pub time: f32,
+    /// From a to b, as far as they have moved against each other when arms end at one point (m).
+    pub apart: [f32; 2],
+    /// What is round, until it is hit.
+    pub round: Option<Round>,
+    /// It is of a round shape.
+    pub is_round: bool,
+}
+
+/// What [`PlasticImpacts::spread`] works on.
+pub struct On<'a> {
+    pub rows: &'a mut [BodyRow],
+    /// Coloured batches, serial ones.
+    pub batches: [&'a mut Batches; 2],
+    pub contacts: &'a mut [Contact],
+    pub features: &'a Features,
+    /// What forces add to the velocities of rows in a substep (m/s).
+    pub increments: &'a [[f32; 4]],
+    /// What contacts bear in statics (N), where that has just been found; else empty. `[contacts]`
+    pub weights: &'a mut Vec<f32>,
+    /// Numbers that are kept per contact.
+    pub kept: &'a [f32],
+    /// Step and substep (s).
+    pub dt: f32,
+    pub h: f32,
+    /// Slower is rest (m/s).
+    pub slowest: f32,
+    pub record_impulses: bool,
+}
+
+/// Where the record of a lane is.
+pub struct Place {
+    /// Which batches.
+    pub part: usize,
+    /// Its lane in these, and how many there are in a batch.
+    pub of: usize,
+    pub width: usize,
+    /// Its first float; the next quantity is `width` floats further.
+    pub first: usize,
+    pub layout: Layout,
+    pub pushes_a: bool,
+}
+
+impl On<'_> {
+    pub fn lanes(&self) -> usize {
+        self.batches[0].lanes() + self.batches[1].lanes()
+    }
+
+    pub fn place(&self, lane: u32) -> Place {
+        let (lane, lanes) = (lane as usize, self.batches[0].lanes());
+        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        let (batches, width) = (&self.batches[part], self.batches[part].width());
+        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
+        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
+        let in_segment = of - segment.first_lane;
+        let vector = segment.first_vector + in_segment / width * segment.stride;
+        let layout = Layout::for_features(self.features, segment.opposite);
+        Place {
+            part,
+            of,
+            width,
+            first: vector * width + in_segment % width,
+            layout,
+            pushes_a: segment.pushes_a(),
+        }
+    }
+
+    /// A point has the frame of the moment of touch.
+    pub fn turn(&mut self, point: &Point, frame: &Frame) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let rows = point.rows.map(|row| &self.rows[row as usize]);
+        frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
+    }
+
+    /// What is left of the step is solved with the arms of the impact.
+    pub fn put(&mut self, point: &Point) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let put = |vector: usize, value: f32| floats[first + vector * width] = value;
+        write_arms(&layout, point.index as usize, point.arms, [point.mass, 1.0 / point.k[1]], put);
+    }
+
+    /// The points of a lane.
+    pub fn points(&self, lane: u32) -> [Point; 2] {
+        let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
+        let batches = &self.batches[part];
+        let floats: &[f32] = bytemuck::cast_slice(batches.records());
+        let contact = batches.contact()[of];
+        let bounces = self.contacts[contact as usize].restitution > 0.0;
+        let rows = [batches.row_a()[of], batches.row_b()[of]];
+        let at = |quantity: usize| floats[first + quantity * width];
+        std::array::from_fn(|p| {
+            let is_there = p < layout.points && !bounces;
+            let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
+            let mut point =
+                Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+            if mass <= 0.0 {
+                return point;
+            }
+            let arm = |arm: usize, has: bool| {
+                if has { [at(layout.at(p, arm)), at(layout.at(p, arm) + 1)] } else { [0.0; 2] }
+            };
+            let arms = [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])];
+            let inertia =
+                |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
+            let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
+            let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
+            (point.normal, point.arms, point.own_arms) = ([at(0), at(1)], arms, arms);
+            point.k = [1.0 / mass, k_tt, k_nt];
+            point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
+            point.separation = at(layout.at(p, layout.separation));
+            let tangent = if layout.has_friction { at(layout.at(p, layout.tangent_impulse)) } else { 0.0 };
+            point.borne = [at(layout.at(p, layout.normal_impulse)), tangent];
+            point.round = Round::of(&self.contacts[contact as usize], !pushes_a);
+            point.is_round = point.round.is_some();
+            point
+        })
+    }
+}
+
+impl Point {
+    /// Velocity of b against a along n and t (m/s).
+    pub fn velocity(&self, rows: &[BodyRow]) -> [f32; 2] {
+        let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].velocity), self.normal);
+        let (x, y) = (b[0] - a[0], b[1] - a[1]);
+        let [of_a, of_b] = self.arms;
+        let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
+        std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
+    }
+
+    /// Gap as bodies are now (m).
+    pub fn gap(&self, rows: &[BodyRow]) -> f32 {
+        let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].delta), self.normal);
+        let moved = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
+        let turned = |angle: f32, [n, t]: [f32; 2]| {
+            let (sine, versine) = turn(angle);
+            sine.mul_add(n, versine * t)
+        };
+        self.separation + moved + turned(b[2], self.arms[1]) - turned(a[2], self.arms[0])
+    }
+
+    /// Impulses `[n, t]` (N·s) on both bodies, at `time` (s).
+    pub fn push(&self, rows: &mut [BodyRow], bodies: &mut [Body], [n, t]: [f32; 2], time: f32) {
+        let [nx, ny] = self.normal;
+        let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
+        let mut give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
+            let (place, arm) = (self.rows[body] as usize, self.arms[body]);
+            let (row, rounded) = (&mut rows[place], &mut bodies[place].rounded);
+            let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
+            let gained = [mass * x, mass * y, inertia * arm[0].mul_add(n, arm[1] * t)];
+            for (k, gained) in gained.into_iter().enumerate() {
+                row.delta[k] = time.neg_mul_add(gained, row.delta[k]);
+                let (before, gained) = (row.velocity[k], gained + rounded[k]);
+                row.velocity[k] = before + gained;
+                rounded[k] = gained - (row.velocity[k] - before);
+            }
+        };
+        give(1, 1.0, rows);
+        if self.pushes_a {
+            give(0, -1.0, rows);
+        }
+    }
+
+    /// Has the frame of the moment of touch from now on.
+    pub fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
+        let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
+        (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
+        (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| frame.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
+        self.apart = [apart(0), apart(1)];
+    }
+
+    /// Puts its place between where both bodies are at its time; see the [module](self).
+    pub fn meet(&mut self, rows: &[BodyRow]) {
+        // Nothing turns a smooth disc.
+        if !self.pushes_a || self.friction == 0.0 && self.is_round {
+            return;
+        }
+        let [a, b] = self.rows.map(|row| rows[row as usize]);
+        let apart = |k: usize| {
+            self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]) - self.apart[k]
+        };
+        let ([x, y], [nx, ny]) = ([0.5 * apart(0), 0.5 * apart(1)], self.normal);
+        // D/2 × n and D/2 × t.
+        let shift = [x.mul_add(ny, -(y * nx)), -x.mul_add(nx, y * ny)];
+        for (axis, shift) in shift.into_iter().enumerate() {
+            self.arms[0][axis] = self.own_arms[0][axis] + shift;
+            self.arms[1][axis] = self.own_arms[1][axis] - shift;
+        }
+        self.k = couplings([&a, &b], self.arms);
+        self.mass = 1.0 / self.k[0];
+    }
+}

@@ -1,0 +1,294 @@
+//! The two passes of position-based dynamics with contacts: bodies are displaced until no point
+//! overlaps and sticking points are where they were, then velocities are corrected once.
+//!
+//! # Displacing
+//!
+//! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse
+//! Δλ = −(C + α̃ λ)/(k + α̃) (kg·m) along n, C = max(s, −v_max h), on arms that have turned, α̃ = α/h²
+//! being what the compliance α (m/N) is in these units (`macklin2016`, equation 18); then, if what it needs is
+//! within the cone of its λ, the one along t that takes back its slide d since the step began,
+//!
+//! ```text
+//! d = t·(Δx_b − Δx_a) + σ_b (r_b × t) − κ_b (r_b × n) − σ_a (r_a × t) + κ_a (r_a × n)
+//! ```
+//!
+//! with σ = sin Δθ and κ = 1 − cos Δθ, as t·r = r × n. The contact point of a disc stays on the line of
+//! centres: its turn counts by Δθ (r × t). Slides since the substep began, as `muller2020` has them, let
+//! stacks of three boxes rock with growing energy; `catto2024solver2d` takes those of the step. Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
+//! the next point sees it. Records hold λ/h, an impulse (N·s).
+//!
+//! # Velocities
+//!
+//! Afterwards v is what moved the bodies, displacements included. Points that pushed lose their
+//! normal velocity, and as much of their sliding velocity as kinetic friction takes, µ λ/h at most.
+//!
+//! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
+
+use crate::engine::constraints::impacts::restitution::{point, restitution_of};
+use crate::engine::constraints::kernels::frame::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, turned,
+    with_arms,
+};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::constraints::records::point_vector::places;
+use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
+
+/// Displaces bodies; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Displace<'a> {
+    /// Substep (s).
+    pub h: f32,
+    /// v_max (m/s)
+    pub push_speed: f32,
+    /// α (m/N)
+    pub compliance: f32,
+    /// The first sweep of a substep: λ starts at zero.
+    pub first: bool,
+    /// Rows as they were before the substep displaced them.
+    pub before: &'a [BodyRow],
+}
+
+/// Corrects velocities; see the [module](self).
+pub(crate) struct AfterDisplacing<'a> {
+    /// How fast points shall leave (m/s), of the coloured and of the serial batches; empty where nothing bounces.
+    pub rebounds: [&'a mut [Block]; 2],
+}
+
+/// Finds how fast points shall leave: at e times the speed at which they come in, if that is more than gravity makes in two
+/// substeps (`muller2020`).
+pub(crate) struct Approach<'a> {
+    /// See [`AfterDisplacing::rebounds`].
+    pub to: [&'a mut [Block]; 2],
+}
+
+impl Pass for Approach<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let read = 2 + layout.points * (layout.arms() + 1);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        let (to, increments): (&mut [L], _) =
+            (bytemuck::cast_slice_mut(self.to[on.part as usize]), on.increments);
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+            let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
+            let each = records.chunks_exact(layout.stride).zip(indices).enumerate();
+            for (batch, (record, (contact, (row_a, row_b)))) in each {
+                let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
+                let e = restitution_of::<L>(on.contacts, filled);
+                let mut least = L::zero();
+                let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut least));
+                let rows: LaneIndex<L::Index> = row_b;
+                for (least, &row) in lanes.iter_mut().zip(rows.entries()) {
+                    let [x, y, ..] = increments[row as usize];
+                    *least = 2.0 * x.hypot(y);
+                }
+                for p in 0..layout.points {
+                    let [v, _] = point::<L>(on.rows, record, layout, p, row_a, row_b);
+                    let [normal, _] = places::<L>(segment.first_slot + batch * L::WIDTH, p);
+                    to[normal] = (-least - v).select_positive(-(e * v), L::zero());
+                }
+            }
+        });
+    }
+}
+
+impl Pass for Displace<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let once = PerLane::of_sweep(layout, true, opposite);
+        // Bodies as they are, and as they were before displacements.
+        PerLane { rows: 2 * once.rows, ..once }
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        let mut store = Displaced { rows: on.rows, before: self.before };
+        over_segments!(displace, L, F; &mut store, on.batches, &*self);
+    }
+}
+
+impl Pass for AfterDisplacing<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, true, opposite)
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        match &*self.rebounds[on.part as usize] {
+            [] => correct_all::<L, F, false>(on.rows, on.batches, &[]),
+            rebounds => correct_all::<L, F, true>(on.rows, on.batches, rebounds),
+        }
+    }
+}
+
+/// Bodies, and the turns of round ones, which their rows do not show, as spins.
+struct Displaced<'a> {
+    rows: &'a mut [BodyRow],
+    before: &'a [BodyRow],
+}
+
+impl RowStore for Displaced<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: crate::engine::lanes::IndexList) {
+        self.rows.assert_rows(index);
+        self.before.assert_rows(index);
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather(self.rows, index)
+    }
+
+    #[inline(always)]
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        L::scatter_velocity(self.rows, index, velocity);
+    }
+}
+
+#[inline(always)]
+fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
+    store: &mut Displaced<'_>,
+    batches: &mut Batches,
+    segment: &Segment,
+    &Displace { h, push_speed, compliance, first, .. }: &Displace<'_>,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let inv_h = L::splat(1.0 / h);
+    let deepest = L::splat(-push_speed * h);
+    // α̃ (1/kg), and α̃ h, as records hold λ/h.
+    let (compliance, of_impulse) = (L::splat(compliance / (h * h)), L::splat(compliance / h));
+    let zero = L::zero();
+    for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
+        let before = BodyPair::<L>::gather::<O, _>(store.before, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        // Of the centres, since the step began.
+        let [mut moved, mut slide] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n);
+        let mut angle = [a[TURN], b[TURN]];
+        let hidden = [before.a[W], before.b[W]];
+        let mut sum = [zero; 2];
+        for p in 0..N::POINTS {
+            let (arm_n, arm_t) =
+                (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
+            let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
+            let mut separation = record[layout.at(p, layout.separation)] + moved;
+            separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
+            separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
+            let at_first = [arm_n, arm_t];
+            let [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+            let answer = |arm: [L; 2]| {
+                let mut k = mass_sum;
+                if N::ROTATION {
+                    k = (inertia[1] * arm[1]).mul_add(arm[1], k);
+                    if O::HAS_ROW && segment.pushes_a() {
+                        k = (inertia[0] * arm[0]).mul_add(arm[0], k);
+                    }
+                }
+                k
+            };
+            // A point that is not there has no mass.
+            let is_there = record[layout.at(p, layout.normal_mass)];
+            let overlap = is_there.select_positive(-separation.max(deepest).min(zero), zero);
+            let at = layout.at(p, layout.normal_impulse);
+            let old = if first { zero } else { record[at] };
+            let wanted = of_impulse.neg_mul_add(old, overlap);
+            let push = is_there.select_positive(wanted / (answer(arm_n) + compliance), zero);
+            // With compliance a push can be taken back, which leaves a rounding of it at most.
+            let normal = inv_h.mul_add(push, old).max(zero);
+            record[at] = normal;
+            sum[0] = sum[0] + push;
+            moved = mass_sum.mul_add(push, moved);
+            spin::<L, N, O>(&mut angle, inertia, arm_n, push);
+            if N::FRICTION {
+                let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
+                let turns = [sine_a + hidden[0], sine_b + hidden[1]];
+                let drift = with_arms::<L, N, O>(slide, turns, at_first[1]);
+                let drift = with_arms::<L, N, O>(drift, [-versine_a, -versine_b], at_first[0]);
+                let wanted = is_there.select_positive(-(drift / answer(arm_t)), zero);
+                let at = layout.at(p, layout.tangent_impulse);
+                let old = if first { zero } else { record[at] };
+                let new = inv_h.mul_add(wanted, old);
+                let bound = record[layout.friction] * normal;
+                // Within the cone: bound − |λt| is not negative.
+                let over = new.max(-new) - bound;
+                let held = over.select_positive(zero, normal.select_positive(wanted, zero));
+                record[at] = inv_h.mul_add(held, old);
+                sum[1] = sum[1] + held;
+                slide = mass_sum.mul_add(held, slide);
+                spin::<L, N, O>(&mut angle, inertia, arm_t, held);
+            }
+        }
+        let x = n[0].mul_add(sum[0], n[1] * sum[1]);
+        let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
+        b[DX] = b[INV_MASS].mul_add(x, b[DX]);
+        b[DY] = b[INV_MASS].mul_add(y, b[DY]);
+        L::scatter_delta(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
+        if O::HAS_ROW && segment.pushes_a() {
+            a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
+            a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
+            L::scatter_delta(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
+        }
+    });
+}
+
+#[inline(never)]
+fn correct_all<L: Lanes, N: KernelFeatures, const BOUNCES: bool>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    rebounds: &[Block],
+) {
+    over_segments!(correct, L, N, BOUNCES; rows, batches, rebounds);
+}
+
+#[inline(always)]
+fn correct<L: Lanes, N: KernelFeatures, O: Opposite, const BOUNCES: bool>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    rebounds: &[Block],
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let rebounds: &[L] = bytemuck::cast_slice(rebounds);
+    let mut slot = segment.first_slot;
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [mut along_n, mut along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+        let mut sum = [L::zero(); 2];
+        for p in 0..N::POINTS {
+            let pushed = record[layout.at(p, layout.normal_impulse)];
+            let arm = arms::<L, N, O>(record, &layout, p, 0);
+            let vn = with_arms::<L, N, O>(along_n, w, arm);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let wanted = if BOUNCES { rebounds[places::<L>(slot, p)[0]] - vn } else { -vn };
+            let delta = pushed.select_positive(mass * wanted, L::zero());
+            sum[0] = sum[0] + delta;
+            along_n = mass_sum.mul_add(delta, along_n);
+            spin::<L, N, O>(&mut w, inertia, arm, delta);
+            if N::FRICTION {
+                let arm = arms::<L, N, O>(record, &layout, p, 1);
+                let vt = with_arms::<L, N, O>(along_t, w, arm);
+                let bound = record[layout.friction] * pushed;
+                let stop = -(record[layout.at(p, layout.tangent_mass)] * vt);
+                let delta = stop.min(bound).max(-bound);
+                sum[1] = sum[1] + delta;
+                along_t = mass_sum.mul_add(delta, along_t);
+                spin::<L, N, O>(&mut w, inertia, arm, delta);
+            }
+        }
+        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        slot += L::WIDTH;
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
+    });
+}
