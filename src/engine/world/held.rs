@@ -91,10 +91,9 @@ impl World {
         let timings = self.timings;
         self.frozen_step();
         self.timings = timings;
-        let rows = self.work.rows.clone();
-        let buffers = all_batches(&mut self.work).map(|batches| batches.records().to_vec()).collect();
-        let contacts = self.contacts.clone();
-        HeldWorld { world: self, before, contacts, rows, buffers }
+        let mut held = HeldWorld { world: self, before, contacts: vec![], rows: vec![], buffers: vec![] };
+        held.save();
+        held
     }
 
     /// Contacts as they were, linked to the present candidates.
@@ -175,6 +174,13 @@ impl HeldWorld<'_> {
         timings
     }
 
+    /// Keeps what [`Self::reset`] brings back: rows, records and impulses of the step that is held.
+    fn save(&mut self) {
+        self.rows.clone_from(&self.world.work.rows);
+        self.buffers = all_batches(&mut self.world.work).map(|batches| batches.records().to_vec()).collect();
+        self.contacts.clone_from(&self.world.contacts);
+    }
+
     /// Brings back what repeats of `phase` have changed.
     pub fn reset(&mut self, phase: Phase) {
         match phase {
@@ -187,7 +193,7 @@ impl HeldWorld<'_> {
         }
         self.world.work.rows.clone_from(&self.rows);
         for (batches, saved) in all_batches(&mut self.world.work).zip(&self.buffers) {
-            batches.records_mut()[..saved.len()].copy_from_slice(saved);
+            batches.records_mut().copy_from_slice(saved);
         }
     }
 
@@ -208,6 +214,8 @@ impl HeldWorld<'_> {
         self.restore_types();
         self.world.put_back(&self.before);
         self.world.frozen_step();
+        // Contacts were coloured anew, so records may have other places.
+        self.save();
         probes
     }
 
