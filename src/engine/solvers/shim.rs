@@ -32,11 +32,8 @@
 
 mod arrivals;
 mod frames;
-mod jams;
-mod loads;
-pub mod piles;
 mod plastic;
-mod preload;
+mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -54,12 +51,9 @@ use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Parameter};
 use arrivals::Arrivals;
 use frames::Roll;
-use jams::Jams;
-use loads::LoadsOf;
-use piles::Found;
-use piles::modes::Piles;
 use plastic::PlasticImpacts;
-use preload::{GIVING, Preload};
+use rest::hand_down::HandDown;
+use rest::{PER_CONTACT, PLACED};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -82,60 +76,32 @@ pub static SOLVER: Variant = Variant {
         Parameter::DAMPING_RATIO,
         Parameter::PUSH_SPEED,
         Parameter {
-            name: "patience",
+            name: "load_sweeps",
             unit: "",
-            default: 4.0,
-            range: [1e-3, 1e6],
-            meaning: "time in which preload follows the load, over what the slowest mode of the pile needs",
-            trials: &[],
-        },
-        Parameter {
-            name: "preload",
-            unit: "",
-            default: 0.95,
-            range: [0.0, 1.0],
-            meaning: "part of its sag that a contact is preloaded by; 0 is none",
-            trials: &[],
-        },
-        Parameter {
-            name: "column_sweeps",
-            unit: "",
-            default: 64.0,
+            default: 2.0,
             range: [0.0, 1000.0],
-            meaning: "most rigid sweeps per substep added for stiffer springs, where a column would buckle on these",
+            meaning: "sweeps per step over the loads that contacts bear in statics; 0 leaves all sag",
             trials: &[],
         },
     ],
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
-    kept: KeptSize { per_contact: 4, ..KeptSize::NONE },
+    kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: waves::FIRST, per_point: waves::PER_POINT },
     make: || Box::new(Shim::default()),
     ..Variant::BASE
 };
 
-/// Numbers that are kept per contact: by how much its springs are shortened (m), negative for the overlap that a body is
-/// put into the world with; the time for which that is not raised (s), negative while it gives back what it had more than
-/// it keeps; what the preload of the second point is more than that of both (m); and the time of the frame of what rolls,
-/// from the beginning of the step (s).
-const PRELOAD: usize = 0;
-/// See [`PRELOAD`].
-const WAIT: usize = 1;
-/// See [`PRELOAD`].
-const TILT: usize = 2;
-/// See [`PRELOAD`].
-const LEAD: usize = 3;
-
 /// What it keeps.
 #[derive(Clone, Debug, Default)]
 struct Shim {
-    piles: Piles,
-    found: Found,
-    /// What contacts bear in statics (N), in the steps in which that has been found, else empty. `[contacts]`
-    weights: Vec<f32>,
-    jams: Jams,
+    hand_down: HandDown,
+    /// Changes of velocity per substep under the loads of statics. `[rows]`
+    fields: Vec<BodyRow>,
+    /// Bodies bear for the first time.
+    begins: bool,
+    /// Contacts have come or gone.
+    contacts_changed: bool,
     plastic: PlasticImpacts,
-    /// What the impulses of contacts belong to; none before there are any.
-    loads_of: Option<LoadsOf>,
     /// Bodies that have taken a step: the first ones.
     stepped: usize,
     /// Something is round.
@@ -143,11 +109,7 @@ struct Shim {
 }
 
 impl Solver for Shim {
-    fn before_collision(&mut self, scene: &mut Scene<'_>, collision: &mut Collision) {
-        let new = LoadsOf::of(scene);
-        if let Some(old) = self.loads_of.replace(new).filter(|old| *old != new) {
-            old.scale(&new, scene);
-        }
+    fn before_collision(&mut self, _scene: &mut Scene<'_>, collision: &mut Collision) {
         collision.rolling = Some(Rolling { limit: frames::STEADY });
     }
 
@@ -155,32 +117,27 @@ impl Solver for Shim {
         self.rolls = [Kind::Circles, Kind::HullCircle, Kind::CircleHull]
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
-        let is_placed = self.place(scene);
-        // Two bodies of one shape each have one contact.
-        if scene.shapes > scene.bodies.len() {
-            self.jams.release(scene.contacts);
-        }
-        self.found.update(&mut self.piles, &mut self.weights, scene, is_placed);
+        self.contacts_changed = scene.contacts_changed;
+        self.place(scene);
+        self.begins = self.hand_down.begin(scene, self.stepped);
     }
 
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h, dt) = (passes.budget(), passes.h(), passes.dt());
-        let [stiffness, damping_ratio, push_speed, patience, share, most] =
-            [0, 1, 2, 3, 4, 5].map(|i| passes.parameter(i));
-        let (usual, piles) = (TAU * stiffness / h, self.found.modes);
-        let added = added_sweeps(piles.critical_frequency / usual, budget, most);
-        let sweeps = (budget.velocity_iterations + budget.relax_iterations).max(1) as f32;
-        let omega = usual * (1.0 + added as f32 / sweeps).sqrt();
+        let [stiffness, damping_ratio, push_speed, load_sweeps] = [0, 1, 2, 3].map(|i| passes.parameter(i));
+        let omega = TAU * stiffness / h;
         let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
         let rigid = Rigid::new(h);
-        let time = patience * piles.slowness / (2.0 * damping_ratio * omega);
         if self.rolls {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
             passes.run(Phase::Prepare, &mut Roll { middle, dt });
         }
         self.impacts(passes);
-        let (rate, weights) = (dt / (dt + time), &self.weights);
-        passes.run(Phase::Prepare, &mut Preload { springs, share, rate, h, dt, weights });
+        if passes.runs(Phase::Prepare) {
+            let more = if self.begins { 8 } else { 1 };
+            self.rest(passes, springs, more * load_sweeps as u32);
+            passes.parts().clock.lap(Phase::Prepare);
+        }
         for substep in 0..budget.substeps {
             if substep == 0 {
                 passes.integrate_velocities();
@@ -194,8 +151,8 @@ impl Solver for Shim {
             }
             passes.integrate_positions();
             // Impulses of the step before meet contacts that came, or miss some that went: one sweep more.
-            let settling = u32::from(substep == 0 && self.found.contacts_changed);
-            for _ in 0..budget.relax_iterations + added + settling {
+            let settling = u32::from(substep == 0 && self.contacts_changed);
+            for _ in 0..budget.relax_iterations + settling {
                 let left = budget.substeps - substep;
                 if passes.run(Phase::Relax, &mut Parting::new(rigid, h, budget.substeps, left)) {
                     passes.solved(&Sweep(rigid));
@@ -211,28 +168,23 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.piles.held_bytes() + held(&self.weights) + self.jams.held_bytes() + self.plastic.held_bytes()
+        self.hand_down.held_bytes() + held(&self.fields) + self.plastic.held_bytes()
     }
 }
 
 impl Shim {
-    /// Contacts that are found in the first step of one of their bodies begin with the overlap that it was placed with, and
-    /// with all of their sag; whether there are any.
-    fn place(&mut self, scene: &mut Scene<'_>) -> bool {
-        let mut is_placed = false;
+    /// Contacts that are found in the first step of one of their bodies begin with the overlap that it was placed with.
+    fn place(&self, scene: &mut Scene<'_>) {
         if self.stepped >= scene.bodies.len() {
-            return false;
+            return;
         }
         let stepped = self.stepped as u32;
         for (i, contact) in scene.contacts.iter().enumerate() {
             if contact.body_a.max(contact.body_b) >= stepped {
                 let least = contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                let kept = scene.kept.contact(i);
-                (kept[PRELOAD], kept[WAIT]) = (least, -GIVING);
-                is_placed = true;
+                scene.kept.contact(i)[PLACED] = least;
             }
         }
-        is_placed
     }
 
     /// What comes in bounces or stops, before the step.
@@ -271,7 +223,6 @@ impl Shim {
                     contacts,
                     features: &input.features,
                     increments: motion.velocity_increments(),
-                    weights: &mut self.weights,
                     kept: kept.contacts(),
                     dt,
                     h,
@@ -314,11 +265,4 @@ fn impact_speeds(work: &Workspace, h: f32, dt: f32) -> Option<[f32; 3]> {
     // |v| + |ω| R ≤ √2 √(v² + ω² R²)
     let fastest = (2.0 * fastest).sqrt();
     (fastest > slowest).then_some([slowest, least, fastest])
-}
-
-/// Rigid sweeps per substep for springs `ratio` times as fast as the usual ones: (h ω)² < q, the number of sweeps
-/// (`papers/shim.md`), which so has to grow with ω².
-fn added_sweeps(ratio: f32, budget: Budget, most: f32) -> u32 {
-    let sweeps = (budget.velocity_iterations + budget.relax_iterations) as f32;
-    (sweeps * (ratio * ratio - 1.0)).ceil().clamp(0.0, most) as u32
 }

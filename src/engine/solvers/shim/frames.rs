@@ -32,7 +32,7 @@
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.
 
-use super::LEAD;
+use super::rest::LEAD;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
@@ -118,7 +118,7 @@ fn roll<L: Lanes>(
         let lead = rolls.select_positive(tau, zero);
         let leads: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&lead));
         for (&contact, &lead) in filled.iter().zip(leads) {
-            kept[contact as usize].0[LEAD] = lead;
+            kept[2 * contact as usize + 1].0[LEAD - 4] = lead;
         }
         if !rolls.any_positive() {
             continue;

@@ -40,7 +40,7 @@ mod release;
 
 use crate::engine::constraints::impacts::waves::{AHEAD, TURNED, rough_impulses};
 use crate::engine::lanes::{BodyRow, held};
-use crate::engine::solvers::shim::LEAD;
+use crate::engine::solvers::shim::rest::{LEAD, PER_CONTACT};
 use pile::Pile;
 pub(crate) use point::On;
 use point::{Body, Point, STILL};
@@ -143,7 +143,6 @@ impl PlasticImpacts {
             on.put(point);
         }
         self.spent += self.solved.saturating_sub(always);
-        self.rest(on);
         if on.record_impulses {
             for point in &self.points {
                 let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
@@ -221,7 +220,7 @@ impl PlasticImpacts {
             for point in points.iter_mut().filter(|point| point.mass > 0.0) {
                 // Arms end at one point at the time of the frame, if nothing is hit.
                 let [a, b] = point.rows.map(|row| self.bodies[row as usize].flown);
-                let lead = on.kept[4 * point.contact as usize + LEAD];
+                let lead = on.kept[PER_CONTACT * point.contact as usize + LEAD];
                 point.apart = std::array::from_fn(|k| lead * (b[k] - a[k]));
                 point.is_round |= lead != 0.0;
             }

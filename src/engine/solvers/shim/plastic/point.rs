@@ -82,8 +82,6 @@ pub struct On<'a> {
     pub features: &'a Features,
     /// What forces add to the velocities of rows in a substep (m/s).
     pub increments: &'a [[f32; 4]],
-    /// What contacts bear in statics (N), where that has just been found; else empty. `[contacts]`
-    pub weights: &'a mut Vec<f32>,
     /// Numbers that are kept per contact.
     pub kept: &'a [f32],
     /// Step and substep (s).

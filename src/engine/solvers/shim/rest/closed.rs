@@ -1,0 +1,140 @@
+//! Which points bear, and what their loads of the last step do to the accelerations of bodies.
+//!
+//! A point is closed if its gap is a fraction of the slop and it moves along its normal no faster than what forces make of
+//! rest in a step, v ≤ dt (|a_a| + |a_b|). One that closes begins with the impulse of the last substep.
+
+use super::OPEN;
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::engine::params::LINEAR_SLOP;
+
+/// Greatest gap of a closed point (m).
+const CLOSED: f32 = 0.02 * LINEAR_SLOP;
+
+/// Finds closed points, and starts from their loads.
+pub(in super::super) struct Close<'a> {
+    /// Changes of velocity in free flight per substep. `[rows]`
+    pub fields: &'a mut [BodyRow],
+    /// Substep (s).
+    pub h: f32,
+    /// Step (s).
+    pub dt: f32,
+}
+
+impl Pass for Close<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        let once = PerLane::of_bodies(7 + layout.points * (layout.arms() + 3), 4, opposite);
+        PerLane { rows: 2 * once.rows, ..once }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            close::<L>(on.rows, batches, segment, layout, on.kept.contacts(), self);
+        });
+    }
+}
+
+#[inline(never)]
+fn close<L: Lanes>(
+    rows: &[BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    kept: &mut [f32],
+    &mut Close { ref mut fields, h, dt }: &mut Close<'_>,
+) {
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(contact.batches::<L::Index>());
+    let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
+    let (zero, open) = (L::zero(), L::splat(OPEN));
+    let (per_step, per_substep, h) = (L::splat(dt / h), L::splat(1.0 / h), L::splat(h));
+    let rows_of = row_a.batches().zip(row_b.batches());
+    for (batch, ((record, index), (row_a, row_b))) in records.zip(rows_of).enumerate() {
+        let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        let gather = |rows: &[BodyRow]| {
+            let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+            [a, L::gather(rows, row_b)]
+        };
+        let ([a, b], [mut free_a, mut free_b]) = (gather(rows), gather(fields));
+        let size = |v: &[L; 8]| v[0].mul_add(v[0], v[1] * v[1]).sqrt();
+        let still = per_step * (size(&free_a) + size(&free_b));
+        let [nx, ny] = [record[0], record[1]];
+        let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
+        let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
+        let mut loads = [open, zero, open, zero];
+        for p in 0..layout.points {
+            let arms = arms_of(record, layout, p);
+            let vn = a[2].neg_mul_add(arms[0][0], b[2].mul_add(arms[1][0], straight));
+            let speed = vn.max(-vn);
+            let at = |quantity: usize| record[layout.at(p, quantity)];
+            let near = L::splat(CLOSED) - at(layout.separation);
+            let is_closed = at(layout.normal_mass).select_positive(near.min(still - speed), zero);
+            let has_borne = last[2 * p] + L::splat(0.5);
+            let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
+            let normal = begun(last[2 * p], at(layout.normal_impulse));
+            let tangent = if layout.has_friction {
+                begun(last[2 * p + 1], at(layout.tangent_impulse))
+            } else {
+                zero
+            };
+            loads[2 * p] = is_closed.select_positive(normal, open);
+            loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
+            let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
+            push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
+        }
+        L::scatter_velocity(fields, row_b, [free_b[0], free_b[1], free_b[2], free_b[3]]);
+        if segment.pushes_a() {
+            L::scatter_velocity(fields, row_a, [free_a[0], free_a[1], free_a[2], free_a[3]]);
+        }
+        store::<L>(quads, index, segment.filled(batch, L::WIDTH), loads);
+    }
+}
+
+/// r × n and r × t of a and b at point `p` (m).
+#[inline(always)]
+pub(super) fn arms_of<L: Lanes>(record: &[L], layout: &Layout, p: usize) -> [[L; 2]; 2] {
+    let arm = |first: usize, has: bool| {
+        if has {
+            [record[layout.at(p, first)], record[layout.at(p, first) + 1]]
+        } else {
+            [L::zero(); 2]
+        }
+    };
+    [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])]
+}
+
+/// What impulses along n and t (N·s) do to a and b.
+#[inline(always)]
+pub(super) fn push<L: Lanes>(
+    [a, b]: [&mut [L; 8]; 2],
+    [nx, ny]: [L; 2],
+    arms: [[L; 2]; 2],
+    [n, t]: [L; 2],
+) {
+    let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
+    let turn = |arm: [L; 2]| arm[0].mul_add(n, arm[1] * t);
+    (b[0], b[1]) = (b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]));
+    b[2] = b[7].mul_add(turn(arms[1]), b[2]);
+    (a[0], a[1]) = (a[3].neg_mul_add(x, a[0]), a[3].neg_mul_add(y, a[1]));
+    a[2] = a[7].neg_mul_add(turn(arms[0]), a[2]);
+}
+
+/// Writes the loads of the `filled` lanes of a batch.
+#[inline(always)]
+pub(super) fn store<L: Lanes>(
+    quads: &mut [Quad],
+    index: LaneIndex<L::Index>,
+    filled: usize,
+    loads: [L; 4],
+) {
+    if filled == L::WIDTH {
+        L::scatter_quads::<2, 0>(quads, index, loads);
+        return;
+    }
+    for (lane, &contact) in index.entries()[..filled].iter().enumerate() {
+        let of = |load: &L| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(load))[lane];
+        quads[2 * contact as usize].0 = [of(&loads[0]), of(&loads[1]), of(&loads[2]), of(&loads[3])];
+    }
+}

@@ -1,0 +1,73 @@
+//! Rest: what contacts bear in statics, and springs that are shortened by what they give way under it.
+//!
+//! # The problem
+//!
+//! A spring bears a load by giving way: at rest a soft row of impulse λ per substep has, with the terms of
+//! [`crate::engine::constraints::kernels::velocity::rules::Soft`], γ_i λ = −m γ_m β s, and so sags by
+//!
+//! ```text
+//! sag(λ) = γ_i λ / (γ_m β m)
+//! ```
+//!
+//! # The law
+//!
+//! The loads F that closed contacts bear at rest solve the contact problem on accelerations, with those of free flight a₀:
+//!
+//! ```text
+//! a = a₀ + M⁻¹ Jᵀ F,    F_n ≥ 0,  J_n a ≥ 0,  F_n J_n a = 0,    |F_t| ≤ µ F_n,  J_t a = 0 or |F_t| = µ F_n
+//! ```
+//!
+//! Each contact keeps its loads. Every step they are the start of `load_sweeps` projected Gauss–Seidel sweeps ([`loads`]),
+//! and each point is shortened by the sag of its load ([`shorten`]): it sees s − sag(F h) instead of s, and rests at s = 0.
+//!
+//! Loads are fed forward. They follow from weights and from which contacts are closed ([`closed`]), and not from impulses of the
+//! springs that they shorten, so that there is no loop to tune, to wait for, or to rock a column; and loads that the law does not ask for
+//! do not grow.
+//!
+//! # New bodies
+//!
+//! Sweeps from nothing need as many steps as a pile is high. What bears a body for the first time begins with what it bears if
+//! loads go down from body to body ([`hand_down`]).
+
+pub(super) mod closed;
+pub(super) mod hand_down;
+pub(super) mod loads;
+pub(super) mod shorten;
+
+use super::Shim;
+use crate::engine::constraints::Passes;
+use crate::engine::constraints::kernels::velocity::rules::Soft;
+use crate::engine::constraints::step::StepParts;
+use crate::engine::lanes::BodyRow;
+
+/// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; then the overlap that a body was put
+/// into the world with (m, ≤ 0), two that are not used, and the time of the frame of what rolls (s).
+pub(super) const PER_CONTACT: usize = 8;
+
+/// See [`PER_CONTACT`].
+pub(super) const PLACED: usize = 4;
+
+/// See [`PER_CONTACT`].
+pub(super) const LEAD: usize = 7;
+
+/// N of a point that is open.
+const OPEN: f32 = -1.0;
+
+impl Shim {
+    /// Finds the loads of closed contacts, and shortens `springs` by their sag.
+    pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
+        let (h, dt) = (passes.h(), passes.dt());
+        let fields = &mut self.fields;
+        let StepParts { work, .. } = passes.parts();
+        fields.clear();
+        fields.extend(work.rows.iter().zip(work.motion.velocity_increments()).map(|(row, gained)| BodyRow {
+            velocity: [gained[0], gained[1], gained[2], row.velocity[3]],
+            delta: [0.0, 0.0, 0.0, row.delta[3]],
+        }));
+        passes.over_contacts(&mut closed::Close { fields, h, dt });
+        for _ in 0..load_sweeps {
+            passes.over_contacts(&mut loads::LoadSweep { fields, h });
+        }
+        passes.over_contacts(&mut shorten::Shorten { springs, h, dt });
+    }
+}
