@@ -35,18 +35,9 @@ pub const MAX_PUSH_SPEED: f32 = 3.0;
 /// further than a linearised contact can follow.
 pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 
-/// Approach speeds above this bounce in any case (m/s); slower ones where they are foreseen, see
-/// [`crate::engine::constraints::impacts::waves`].
+/// Approach speeds above this bounce (m/s), where a source has no other.
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 
-/// Most waves of impacts before a step. What still comes in is stopped by the solver.
-pub const IMPACT_WAVES: u32 = 32;
-
-/// Most sweeps over a wave of impacts.
-pub const IMPACT_SWEEPS: u32 = 256;
-
-/// A wave of impacts is solved when a sweep changes velocities by less than this part of what it asks for (1).
-pub const IMPACT_TOLERANCE: f32 = 1e-6;
 
 /// Most vertices of a convex polygon.
 pub const MAX_POLYGON_VERTICES: usize = 8;

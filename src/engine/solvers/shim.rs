@@ -30,30 +30,26 @@
 //! goes or wanders to a new contact within a step is followed by one sweep more: what stood on it comes apart a little
 //! (B23.release), and what bears hundreds of times its mass sinks (B23.rolling).
 
-mod arrivals;
 mod frames;
-mod plastic;
 mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::impacts::waves;
 use crate::engine::constraints::kernels::velocity::block::Parting;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
 use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::{AFTER_WAVES, Collision, Scene, StepParts};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver, Workspace};
+use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::constraints::{ImpactLaw, Passes, Solver};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::batch::Kind;
 use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Parameter};
-use arrivals::Arrivals;
 use frames::Roll;
-use plastic::PlasticImpacts;
 use rest::hand_down::HandDown;
-use rest::{PER_CONTACT, PLACED};
+use rest::shorten::LEFT;
+use rest::{LEAD, LESS, PER_CONTACT, PLACED};
+use glam::Vec2;
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -86,7 +82,7 @@ pub static SOLVER: Variant = Variant {
     ],
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
-    impacts: ImpactLaw::Solver { per_contact: waves::FIRST, per_point: waves::PER_POINT },
+    impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     make: || Box::new(Shim::default()),
     ..Variant::BASE
 };
@@ -97,11 +93,10 @@ struct Shim {
     hand_down: HandDown,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
-    /// Bodies bear for the first time.
-    begins: bool,
+    /// Of the last step (m/s²).
+    gravity: Vec2,
     /// Contacts have come or gone.
     contacts_changed: bool,
-    plastic: PlasticImpacts,
     /// Bodies that have taken a step: the first ones.
     stepped: usize,
     /// Something is round.
@@ -119,7 +114,10 @@ impl Solver for Shim {
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         self.contacts_changed = scene.contacts_changed;
         self.place(scene);
-        self.begins = self.hand_down.begin(scene, self.stepped);
+        if scene.contacts_changed || scene.gravity != self.gravity {
+            self.gravity = scene.gravity;
+            self.hand_down.build(scene.bodies, scene.contacts, scene.gravity);
+        }
     }
 
     fn step(&mut self, passes: &mut Passes<'_>) {
@@ -134,8 +132,7 @@ impl Solver for Shim {
         }
         self.impacts(passes);
         if passes.runs(Phase::Prepare) {
-            let more = if self.begins { 8 } else { 1 };
-            self.rest(passes, springs, more * load_sweeps as u32);
+            self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
         for substep in 0..budget.substeps {
@@ -168,7 +165,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + held(&self.fields) + self.plastic.held_bytes()
+        self.hand_down.held_bytes() + held(&self.fields)
     }
 }
 
@@ -182,87 +179,17 @@ impl Shim {
         for (i, contact) in scene.contacts.iter().enumerate() {
             if contact.body_a.max(contact.body_b) >= stepped {
                 let least = contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                scene.kept.contact(i)[PLACED] = least;
+                let kept = scene.kept.contact(i);
+                (kept[PLACED], kept[LESS]) = (least, if least < -LEFT { 0.0 } else { -LEFT });
             }
         }
     }
 
     /// What comes in bounces or stops, before the step.
     fn impacts(&mut self, passes: &mut Passes<'_>) {
-        let StepParts { input, .. } = passes.parts();
-        if input.impacts != SOLVER.impacts || !passes.runs(Phase::Prepare) {
-            return;
-        }
-        if passes.law() == SOLVER.impacts {
-            passes.bounce_before(true);
-            passes.begin_bounces(AFTER_WAVES);
-        }
-        self.plastic_impacts(passes);
-        passes.parts().clock.lap(Phase::Prepare);
-    }
-
-    /// Stops what comes in without restitution; see [`plastic`].
-    fn plastic_impacts(&mut self, passes: &mut Passes<'_>) {
-        let (h, dt) = (passes.h(), passes.dt());
-        let StepParts { work, contacts, .. } = passes.parts();
-        self.plastic.earn(contacts.len());
-        if let Some([slowest, least_gain, fastest]) = impact_speeds(work, h, dt) {
-            let mut found = std::mem::take(&mut self.plastic.found);
-            for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(&mut found) {
-                found.clear();
-                passes.over_part(part, &mut Arrivals { h, dt, slowest, least_gain, fastest, found });
-            }
-            let count: usize = found.iter().map(Vec::len).sum();
-            self.plastic.found = found;
-            if (1..=arrivals::MOST).contains(&count) {
-                let StepParts { work, contacts, input, .. } = passes.parts();
-                let Workspace { rows, lanes, serial, motion, kept, .. } = work;
-                self.plastic.spread(&mut plastic::On {
-                    rows,
-                    batches: [lanes, serial],
-                    contacts,
-                    features: &input.features,
-                    increments: motion.velocity_increments(),
-                    kept: kept.contacts(),
-                    dt,
-                    h,
-                    slowest,
-                    record_impulses: input.record_impulses,
-                });
-                motion.hide_turns(rows);
-                if passes.law() == SOLVER.impacts {
-                    passes.begin_bounces(AFTER_WAVES);
-                }
-            }
+        if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) {
+            passes.spread_impacts(true, true, Some(LEAD));
+            passes.parts().clock.lap(Phase::Prepare);
         }
     }
-}
-
-/// Speed below which nothing is an impact, the least that forces add to the speed of a dynamic body in a step, and
-/// a speed that no point of a body exceeds (m/s); none if that is slower than an impact.
-fn impact_speeds(work: &Workspace, h: f32, dt: f32) -> Option<[f32; 3]> {
-    /// Part of what forces make in a step (1).
-    const SLOW: f32 = 0.01;
-    /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
-    const REACH: f32 = 3.0;
-    let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
-    let (mut fastest, mut most, mut least) = (0.0_f32, 0.0_f32, f32::INFINITY);
-    for (BodyRow { velocity, delta }, increment) in work.rows.iter().zip(work.motion.velocity_increments()) {
-        let [inv_mass, inv_inertia] = [velocity[3], delta[3]];
-        // (ω R)²: infinite for a kinematic body that turns, NaN, which is never the maximum, for one that does not.
-        let (top, turning) = (REACH.mul_add(REACH * inv_mass, f32::MIN_POSITIVE), velocity[2] * velocity[2]);
-        let straight = square(velocity);
-        fastest = fastest.max(straight);
-        // Multiplied out, since few bodies are the fastest so far: a division for each takes twice the time of this loop.
-        if turning * top > (fastest - straight) * inv_inertia {
-            fastest = fastest.max(turning.mul_add(top / inv_inertia, straight));
-        }
-        let gained = square(increment);
-        most = most.max(if inv_mass > 0.0 { gained } else { 0.0 });
-        least = least.min(if inv_mass > 0.0 { gained } else { f32::INFINITY });
-    }
-    let [slowest, least] = [SLOW * most.sqrt(), least.sqrt()].map(|gained| gained * dt / h);
-    // |v| + |ω| R ≤ √2 √(v² + ω² R²)
-    let fastest = (2.0 * fastest).sqrt();
-    (fastest > slowest).then_some([slowest, least, fastest])
 }

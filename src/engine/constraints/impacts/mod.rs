@@ -5,17 +5,16 @@
 //! | [`ImpactLaw::None`] | nothing bounces, whatever the surfaces say |
 //! | [`ImpactLaw::Bias`] | the speed at which a point is to leave is the target of its row ([`bias`]) |
 //! | [`ImpactLaw::EndPass`] | one pass at the end of the step gives points that speed ([`restitution`]) |
-//! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave ([`waves`]) |
+//! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave ([`spread`]) |
 //! | [`ImpactLaw::Solver`] | the solver's schedule does it |
 
 use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::params::RESTITUTION_THRESHOLD;
 
 pub mod bias;
-pub mod rebounds;
 pub mod restitution;
+pub(crate) mod spread;
 pub(crate) mod touch;
-pub mod waves;
 
 /// Which treatment of impacts a run takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -103,7 +102,7 @@ impl ImpactLaw {
             ImpactLaw::None => 0,
             ImpactLaw::Bias => bias::stride(points),
             ImpactLaw::EndPass { .. } => restitution::stride(points),
-            ImpactLaw::Waves => waves::stride(points),
+            ImpactLaw::Waves => 0,
             ImpactLaw::Solver { per_contact, per_point } => per_contact + points * per_point,
         }
     }
@@ -114,13 +113,13 @@ impl ImpactLaw {
 pub struct ImpactRecords {
     /// Of the coloured batches, and of the serial ones.
     pub bounces: [Bounces; 2],
-    /// What waves of impacts may do to bodies.
-    pub rebounds: rebounds::Rebounds,
+    /// Impacts before the step.
+    pub(crate) spread: spread::Spread,
 }
 
 impl ImpactRecords {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        self.bounces.iter().map(Bounces::held_bytes).sum::<usize>() + self.rebounds.held_bytes()
+        self.bounces.iter().map(Bounces::held_bytes).sum::<usize>() + self.spread.held_bytes()
     }
 }

@@ -1,33 +1,13 @@
-//! Bouncing: one pass at the end of a step, and its own side records. [`crate::engine::constraints::impacts::waves`] has let bounce before
-//! the step what was seen to come in; here is what only others pushed together.
+//! Bouncing: one pass at the end of a step, and its own side records.
 //!
-//! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the
-//! speed is known at its start, some way s₀ above (or below) the surface, and the bounce is
-//! applied at its end, at a separation s. In between, the relative normal acceleration a of
-//! free flight changes the speed. Semi-implicit Euler of substep h keeps, in flight, not
-//! v²/2 + a s but the shadow energy
-//!
-//! ```text
-//! E = v²/2 + a (s − v h/2)          (v' = v − a h, s' = s + h v'  ⇒  E' = E)
-//! ```
-//!
-//! so with E₀ from the start of the step, the rebound v > 0 that has e² E₀ at separation s is
-//!
-//! ```text
-//! v = a h/2 + √((a h/2)² + 2 (e² E₀ − a s))
-//! ```
-//!
-//! which is e |v₀| without acceleration. A ball that falls on the ground then returns to e² of
-//! its height whatever the step. Between two bodies that fall together a is zero, also where one
-//! of them is held up from below: what others do to them is not seen.
+//! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the speed of approach is read at its
+//! start, and the bounce is applied at its end.
 //!
 //! Every point that came in faster than the threshold and pushed at all is given the impulse
-//! λ = −m_eff (v_n − v), clamped on the accumulated impulse. Scenes in which nothing bounces have
+//! λ = −m_eff (v_n − e |v_n⁻|), clamped on the accumulated impulse. Scenes in which nothing bounces have
 //! neither the pass nor the side records.
 //!
-//! Source: `catto2024box2d` for the placement after the sweeps and for the threshold, and for e times the speed of approach;
-//! the
-//! rebound speed is *derived* here.
+//! Source: `catto2024box2d`.
 
 use crate::engine::constraints::kernels::frame::turn;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -36,49 +16,41 @@ use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
-use glam::Vec2;
 
-/// Side record: the acceleration a of approach (m/s²), then per point the energy e² E₀ (m²/s²; zero where it shall not
-/// bounce) and the largest normal impulse so far (N·s).
+/// Side record: per point the speed of its rebound (m/s; zero where it shall not bounce) and the largest normal impulse so far
+/// (N·s).
 pub(super) const fn stride(points: usize) -> usize {
-    1 + 2 * points
+    2 * points
 }
 
-/// How fast what comes in shall leave, where nothing else says so.
+/// What bounces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rebound {
     /// Approach (m/s) that a point has to exceed.
     pub threshold: f32,
-    /// At e times the height that it has come from, else at e times its speed.
-    pub in_flight: bool,
     /// Points that bore an impulse in the step before bounce only if e ≥ 1.
     pub only_new: bool,
 }
 
-/// Reads the energies, before anything moves.
-pub struct Begin<'a> {
-    /// Substep (s).
-    pub h: f32,
-    /// How fast points shall leave.
+/// Reads the speeds of approach, before anything moves.
+pub struct Begin {
+    /// What bounces.
     pub rebound: Rebound,
     /// Lane vectors of a side record.
     pub stride: usize,
-    /// Contacts that do not bounce; none if empty. `[contacts]`
-    pub stopped: &'a [bool],
-    /// Whether a point may bounce: greater than zero (m²/s²).
+    /// The fastest rebound (m/s); zero if nothing bounces.
     pub found: f32,
 }
 
-impl Pass for Begin<'_> {
+impl Pass for Begin {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let bounce = 1 + 2 * layout.points;
+        let bounce = 2 * layout.points;
         let read = 2 + layout.points * (layout.arms() + 1);
         PerLane { halves: 0, ..PerLane::of_bodies(read, bounce, opposite) }
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        let (contacts, increments) = (on.contacts, on.increments);
-        let most = prepare::<L, F>(on.rows, on.batches, on.bounces, contacts, increments, self);
+        let most = prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, self);
         self.found = self.found.max(most);
     }
 }
@@ -97,10 +69,7 @@ impl Pass for Track {
 }
 
 /// Bounces, at the end of the step.
-pub struct Apply {
-    /// Substep (s).
-    pub h: f32,
-}
+pub struct Apply;
 
 impl Pass for Apply {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
@@ -112,49 +81,30 @@ impl Pass for Apply {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        apply::<L, F>(on.rows, on.batches, on.bounces, self.h);
-    }
-}
-
-/// Forgets the impulses of points that bounced.
-pub struct Forget;
-
-impl Pass for Forget {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        let impulses = if layout.has_friction { 2 } else { 1 };
-        let floats = layout.points * impulses;
-        PerLane { floats_read: floats + 2 * layout.points, floats_written: floats, ..PerLane::default() }
-    }
-
-    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        forget::<L, F>(on.batches, on.bounces);
+        apply::<L, F>(on.rows, on.batches, on.bounces);
     }
 }
 
 // What follows is compiled per width alone: layouts are looked up per segment, and a branch on
 // them per batch is not measurable beside the gathers.
 
-/// Reads energies before anything moves. `increments` are the changes of velocity in free flight
-/// per substep, `[h aₓ, h a_y, h α, 0]` per row. Returns the greatest energy (m²/s²).
+/// Reads speeds of approach before anything moves. Returns the fastest rebound (m/s).
 pub fn prepare<L: Lanes, N: KernelFeatures>(
     rows: &[BodyRow],
     batches: &mut Batches,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    increments: &[[f32; 4]],
-    begin: &Begin<'_>,
+    begin: &Begin,
 ) -> f32 {
     bounces.reserve(batches.lanes(), begin.stride);
     let mut most = 0.0_f32;
     batches.each_segment(N::layout, |batches, segment, layout| {
-        let found =
-            prepare_segment::<L>(rows, batches, segment, layout, bounces, contacts, increments, begin);
+        let found = prepare_segment::<L>(rows, batches, segment, layout, bounces, contacts, begin.rebound);
         most = most.max(found);
     });
     most
 }
 
-#[allow(clippy::too_many_arguments)]
 #[inline(never)]
 fn prepare_segment<L: Lanes>(
     rows: &[BodyRow],
@@ -163,46 +113,29 @@ fn prepare_segment<L: Lanes>(
     layout: &Layout,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    increments: &[[f32; 4]],
-    &Begin { h, rebound, stopped, .. }: &Begin<'_>,
+    rebound: Rebound,
 ) -> f32 {
     let mut most = L::zero();
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride);
-    let rows_of = row_a.batches().zip(row_b.batches());
-    let all = bounces.of::<L>(segment).zip(records);
-    let all = all.zip(contact.batches::<L::Index>().zip(rows_of));
-    for (batch, ((bounce, record), (contact, (row_a, row_b)))) in all.enumerate() {
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(bounce);
-        for lane in 0..L::WIDTH {
-            // Lanes without a contact have e = 0 and so no energy.
-            let e = if lane < segment.filled(batch, L::WIDTH) {
-                let index = contact.entries()[lane] as usize;
-                let is_stopped = stopped.get(index).is_some_and(|is| *is);
-                if is_stopped { 0.0 } else { contacts[index].restitution }
-            } else {
-                0.0
-            };
-            let increment = |row: u32| Vec2::new(increments[row as usize][0], increments[row as usize][1]);
-            let [a, b] = [row_a, row_b].map(|row| increment(row.entries()[lane]));
-            let record: &[f32] = bytemuck::cast_slice(record);
-            let n = Vec2::new(record[lane], record[L::WIDTH + lane]);
-            floats[lane] = if rebound.in_flight { -n.dot(b - a) / h } else { 0.0 };
-            floats[L::WIDTH + lane] = e;
-        }
-        let (a, e) = (bounce[0], bounce[1]);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let sides = bounces.of::<L>(segment);
+    for (batch, (bounce, (record, (row_a, row_b)))) in sides.zip(records).enumerate() {
+        let first = batch * L::WIDTH;
+        let filled = segment.filled(batch, L::WIDTH);
+        // Lanes without a contact have e = 0 and do not bounce.
+        let e = restitution_of::<L>(contacts, &contact.entries()[first..first + filled]);
         for p in 0..layout.points {
-            let [v, s] = point::<L>(rows, record, layout, p, row_a, row_b);
-            let energy = L::splat(0.5) * v * v + a * (s - v * L::splat(0.5 * h));
+            let [v, _] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let energy = L::splat(0.5) * v * v;
             let mut fast = (L::splat(-rebound.threshold) - v).select_positive(energy, L::zero());
             if rebound.only_new {
                 let is_old = record[layout.at(p, layout.normal_impulse)];
                 let lossy = (L::splat(1.0) - e).select_positive(L::zero(), fast);
                 fast = is_old.select_positive(lossy, fast);
             }
-            bounce[1 + 2 * p] = e * e * fast;
-            bounce[2 + 2 * p] = L::zero();
-            most = most.max(bounce[1 + 2 * p]);
+            bounce[2 * p] = (L::splat(2.0) * (e * e * fast)).sqrt();
+            bounce[2 * p + 1] = L::zero();
+            most = most.max(bounce[2 * p]);
         }
     }
     largest(most)
@@ -212,14 +145,6 @@ fn prepare_segment<L: Lanes>(
 pub(crate) fn largest<L: Lanes>(value: L) -> f32 {
     let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
     floats.iter().fold(0.0, |most, &x| x.max(most))
-}
-
-/// The speed v of a rebound that has the energy `energy` (m²/s²) at `separation` (m); see the [module](self).
-#[inline(always)]
-pub(crate) fn rebound<L: Lanes>(energy: L, a: L, separation: L, h: f32) -> L {
-    let half = a * L::splat(0.5 * h);
-    let left = half * half + L::splat(2.0) * (energy - a * separation);
-    half + left.max(L::zero()).sqrt()
 }
 
 /// Normal velocity (m/s) and separation (m) of point `p` of a batch, as bodies now are.
@@ -255,7 +180,7 @@ pub(crate) fn point<L: Lanes>(
 pub fn track<L: Lanes, N: KernelFeatures>(batches: &mut Batches, bounces: &mut Bounces) {
     each_record::<L>(batches, bounces, N::layout, |record, bounce, layout| {
         for p in 0..layout.points {
-            bounce[2 + 2 * p] = bounce[2 + 2 * p].max(record[layout.at(p, layout.normal_impulse)]);
+            bounce[2 * p + 1] = bounce[2 * p + 1].max(record[layout.at(p, layout.normal_impulse)]);
         }
     });
 }
@@ -281,10 +206,9 @@ pub fn apply<L: Lanes, N: KernelFeatures>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     bounces: &mut Bounces,
-    h: f32,
 ) {
     batches.each_segment(N::layout, |batches, segment, layout| {
-        apply_segment::<L>(rows, batches, segment, layout, bounces, h);
+        apply_segment::<L>(rows, batches, segment, layout, bounces);
     });
 }
 
@@ -295,20 +219,18 @@ fn apply_segment<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     bounces: &mut Bounces,
-    h: f32,
 ) {
     let pushes_a = segment.pushes_a();
     let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment));
     for ((record, bounce), (row_a, row_b)) in records.zip(row_a.batches().zip(row_b.batches())) {
         for p in 0..layout.points {
-            let [vn, separation] = point::<L>(rows, record, layout, p, row_a, row_b);
-            let (a, energy, peak) = (bounce[0], bounce[1 + 2 * p], bounce[2 + 2 * p]);
-            let rebound = rebound(energy, a, separation, h);
+            let [vn, _] = point::<L>(rows, record, layout, p, row_a, row_b);
+            let (rebound, peak) = (bounce[2 * p], bounce[2 * p + 1]);
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             let target = mass.neg_mul_add(vn - rebound, old).max(L::zero());
-            let new = bounced(energy, peak, target, old);
+            let new = rebound.select_positive(peak.select_positive(target, old), old);
             record[layout.at(p, layout.normal_impulse)] = new;
             let delta = new - old;
             push::<L>(rows, record, layout, p, [row_a, row_b], pushes_a, delta);
@@ -348,26 +270,4 @@ pub(crate) fn restitution_of<L: Lanes>(contacts: &[Contact], filled: &[u32]) -> 
     let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut e));
     lanes.iter_mut().zip(filled).for_each(|(lane, &contact)| *lane = contacts[contact as usize].restitution);
     e
-}
-
-/// `yes` where a point with this energy and this largest impulse bounces, else `no`.
-#[inline(always)]
-fn bounced<L: Lanes>(energy: L, peak: L, yes: L, no: L) -> L {
-    energy.select_positive(peak.select_positive(yes, no), no)
-}
-
-/// Forgets the impulses of points that bounced: they say nothing about the next step.
-pub fn forget<L: Lanes, N: KernelFeatures>(batches: &mut Batches, bounces: &mut Bounces) {
-    each_record::<L>(batches, bounces, N::layout, |record, bounce, layout| {
-        for p in 0..layout.points {
-            let mut forget = |at: usize| {
-                let at = layout.at(p, at);
-                record[at] = bounced(bounce[1 + 2 * p], bounce[2 + 2 * p], L::zero(), record[at]);
-            };
-            forget(layout.normal_impulse);
-            if layout.has_friction {
-                forget(layout.tangent_impulse);
-            }
-        }
-    });
 }

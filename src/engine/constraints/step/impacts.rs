@@ -3,73 +3,50 @@
 use super::Passes;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution, waves};
+use crate::engine::constraints::Workspace;
+use crate::engine::constraints::impacts::spread::{self, Find, Leads, On};
+use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
+use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::params::{IMPACT_SWEEPS, IMPACT_TOLERANCE, IMPACT_WAVES, RESTITUTION_THRESHOLD};
-
-/// What only others push together after waves of impacts.
-pub(crate) const AFTER_WAVES: Rebound =
-    Rebound { threshold: RESTITUTION_THRESHOLD, in_flight: true, only_new: false };
 
 impl Passes<'_> {
-    /// Lets bounce what comes in, wave by wave; see [`waves`].
-    pub(crate) fn bounce_before(&mut self, timed: bool) {
+    /// Lets what comes in bounce and, with `stops`, stop, before the step; see [`spread`]. `lead`: which number that the solver keeps per contact is
+    /// the time of its frame.
+    pub(crate) fn spread_impacts(
+        &mut self,
+        timed: bool,
+        stops: bool,
+        lead: Option<usize>,
+    ) {
         let (h, dt) = (self.h(), self.dt());
-        self.over_contacts(&mut waves::Load { h, dt, timed });
-        let (mut has_bounced, mut has_ended) = (false, false);
-        self.work.impacts.rebounds.stopped.clear();
-        for _ in 0..IMPACT_WAVES {
-            let mut wave = waves::Wave { h, dt, is_first: !has_bounced, found: 0.0 };
-            self.over_contacts(&mut wave);
-            let fastest = wave.found;
-            has_ended = fastest == 0.0;
-            if has_ended {
-                break;
-            }
-            has_bounced = true;
-            self.work.impacts.rebounds.begin(&self.work.rows);
-            let friction = self.input.features.friction;
-            if !self.solve_wave(timed, fastest, friction)
-                && friction
-                && self.work.impacts.rebounds.has_gained(&self.work.rows)
-            {
-                self.work.impacts.rebounds.undo(&mut self.work.rows);
-                self.solve_wave(timed, fastest, false);
-            }
-            if self.input.record_impulses {
-                self.over_contacts(&mut waves::Book);
-            }
-            if timed {
-                self.over_contacts(&mut waves::PutBack);
-                self.work.impacts.rebounds.bound(&mut self.work.rows, dt);
-            }
+        let bounces = self.law() != ImpactLaw::None;
+        let Some([least_gain, fastest]) = spread::impact_speeds(self.work, h, dt) else { return };
+        let mut spread = std::mem::take(&mut self.work.impacts.spread);
+        for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
+            found.clear();
+            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
         }
-        if has_bounced && timed {
-            if !has_ended {
-                // Bodies stay where they are: one might be in a third that nobody has looked at.
-                self.work.rows.iter_mut().for_each(|row| row.delta[..3].fill(0.0));
-                let mut stopped = std::mem::take(&mut self.work.impacts.rebounds.stopped);
-                stopped.resize(self.contacts.len(), false);
-                self.over_contacts(&mut waves::Bounced { found: &mut stopped });
-                self.work.impacts.rebounds.stopped = stopped;
-            }
-            self.work.motion.hide_turns(&mut self.work.rows);
-            self.over_contacts(&mut waves::Leave);
+        let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
+        let size = kept.size().per_contact;
+        let leads = lead.map_or(Leads::NONE, |place| Leads { kept: kept.contacts(), size, place });
+        let cut = spread.run(&mut On {
+            rows,
+            batches: [lanes, serial],
+            contacts: self.contacts,
+            features: &self.input.features,
+            increments: motion.velocity_increments(),
+            leads,
+            dt,
+            h,
+            timed,
+            record_impulses: self.input.record_impulses,
+            bounces,
+        });
+        if let Some(cut) = cut {
+            self.count.cut_impacts += cut;
+            motion.hide_turns(rows);
         }
-    }
-
-    /// Solves a wave, the fastest point of which shall leave at `fastest` (m/s), from no impulses; whether it is solved.
-    fn solve_wave(&mut self, timed: bool, fastest: f32, with_friction: bool) -> bool {
-        for sweep in 0..IMPACT_SWEEPS {
-            let is_first = sweep == 0;
-            let mut solve = waves::Solve { timed, fastest, is_first, with_friction, change: 0.0 };
-            self.over_contacts(&mut solve);
-            self.count_sweep(if with_friction { self.rows_per_point() } else { 1 });
-            if solve.change < IMPACT_TOLERANCE {
-                return true;
-            }
-        }
-        false
+        self.work.impacts.spread = spread;
     }
 
     /// What is done before the step where bodies hit each other.
@@ -80,30 +57,31 @@ impl Passes<'_> {
             ImpactLaw::None | ImpactLaw::Solver { .. } => {}
             ImpactLaw::Bias => self.begin_bias(true),
             ImpactLaw::EndPass { threshold, only_new } => {
-                self.begin_bounces(Rebound { threshold, in_flight: false, only_new });
+                self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.bounce_before(false);
-                self.begin_bounces(AFTER_WAVES);
+                self.spread_impacts(false, false, None);
             }
         }
     }
 
-    /// The law of impacts of the run; none where nothing bounces.
+    /// The law of impacts of the run.
+    pub(crate) fn impacts(&self) -> ImpactLaw {
+        self.input.impacts
+    }
+
+    /// As [`Self::impacts`]; none where nothing bounces.
     pub(crate) fn law(&self) -> ImpactLaw {
         if self.input.features.restitution { self.input.impacts } else { ImpactLaw::None }
     }
 
     /// Notes how fast points come in that shall bounce at the end of the step.
-    pub(crate) fn begin_bounces(&mut self, rebound: Rebound) {
+    fn begin_bounces(&mut self, rebound: Rebound) {
         let points = if self.input.features.two_points { 2 } else { 1 };
         let stride = self.law().stride(points);
-        let stopped = std::mem::take(&mut self.work.impacts.rebounds.stopped);
-        let mut begin =
-            restitution::Begin { h: self.input.h, rebound, stride, stopped: &stopped, found: 0.0 };
+        let mut begin = restitution::Begin { rebound, stride, found: 0.0 };
         self.over_contacts(&mut begin);
         self.bounces = begin.found > 0.0;
-        self.work.impacts.rebounds.stopped = stopped;
     }
 
     /// Finds what bounces in the coming substep.
@@ -137,7 +115,7 @@ impl Passes<'_> {
         if self.bounces && self.input.phases.runs(Phase::Restitution) {
             self.over_contacts(&mut restitution::Track);
             if is_last {
-                self.over_contacts(&mut restitution::Apply { h: self.input.h });
+                self.over_contacts(&mut restitution::Apply);
                 self.count_sweep(1);
             }
             self.clock.lap(Phase::Restitution);
@@ -162,13 +140,6 @@ impl Passes<'_> {
                 });
             }
             self.clock.lap(Phase::Store);
-        }
-    }
-
-    /// The impulses of what has bounced are no start for the next step. Sources with a pass of their own keep them.
-    pub(super) fn forget_bounced(&mut self) {
-        if self.bounces && !matches!(self.law(), ImpactLaw::EndPass { .. }) {
-            self.over_contacts(&mut restitution::Forget);
         }
     }
 }

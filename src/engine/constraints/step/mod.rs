@@ -10,7 +10,6 @@ mod sweeps;
 mod vectors;
 mod workspace;
 
-pub(crate) use impacts::AFTER_WAVES;
 pub use solver::{Collision, Scene, Schedule, Solver};
 pub use workspace::{Observer, StepInput, Watch, WorkCount, Workspace};
 
@@ -192,7 +191,6 @@ impl<'a> Passes<'a> {
     pub fn finish(mut self) -> WorkCount {
         self.set_order(SweepOrder::Forward);
         if self.input.phases.runs(Phase::Store) {
-            self.forget_bounced();
             self.over_batches(Phase::Store, &mut Store);
             self.clock.lap(Phase::Store);
         }

@@ -68,6 +68,8 @@ pub struct WorkCount {
     /// Rows solved in all sweeps: a normal row per point, and a tangential one where the
     /// sweep has friction.
     pub row_updates: usize,
+    /// Islands whose impacts were not followed to their end.
+    pub cut_impacts: usize,
 }
 
 /// What a step is given besides the workspace.

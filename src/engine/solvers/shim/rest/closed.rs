@@ -31,7 +31,7 @@ impl Pass for Close<'_> {
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            close::<L>(on.rows, batches, segment, layout, on.kept.contacts(), self);
+            close::<L>(on.rows, batches, segment, layout, on.kept.contacts(), on.increments, self);
         });
     }
 }
@@ -43,11 +43,13 @@ fn close<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
+    increments: &[[f32; 4]],
     &mut Close { ref mut fields, h, dt }: &mut Close<'_>,
 ) {
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
-    let records = records.chunks_exact(layout.stride).zip(contact.batches::<L::Index>());
+    let records = records.chunks_exact_mut(layout.stride).zip(contact.batches::<L::Index>());
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
+    let increments: &[Quad] = bytemuck::cast_slice(increments);
     let (zero, open) = (L::zero(), L::splat(OPEN));
     let (per_step, per_substep, h) = (L::splat(dt / h), L::splat(1.0 / h), L::splat(h));
     let rows_of = row_a.batches().zip(row_b.batches());
@@ -58,8 +60,12 @@ fn close<L: Lanes>(
             [a, L::gather(rows, row_b)]
         };
         let ([a, b], [mut free_a, mut free_b]) = (gather(rows), gather(fields));
-        let size = |v: &[L; 8]| v[0].mul_add(v[0], v[1] * v[1]).sqrt();
-        let still = per_step * (size(&free_a) + size(&free_b));
+        let gained = |row: LaneIndex<L::Index>| {
+            let [x, y, ..]: [L; 4] = L::gather_quads::<1, 0>(increments, row);
+            x.mul_add(x, y * y).sqrt()
+        };
+        let of_a = if segment.pushes_a() { gained(row_a) } else { zero };
+        let still = per_step * (of_a + gained(row_b));
         let [nx, ny] = [record[0], record[1]];
         let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
@@ -82,6 +88,13 @@ fn close<L: Lanes>(
             loads[2 * p] = is_closed.select_positive(normal, open);
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
+            // What is left of impulses is what statics does not know.
+            let at = layout.at(p, layout.normal_impulse);
+            record[at] = record[at] - impulse[0];
+            if layout.has_friction {
+                let at = layout.at(p, layout.tangent_impulse);
+                record[at] = record[at] - impulse[1];
+            }
             push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
         }
         L::scatter_velocity(fields, row_b, [free_b[0], free_b[1], free_b[2], free_b[3]]);

@@ -1,237 +1,210 @@
-//! What begins to bear: loads that go down from body to body.
+//! Loads that go down from body to body.
 //!
-//! A body that nothing has borne before, and that is closed now, is new. From the top of the contact graph downwards each new body stands, with
-//! what it bears itself, on its closed points with the level below ([`supports`]); these begin with their loads and, as far as they
-//! have none, with the impulses of a substep. What stands on a body that others bear already adds to the loads below that one. Weight goes
-//! down along gravity, no more and no less. What leans on each other is found by the sweeps ([`super::loads`]).
+//! Sweeps spread a change of loads by a contact each, and a moment along a column of N bodies takes N⁴ of them. From the top of the
+//! contact graph downwards it takes one pass: each body stands on its closed points with the bodies below it, whose loads are found
+//! such that nothing is left that accelerates it ([`supports`]), and what these loads change acts on the bodies below. Bodies
+//! that are not accelerated are left as they are, so that a pile at rest costs one comparison a body.
+//!
+//! Below is what is nearer to the ground in the graph of contacts whose normals are within 60° of gravity; what these do not connect with
+//! the ground, as a row of boxes that is pressed to a wall, hangs on the graph of all contacts.
 
+use super::{OPEN, PER_CONTACT};
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::numerics::supports::{self, Support};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::step::Scene;
-use crate::engine::contacts::{Contact, ManifoldPoint};
-use crate::engine::lanes::held;
-use crate::engine::params::LINEAR_SLOP;
+use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, held};
 use glam::{DVec2, Vec2};
 
 /// Least cosine between gravity and the normals of contacts that hand it down.
 const BEARING: f32 = 0.5;
 
+/// Acceleration that is left alone, over that of free flight (1): of what stands on one body, whose lean grows if its loads are not those
+/// of its place, and of what stands on several.
+const STILL: [f32; 2] = [1e-5, 1e-3];
+
+/// Least cosine between the normals of what does not lean (1).
+const ALIKE: f32 = 0.99;
+
 /// Hands loads down; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct HandDown {
-    graph: Graph,
-    /// Contacts that hand down, the edges of `graph`.
+    upright: Graph,
+    /// Contacts of `upright`.
     bearing: Vec<u32>,
-    /// What each body bears: weight (N), and its torque about the centre of mass (N·m).
-    borne: Vec<[f64; 2]>,
-    /// What of that is new to a body that is not.
-    added: Vec<[f64; 2]>,
-    /// Whether a contact of the body has borne a load.
-    is_loaded: Vec<bool>,
+    /// Of all contacts; empty if `upright` has all bodies that have some.
+    all: Graph,
+    /// Bodies from the top downwards, and the part of their free acceleration that is left alone; infinite for what leans, on a body
+    /// of its own level or on several in different directions: only sweeps find its thrust.
+    downwards: Vec<(u32, f32)>,
     /// Of one body.
     supports: Vec<Support>,
-    /// A body may be new in the coming step.
-    is_pending: bool,
 }
 
-/// Gravity as loads have it.
-#[derive(Clone, Copy)]
-struct Down {
-    /// m/s²
-    gravity: DVec2,
-    /// Unit vector against it.
-    up: DVec2,
-    /// Speed (m/s) of what rests: what gravity makes in a step.
-    still: f32,
+/// What loads are handed down on.
+pub(in super::super) struct On<'a> {
+    /// All contacts.
+    pub contacts: &'a [Contact],
+    /// N and T of both points of each contact (N), N negative where it is open. `[contacts × PER_CONTACT]`
+    pub kept: &'a mut [f32],
+    /// Changes of velocity per substep under the loads. `[rows]`
+    pub fields: &'a mut [BodyRow],
+    /// Changes of velocity per substep in free flight. `[rows]`
+    pub increments: &'a [[f32; 4]],
     /// Substep (s).
-    h: f32,
+    pub h: f32,
 }
 
 impl HandDown {
-    /// Gives new bodies their loads. Those from index `stepped` on have not taken a step; whether there are any new ones.
-    pub fn begin(&mut self, scene: &mut Scene<'_>, stepped: usize) -> bool {
-        let Some(up) = (-scene.gravity).try_normalize() else { return false };
-        if !scene.contacts_changed && !self.is_pending {
-            return false;
-        }
-        let gravity = scene.gravity.as_dvec2();
-        let still = scene.gravity.length() * scene.dt;
-        let down = Down { gravity, up: up.as_dvec2(), still, h: scene.h() };
-        self.find_loaded(scene);
-        let (bodies, contacts) = (scene.bodies, &*scene.contacts);
-        let is_new = |body: u32, is_loaded: &[bool]| {
-            bodies.kind[body as usize] == BodyKind::Dynamic && !is_loaded[body as usize]
-        };
-        let mut any = false;
-        self.is_pending = false;
-        for contact in contacts {
-            if [contact.body_a, contact.body_b].iter().any(|&body| is_new(body, &self.is_loaded)) {
-                self.is_pending = true;
-                any |= contact.manifold.points().iter().any(|p| rests(bodies, contact, p, still));
-            }
-        }
-        if any {
-            self.build(bodies, contacts, up, still);
-            self.hand_down(scene, down, stepped);
-        }
-        any
-    }
-
-    fn find_loaded(&mut self, scene: &mut Scene<'_>) {
-        self.is_loaded.clear();
-        self.is_loaded.resize(scene.bodies.len(), false);
-        for (i, contact) in scene.contacts.iter().enumerate() {
-            let loads = &scene.kept.contact(i)[..4];
-            let has_impulse = contact.manifold.points().iter().any(|p| p.normal_impulse > 0.0);
-            if has_impulse || loads[0] > 0.0 || loads[2] > 0.0 {
-                self.is_loaded[contact.body_a as usize] = true;
-                self.is_loaded[contact.body_b as usize] = true;
-            }
-        }
-    }
-
-    /// Builds the graph of the contacts that hand down.
-    fn build(&mut self, bodies: &Bodies, contacts: &[Contact], up: Vec2, still: f32) {
-        let bears = |contact: &Contact| {
-            contact.manifold.normal.dot(up).abs() >= BEARING
-                && contact.manifold.points().iter().any(|p| rests(bodies, contact, p, still))
-        };
+    /// Builds the graphs, where contacts have come or gone.
+    pub fn build(&mut self, bodies: &Bodies, contacts: &[Contact], gravity: Vec2) {
+        let up = (-gravity).try_normalize().unwrap_or(Vec2::Y);
+        let is_dynamic = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic;
+        let ends = |c: &u32| [contacts[*c as usize].body_a, contacts[*c as usize].body_b];
+        let bears = |c: &u32| contacts[*c as usize].manifold.normal.dot(up).abs() >= BEARING;
         self.bearing.clear();
-        self.bearing.extend((0..contacts.len() as u32).filter(|&c| bears(&contacts[c as usize])));
-        let ends = self.bearing.iter().map(|&c| [contacts[c as usize].body_a, contacts[c as usize].body_b]);
-        self.graph.build(bodies.len(), ends, |body| bodies.kind[body as usize] == BodyKind::Dynamic);
+        self.bearing.extend((0..contacts.len() as u32).filter(bears));
+        self.upright.build(bodies.len(), self.bearing.iter().map(ends), is_dynamic);
+        let hangs = |c: &Contact| {
+            [c.body_a, c.body_b]
+                .into_iter()
+                .any(|b| is_dynamic(b) && self.upright.levels()[b as usize] == UNSUPPORTED)
+        };
+        self.downwards.clear();
+        if contacts.iter().any(hangs) {
+            let ends = contacts.iter().map(|c| [c.body_a, c.body_b]);
+            self.all.build(bodies.len(), ends, is_dynamic);
+            let hangs = |body: &&u32| self.upright.levels()[**body as usize] == UNSUPPORTED;
+            let hanging = self.all.upwards().iter().rev().filter(hangs);
+            self.downwards.extend(hanging.map(|&body| (body, still(&self.all, body, |edge| &contacts[edge as usize]))));
+        } else {
+            self.all = Graph::default();
+        }
+        let standing = self.upright.upwards().iter().rev();
+        let bearing = |edge: u32| &contacts[self.bearing[edge as usize] as usize];
+        self.downwards.extend(standing.map(|&body| (body, still(&self.upright, body, bearing))));
     }
 
-    fn hand_down(&mut self, scene: &mut Scene<'_>, down: Down, stepped: usize) {
-        let Scene { bodies, contacts, kept, .. } = scene;
-        for list in [&mut self.borne, &mut self.added] {
-            list.clear();
-            list.resize(bodies.len(), [0.0; 2]);
-        }
-        for &body in self.graph.upwards().iter().rev() {
-            let b = body as usize;
-            let is_new = !self.is_loaded[b];
-            let [borne, turns] = if is_new { self.borne[b] } else { self.added[b] };
-            if !is_new && borne == 0.0 {
+    /// Hands down what accelerates bodies.
+    pub fn run(&mut self, on: &mut On<'_>) {
+        for i in 0..self.downwards.len() {
+            let (body, still) = self.downwards[i];
+            let [x, y, turn, inv_mass] = on.fields[body as usize].velocity;
+            let inv_inertia = on.fields[body as usize].delta[3];
+            let [free_x, free_y, ..] = on.increments[body as usize];
+            let turning = if inv_inertia > 0.0 { turn * turn * inv_mass / inv_inertia } else { 0.0 };
+            let free = free_x.mul_add(free_x, free_y * free_y);
+            let moves = x.mul_add(x, y.mul_add(y, turning));
+            // What nothing bears is accelerated as in flight.
+            if moves <= free * (still * still).min(0.25) {
                 continue;
             }
-            self.supports.clear();
-            for &edge in self.graph.edges_of(b) {
-                let [a, c] = self.graph.ends(edge as usize);
-                let other = if a == body { c } else { a };
-                if self.graph.levels()[other as usize] < self.graph.levels()[b] {
-                    let contact = self.bearing[edge as usize];
-                    self.supports.extend(supports_of(bodies, contacts, contact, body, down.still));
+            self.find_supports(on, body);
+            let is_new = self.supports.iter().all(|support| support.load == [0.0; 2]);
+            if !self.supports.is_empty() && (is_new || still.is_finite()) {
+                self.stand(on, body);
+            }
+        }
+    }
+
+    /// Lists the closed points of `body` with what is below it, with their loads.
+    fn find_supports(&mut self, on: &On<'_>, body: u32) {
+        self.supports.clear();
+        let level = self.upright.levels()[body as usize];
+        let hangs = level == UNSUPPORTED;
+        let graph = if hangs { &self.all } else { &self.upright };
+        for &edge in graph.edges_of(body as usize) {
+            let [a, b] = graph.ends(edge as usize);
+            let other = if a == body { b } else { a } as usize;
+            let is_below = if hangs {
+                self.upright.levels()[other] != UNSUPPORTED
+                    || self.all.levels()[other] < self.all.levels()[body as usize]
+            } else {
+                self.upright.levels()[other] < level
+            };
+            if !is_below {
+                continue;
+            }
+            let index = if hangs { edge } else { self.bearing[edge as usize] };
+            let contact = &on.contacts[index as usize];
+            let normal = contact.manifold.normal.as_dvec2();
+            let loads = &on.kept[PER_CONTACT * index as usize..][..4];
+            for (point, p) in contact.manifold.points().iter().enumerate() {
+                if loads[2 * point] != OPEN {
+                    self.supports.push(Support {
+                        contact: index,
+                        point,
+                        normal: if b == body { normal } else { -normal },
+                        arm: if b == body { p.anchor_b } else { p.anchor_a }.as_dvec2(),
+                        friction: f64::from(contact.friction),
+                        load: [loads[2 * point], loads[2 * point + 1]].map(f64::from),
+                    });
                 }
             }
-            let mut force = -borne * down.up;
-            let mut torque = turns;
-            if is_new {
-                force += weight(bodies, b, down.gravity);
-                torque += f64::from(bodies.torque[b]);
-            }
-            let gyration = (f64::from(bodies.inv_mass[b]) / f64::from(bodies.inv_inertia[b])).sqrt();
-            supports::load(&mut self.supports, force, torque, gyration);
-            let shares = shares(bodies, contacts, body, force, down.up, &self.supports);
-            for (other, carried) in shares {
-                for list in [&mut self.borne, &mut self.added] {
-                    list[other][0] += carried[0];
-                    list[other][1] += carried[1];
-                }
-            }
-            for support in &self.supports {
-                let (index, p) = (support.contact as usize, support.point);
-                let loads = &mut kept.contact(index)[2 * p..2 * p + 2];
-                let point = &mut contacts[index].manifold.points[p];
-                // What has fallen on others is borne by what it has done to them.
-                let is_set = is_new || b >= stepped;
-                for (axis, impulse) in
-                    [&mut point.normal_impulse, &mut point.tangent_impulse].into_iter().enumerate()
-                {
-                    let load = support.load[axis] as f32;
-                    loads[axis] = if is_new { load } else { loads[axis].max(0.0) + load };
-                    if is_set {
-                        *impulse = if is_new { load * down.h } else { *impulse + load * down.h };
-                    }
-                }
+        }
+    }
+
+    /// Finds the loads on which `body` stands.
+    fn stand(&mut self, on: &mut On<'_>, body: u32) {
+        let BodyRow { velocity: [x, y, turn, inv_mass], delta: [.., inv_inertia] } = on.fields[body as usize];
+        let h = f64::from(on.h);
+        let [inv_mass, inv_inertia] = [inv_mass, inv_inertia].map(f64::from);
+        let mut force = DVec2::new(f64::from(x), f64::from(y)) / (inv_mass * h);
+        let mut torque = if inv_inertia > 0.0 { f64::from(turn) / (inv_inertia * h) } else { 0.0 };
+        for support in &self.supports {
+            force -= support.force();
+            torque -= support.arm.perp_dot(support.force());
+        }
+        let gyration = if inv_inertia > 0.0 { (inv_mass / inv_inertia).sqrt() } else { 0.0 };
+        supports::load(&mut self.supports, force, torque, gyration);
+        for support in &self.supports {
+            let loads = &mut on.kept[PER_CONTACT * support.contact as usize + 2 * support.point..][..2];
+            let old = Support { load: [loads[0], loads[1]].map(f64::from), ..*support };
+            let change = h * (support.force() - old.force());
+            let new = support.load.map(|load| load as f32);
+            loads.copy_from_slice(&new);
+            let contact = &on.contacts[support.contact as usize];
+            let point = &contact.manifold.points[support.point];
+            for (row, arm) in [(contact.body_a, point.anchor_a), (contact.body_b, point.anchor_b)] {
+                let change = if row == body { change } else { -change };
+                let BodyRow { velocity, delta } = &mut on.fields[row as usize];
+                velocity[0] += velocity[3] * change.x as f32;
+                velocity[1] += velocity[3] * change.y as f32;
+                velocity[2] += delta[3] * arm.as_dvec2().perp_dot(change) as f32;
             }
         }
     }
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        self.graph.held_bytes()
+        self.upright.held_bytes()
+            + self.all.held_bytes()
             + held(&self.bearing)
-            + held(&self.borne)
-            + held(&self.added)
-            + held(&self.is_loaded)
+            + held(&self.downwards)
             + held(&self.supports)
     }
 }
 
-/// The points of the contact `index` on which `body` rests.
-fn supports_of<'c>(
-    bodies: &'c Bodies,
-    contacts: &'c [Contact],
-    index: u32,
-    body: u32,
-    still: f32,
-) -> impl Iterator<Item = Support> + 'c {
-    let contact = &contacts[index as usize];
-    let is_b = contact.body_b == body;
-    let normal = contact.manifold.normal.as_dvec2();
-    let points = contact.manifold.points().iter().enumerate();
-    points.filter(move |(_, p)| rests(bodies, contact, p, still)).map(move |(point, p)| Support {
-        contact: index,
-        point,
-        normal: if is_b { normal } else { -normal },
-        arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
-        friction: f64::from(contact.friction),
-        load: [0.0; 2],
-    })
-}
-
-/// What each body below `body` bears of the `force` (N) on it: weight (N) and torque (N·m).
-fn shares<'c>(
-    bodies: &'c Bodies,
-    contacts: &'c [Contact],
-    body: u32,
-    force: DVec2,
-    up: DVec2,
-    supports: &'c [Support],
-) -> impl Iterator<Item = (usize, [f64; 2])> + 'c {
-    let carried = move |support: &Support| support.force().dot(up).max(0.0);
-    let part = (-force.dot(up)).max(0.0) / supports.iter().map(carried).sum::<f64>();
-    supports.iter().filter(move |_| part.is_finite()).map(move |support| {
-        let contact = &contacts[support.contact as usize];
-        let other = if contact.body_a == body { contact.body_b } else { contact.body_a } as usize;
-        let arm = center(bodies, body as usize) + support.arm - center(bodies, other);
-        let carried = part * carried(support);
-        (other, [carried, -carried * arm.perp_dot(up)])
-    })
-}
-
-/// A point touches, and moves by no more than `still` (m/s).
-fn rests(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint, still: f32) -> bool {
-    point.separation.abs() <= LINEAR_SLOP && speed(bodies, contact, point) <= still
-}
-
-/// Weight of a body, and what users push it with (N).
-fn weight(bodies: &Bodies, body: usize, gravity: DVec2) -> DVec2 {
-    let pushed = DVec2::new(f64::from(bodies.force_x[body]), f64::from(bodies.force_y[body]));
-    f64::from(bodies.gravity_scale[body]) / f64::from(bodies.inv_mass[body]) * gravity + pushed
-}
-
-/// Centre of mass of a body (m).
-fn center(bodies: &Bodies, body: usize) -> DVec2 {
-    DVec2::new(f64::from(bodies.position_x[body]), f64::from(bodies.position_y[body]))
-}
-
-/// Speed of body b at a point relative to body a (m/s).
-fn speed(bodies: &Bodies, contact: &Contact, point: &ManifoldPoint) -> f32 {
-    let side = |body: u32, anchor: Vec2| {
-        bodies.velocity(body as usize) + bodies.angular_velocity[body as usize] * anchor.perp()
-    };
-    (side(contact.body_b, point.anchor_b) - side(contact.body_a, point.anchor_a)).length()
+/// See [`HandDown::downwards`]. `contact`: that of an edge.
+fn still<'c>(graph: &Graph, body: u32, contact: impl Fn(u32) -> &'c Contact) -> f32 {
+    let level = graph.levels()[body as usize];
+    let mut below: Option<(u32, Vec2)> = None;
+    let mut still = STILL[0];
+    for &edge in graph.edges_of(body as usize) {
+        let [a, b] = graph.ends(edge as usize);
+        let (other, n) = (if a == body { b } else { a }, contact(edge).manifold.normal);
+        let (of_other, normal) = (graph.levels()[other as usize], if b == body { n } else { -n });
+        if of_other == level {
+            return f32::INFINITY;
+        }
+        if of_other < level {
+            match below {
+                None => below = Some((other, normal)),
+                Some((_, first)) if first.dot(normal) < ALIKE => return f32::INFINITY,
+                Some((first, _)) if first != other => still = STILL[1],
+                Some(_) => {}
+            }
+        }
+    }
+    still
 }

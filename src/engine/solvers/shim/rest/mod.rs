@@ -35,17 +35,20 @@ pub(super) mod loads;
 pub(super) mod shorten;
 
 use super::Shim;
-use crate::engine::constraints::Passes;
+use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::constraints::kernels::velocity::rules::Soft;
 use crate::engine::constraints::step::StepParts;
 use crate::engine::lanes::BodyRow;
 
 /// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; then the overlap that a body was put
-/// into the world with (m, ≤ 0), two that are not used, and the time of the frame of what rolls (s).
+/// into the world with (m, ≤ 0), what is left of sag less than usual (m, ≤ 0), one that is not used, and the time of the frame of what rolls (s).
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
 pub(super) const PLACED: usize = 4;
+
+/// See [`PER_CONTACT`].
+pub(super) const LESS: usize = 5;
 
 /// See [`PER_CONTACT`].
 pub(super) const LEAD: usize = 7;
@@ -65,6 +68,12 @@ impl Shim {
             delta: [0.0, 0.0, 0.0, row.delta[3]],
         }));
         passes.over_contacts(&mut closed::Close { fields, h, dt });
+        if load_sweeps > 0 {
+            let StepParts { work, contacts, .. } = passes.parts();
+            let Workspace { kept, motion, .. } = work;
+            let (kept, increments) = (kept.contacts(), motion.velocity_increments());
+            self.hand_down.run(&mut hand_down::On { contacts, kept, fields, increments, h });
+        }
         for _ in 0..load_sweeps {
             passes.over_contacts(&mut loads::LoadSweep { fields, h });
         }

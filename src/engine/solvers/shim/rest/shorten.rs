@@ -4,6 +4,9 @@
 //!
 //! Points at rest shall stay points that touch: of each sag (1 − φ) is left, 20 µm at most.
 //!
+//! What is found in the first step of one of its bodies begins with all of its sag taken away, and leaves that overlap within a second: piles
+//! that begin at rest would else sink by it within a step, and rebound.
+//!
 //! # Overlap that was placed
 //!
 //! Bodies may be put into a world where they overlap. No load has made that overlap, and springs that see it throw bodies apart
@@ -26,7 +29,7 @@
 //! the depth from which the push speed u is all they give, and more as they bear a load. So what is
 //! thrown into another body is not thrown back.
 
-use super::PLACED;
+use super::{LESS, PLACED};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
@@ -49,7 +52,13 @@ pub(in super::super) struct Shorten {
 const SHARE: f32 = 0.95;
 
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
-const LEFT: f32 = 2e-5;
+pub(in super::super) const LEFT: f32 = 2e-5;
+
+/// Time in which that comes where a contact began without it (s).
+const GIVING: f32 = 1.0;
+
+/// Largest sag that is taken away (m).
+const LARGEST: f32 = 5.0 * SPECULATIVE_DISTANCE;
 
 /// Depth that springs see beyond that of the push speed, per sag (1).
 const EARNED: f32 = 20.0;
@@ -92,10 +101,11 @@ fn shorten<L: Lanes>(
     };
     // Sag per load and effective mass (s²).
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
+    let per_impulse = L::splat(impulse_scale / (mass_scale * bias_rate));
     // Depth at which springs reach the push speed (m).
     let deepest = L::splat(springs.push_speed / (mass_scale * bias_rate));
     let keeps = L::splat(PLACED_TIME / (PLACED_TIME + dt));
-    let (zero, one) = (L::zero(), L::splat(1.0));
+    let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
@@ -105,24 +115,35 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [mut placed, ..]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
-        if (-placed).any_positive() {
+        let [mut placed, mut less, ..]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        if (-placed - less).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
             placed = keeps.mul_add(placed.max(lowest), L::splat(LEFT)).min(zero);
-            let lanes: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&placed));
-            for (&contact, &placed) in index.entries()[..segment.filled(batch, L::WIDTH)].iter().zip(lanes) {
-                quads[2 * contact as usize + 1].0[PLACED - 4] = placed;
+            less = (less + L::splat(LEFT * dt / GIVING)).min(zero);
+            let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
+            let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
+            for (lane, &contact) in filled.iter().enumerate() {
+                let kept = &mut quads[2 * contact as usize + 1].0;
+                (kept[PLACED - 4], kept[LESS - 4]) = (of(&placed, lane), of(&less, lane));
             }
         }
         for p in 0..layout.points {
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
-            let sag = (compliance * loads[2 * p].max(zero) / mass).min(L::splat(SPECULATIVE_DISTANCE));
-            let shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT));
+            let sag = (compliance * loads[2 * p].max(zero) / mass).min(L::splat(LARGEST));
+            let shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT) + less);
+            let at = layout.at(p, layout.normal_impulse);
+            let impulse = loads[2 * p].max(zero).mul_add(h_lanes, record[at]).max(zero);
+            record[at] = impulse;
+            let borne = (per_impulse * impulse / mass).min(L::splat(LARGEST));
+            let depth = L::splat(EARNED).mul_add(borne, deepest);
             let at = layout.at(p, layout.separation);
-            let depth = L::splat(EARNED).mul_add(shorter, deepest);
             record[at] = (record[at] - placed).max(-depth) - shorter;
+            if layout.has_friction {
+                let at = layout.at(p, layout.tangent_impulse);
+                record[at] = loads[2 * p + 1].mul_add(h_lanes, record[at]);
+            }
         }
     }
 }

@@ -11,36 +11,47 @@ use crate::engine::lanes::{BodyRow, Lanes};
 
 /// What is known of a body.
 #[derive(Clone, Copy, Debug)]
-pub struct Body {
+pub(super) struct Body {
     /// Its first end; see `next`.
     pub first: u32,
     /// When it was last pushed (s); −∞ for never.
     pub time: f32,
     pub is_queued: bool,
-    /// Normal impulses of its points in the last substep (N·s).
-    pub borne: f32,
-    /// `time` when only what arrives had been solved (s).
-    pub begun: f32,
     /// Its velocity before anything pushed it (m/s, m/s, rad/s).
     pub flown: [f32; 3],
+    /// Velocity and displacement before the wave.
+    pub before: [[f32; 3]; 2],
     /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
     pub rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-pub const STILL: Body = Body {
+pub(super) const STILL: Body = Body {
     first: NONE,
     time: f32::NEG_INFINITY,
     is_queued: false,
-    borne: 0.0,
     flown: [0.0; 3],
-    begun: f32::NEG_INFINITY,
+    before: [[0.0; 3]; 2],
     rounded: [0.0; 3],
 };
 
+/// What a point does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Role {
+    /// Nothing has hit it.
+    #[default]
+    Open,
+    /// It stops what comes in, from now on.
+    Stops,
+    /// It leaves at its target in this wave.
+    Bounces,
+    /// It has bounced in a wave before.
+    Left,
+}
+
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Point {
+pub(super) struct Point {
     pub lane: u32,
     pub index: u32,
     pub contact: u32,
@@ -54,15 +65,26 @@ pub struct Point {
     pub own_arms: [[f32; 2]; 2],
     /// k_nn, k_tt, k_nt (1/kg).
     pub k: [f32; 3],
-    /// 1/k_nn (kg).
+    /// 1/k_nn (kg); zero for a point that is not there.
     pub mass: f32,
     pub friction: f32,
+    /// Coefficient of restitution (1).
+    pub restitution: f32,
+    pub role: Role,
+    /// At which it shall leave in this wave (m/s).
+    pub target: f32,
+    /// v_t before the wave, and what of |v_n| it shall lose (m/s).
+    pub slip: f32,
+    pub lost: f32,
+    /// Acceleration of approach, and the speed that forces make in a step between both bodies (m/s², m/s).
+    pub falls: f32,
+    pub slow: f32,
     /// At the beginning of the step (m).
     pub separation: f32,
-    /// Impulses so far, along n and t (N·s).
+    /// Impulses along n and t that are not final (N·s), those when the wave began, and what earlier waves gave.
     pub impulse: [f32; 2],
-    /// Impulses of the last substep, along both (N·s).
-    pub borne: [f32; 2],
+    pub begun: [f32; 2],
+    pub given: [f32; 2],
     /// When it is hit (s).
     pub time: f32,
     /// From a to b, as far as they have moved against each other when arms end at one point (m).
@@ -73,8 +95,8 @@ pub struct Point {
     pub is_round: bool,
 }
 
-/// What [`PlasticImpacts::spread`] works on.
-pub struct On<'a> {
+/// What [`super::Spread::run`] works on.
+pub(crate) struct On<'a> {
     pub rows: &'a mut [BodyRow],
     /// Coloured batches, serial ones.
     pub batches: [&'a mut Batches; 2],
@@ -82,18 +104,42 @@ pub struct On<'a> {
     pub features: &'a Features,
     /// What forces add to the velocities of rows in a substep (m/s).
     pub increments: &'a [[f32; 4]],
-    /// Numbers that are kept per contact.
-    pub kept: &'a [f32],
+    /// Times of the frames that contacts have (s), and at which place of how many numbers each: see [`Leads`].
+    pub leads: Leads<'a>,
     /// Step and substep (s).
     pub dt: f32,
     pub h: f32,
-    /// Slower is rest (m/s).
-    pub slowest: f32,
+    /// Bodies are where they were hit, else where they are.
+    pub timed: bool,
     pub record_impulses: bool,
+    /// Contacts may bounce.
+    pub bounces: bool,
+}
+
+/// Since when in a step contacts have the frames of their records.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leads<'a> {
+    /// What a solver keeps per contact; empty if all frames are of the beginning.
+    pub kept: &'a [f32],
+    /// Numbers per contact, and which of them it is.
+    pub size: usize,
+    pub place: usize,
+}
+
+impl Leads<'static> {
+    /// All frames are of the beginning.
+    pub(crate) const NONE: Self = Leads { kept: &[], size: 0, place: 0 };
+}
+
+impl Leads<'_> {
+    /// Of a contact (s).
+    pub(super) fn of(&self, contact: u32) -> f32 {
+        self.kept.get(self.size * contact as usize + self.place).copied().unwrap_or(0.0)
+    }
 }
 
 /// Where the record of a lane is.
-pub struct Place {
+pub(super) struct Place {
     /// Which batches.
     pub part: usize,
     /// Its lane in these, and how many there are in a batch.
@@ -145,17 +191,34 @@ impl On<'_> {
         write_arms(&layout, point.index as usize, point.arms, [point.mass, 1.0 / point.k[1]], put);
     }
 
+    /// A point that has bounced leaves by itself: it is not pushed out as well.
+    pub fn leave(&mut self, point: &Point) {
+        let raised = point.gap(self.rows).min(0.0);
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        floats[first + layout.at(point.index as usize, layout.separation) * width] -= raised;
+    }
+
+    /// Finds what forces make of both bodies of a point.
+    pub fn fall(&self, point: &mut Point) {
+        let [a, b] = point.rows.map(|row| {
+            let [x, y, ..] = self.increments[row as usize];
+            (point.normal[0].mul_add(x, point.normal[1] * y)) / self.h
+        });
+        (point.falls, point.slow) = (a - b, self.dt * (a.abs() + b.abs()));
+    }
+
     /// The points of a lane.
     pub fn points(&self, lane: u32) -> [Point; 2] {
         let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
         let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
         let contact = batches.contact()[of];
-        let bounces = self.contacts[contact as usize].restitution > 0.0;
+        let restitution = if self.bounces { self.contacts[contact as usize].restitution } else { 0.0 };
         let rows = [batches.row_a()[of], batches.row_b()[of]];
         let at = |quantity: usize| floats[first + quantity * width];
         std::array::from_fn(|p| {
-            let is_there = p < layout.points && !bounces;
+            let is_there = p < layout.points;
             let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
             let mut point =
                 Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
@@ -173,9 +236,9 @@ impl On<'_> {
             (point.normal, point.arms, point.own_arms) = ([at(0), at(1)], arms, arms);
             point.k = [1.0 / mass, k_tt, k_nt];
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
+            point.restitution = restitution;
             point.separation = at(layout.at(p, layout.separation));
-            let tangent = if layout.has_friction { at(layout.at(p, layout.tangent_impulse)) } else { 0.0 };
-            point.borne = [at(layout.at(p, layout.normal_impulse)), tangent];
+            self.fall(&mut point);
             point.round = Round::of(&self.contacts[contact as usize], !pushes_a);
             point.is_round = point.round.is_some();
             point

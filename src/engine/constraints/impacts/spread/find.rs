@@ -1,0 +1,153 @@
+//! Which contacts are hit in the coming step.
+//!
+//! A point is hit if it closes its gap within the step, and comes in faster than what rests can. Forces alone make a speed of
+//! dt |a| in a step. What is to bounce exceeds dt (|n·a_a| + |n·a_b|), and leaves faster than a tenth of that. What is to stop exceeds
+//! twice as much: between two bodies that others push as well, in any direction, 2 dt (|a_a| + |a_b|); against one that nothing
+//! pushes, 2 dt |n·a_b|, so that a wall that moves with a jolt is seen.
+
+use super::{AHEAD, BOUNCES};
+use crate::engine::constraints::Workspace;
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+
+/// Looks for what is hit; see the [module](self).
+pub(crate) struct Find<'a> {
+    /// Substep (s).
+    pub h: f32,
+    /// Step (s).
+    pub dt: f32,
+    /// Least that forces add to the speed of a dynamic body in a step (m/s).
+    pub least_gain: f32,
+    /// No point of a body is faster (m/s).
+    pub fastest: f32,
+    /// Contacts may bounce, and what does not bounce is stopped.
+    pub bounces: bool,
+    pub stops: bool,
+    /// Lanes of the contacts that are hit, in order.
+    pub found: &'a mut Vec<u32>,
+}
+
+impl Pass for Find<'_> {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        // Half a row of accelerations for each body that has some.
+        let accelerations = if opposite == OppositeKind::Dynamic { 8 } else { 4 };
+        let read = 2 + accelerations + layout.points * (layout.arms() + 2);
+        PerLane { halves: 0, ..PerLane::of_bodies(read, 0, opposite) }
+    }
+
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            find::<L>(on.rows, batches, segment, layout, on.contacts, on.increments, self);
+        });
+    }
+}
+
+/// How much faster than what forces make in a step something comes in that is stopped (1). Slower impacts are left to soft contacts, as
+/// loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
+const FASTER: f32 = 2.0;
+
+/// Part of what forces make in a step that nothing rests with, in any direction (1).
+const SLOW: f32 = 0.01;
+
+#[inline(never)]
+fn find<L: Lanes>(
+    rows: &[BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    layout: &Layout,
+    contacts: &[Contact],
+    increments: &[[f32; 4]],
+    &mut Find { h, dt, least_gain, fastest, bounces, stops, ref mut found }: &mut Find<'_>,
+) {
+    let between_dynamic = segment.pushes_a();
+    let least = if between_dynamic && !bounces { 2.0 * FASTER * least_gain } else { SLOW * least_gain };
+    if 2.0 * fastest <= least {
+        return;
+    }
+    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
+    let quads: &[Quad] = bytemuck::cast_slice(increments);
+    let (zero, per_step) = (L::zero(), L::splat(dt / h));
+    for (batch, (record, (row_a, row_b))) in records.enumerate() {
+        let (row_a, row_b): (LaneIndex<L::Index>, LaneIndex<L::Index>) = (row_a, row_b);
+        // No body has moved yet.
+        let b = L::gather(rows, row_b);
+        let a = if layout.a_has_row { L::gather(rows, row_a) } else { [zero; 8] };
+        let along = |x: L, y: L| record[0].mul_add(x, record[1] * y);
+        let straight = along(b[0] - a[0], b[1] - a[1]);
+        let velocity = |p: usize| {
+            let arm = |of: usize, has: bool| if has { record[layout.at(p, of)] } else { zero };
+            let (of_a, of_b) = (arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0]));
+            a[2].neg_mul_add(of_a, b[2].mul_add(of_b, straight))
+        };
+        let fastest = (0..layout.points).fold(zero, |most, p| most.max(-velocity(p)));
+        if !(fastest - L::splat(least)).any_positive() {
+            continue;
+        }
+        let [bx, by, ..] = L::gather_quads::<1, 0>(quads, row_b);
+        // What forces add to the velocity of approach in a substep, at most along n, and at most in any direction (m/s).
+        let size = |x: L, y: L| x.mul_add(x, y * y).sqrt();
+        let positive = |x: L| x.max(-x);
+        let of_b = along(bx, by);
+        let (gained, along_n, most) = if between_dynamic {
+            let [ax, ay, ..] = L::gather_quads::<1, 0>(quads, row_a);
+            let of_a = along(ax, ay);
+            (of_a - of_b, positive(of_a) + positive(of_b), size(ax, ay) + size(bx, by))
+        } else {
+            (-of_b, positive(of_b), positive(of_b))
+        };
+        let slow = L::splat(SLOW) * size(bx, by);
+        let stops_at = (per_step * L::splat(FASTER) * most).max(per_step * slow);
+        let bounces_at = per_step * along_n;
+        let threshold = if bounces { bounces_at } else { stops_at };
+        let fall = gained * L::splat((0.5 * dt + 0.5 * h) / h);
+        let mut any = zero;
+        for p in 0..layout.points {
+            let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
+            let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
+            let fast = record[layout.at(p, layout.normal_mass)].select_positive(-threshold - v, zero);
+            any = any.max((-closes).select_positive(fast, zero));
+        }
+        if !any.any_positive() {
+            continue;
+        }
+        let first = batch * L::WIDTH;
+        let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
+        for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| of(&any, lane) > 0.0) {
+            let speed = of(&any, lane) + of(&threshold, lane);
+            let e = if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
+            let is_stopped = stops && speed > of(&stops_at, lane);
+            if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
+                found.push((segment.first_lane + first + lane) as u32);
+            }
+        }
+    }
+}
+
+/// The least that forces add to the speed of a dynamic body in a step, and a speed that no point of a body exceeds (m/s); none if
+/// that is slower than any impact.
+pub(crate) fn impact_speeds(work: &Workspace, h: f32, dt: f32) -> Option<[f32; 2]> {
+    /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
+    const REACH: f32 = 3.0;
+    let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
+    let (mut fastest, mut least) = (0.0_f32, f32::INFINITY);
+    for (BodyRow { velocity, delta }, increment) in work.rows.iter().zip(work.motion.velocity_increments()) {
+        let [inv_mass, inv_inertia] = [velocity[3], delta[3]];
+        // (ω R)²: infinite for a kinematic body that turns, NaN, which is never the maximum, for one that does not.
+        let (top, turning) = (REACH.mul_add(REACH * inv_mass, f32::MIN_POSITIVE), velocity[2] * velocity[2]);
+        let straight = square(velocity);
+        fastest = fastest.max(straight);
+        // Multiplied out, since few bodies are the fastest so far: a division for each takes twice the time of this loop.
+        if turning * top > (fastest - straight) * inv_inertia {
+            fastest = fastest.max(turning.mul_add(top / inv_inertia, straight));
+        }
+        least = least.min(if inv_mass > 0.0 { square(increment) } else { f32::INFINITY });
+    }
+    let least = least.sqrt() * dt / h;
+    // |v| + |ω| R ≤ √2 √(v² + ω² R²)
+    let fastest = (2.0 * fastest).sqrt();
+    (fastest > SLOW * least).then_some([least, fastest])
+}

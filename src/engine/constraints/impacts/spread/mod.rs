@@ -1,0 +1,498 @@
+//! Impacts that spread: bodies that are about to hit each other, or have, bounce or stop before the step is solved.
+//!
+//! # The law
+//!
+//! That of one point is in [`law`]. Which points bounce, and how fast, is decided at the beginning of a *wave*: those that come in. All of them
+//! are solved together, by Gauss–Seidel on accumulated impulses, so that a box that lands flat bounces flat. What comes in then makes the
+//! next wave: through a row of balls an impact runs ball by ball. A point whose rebound is slower than a tenth of what forces make
+//! of rest in a step does not bounce: it *stops* what comes in, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all that
+//! follow. So restitution of zero is the limit of a small one.
+//!
+//! Where a body is pushed, its other points are looked at next, until nothing comes in by more than a ten-thousandth of what came in
+//! first. What nothing hits costs nothing.
+//!
+//! # When in the step
+//!
+//! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 in the place of v. From the gap s it is at the surface
+//! after t, with the speed w₁, bounces, and is from then on on the parabola that has at the beginning of the step
+//!
+//! ```text
+//! w₁ = √(w² + 2 a s)   t = 2 s/(w₁ − w)   v⁺ = e w₁ + a t + a h/2   s⁺ = s − t (v⁺ − v)
+//! ```
+//!
+//! So bodies that are given v⁺ and put back by t Δv fly as if hit at t, in the coming step or (t < 0, an overlap) in the
+//! last one. Beyond the end of the step, and deeper than a step, it is at the end and at the beginning, with as much of the energy of
+//! height. What stops touches from t = s/|v| on. One that is pushed again by a body that was hit at t′ is so at the later of both times.
+//! Solvers that find velocities from positions, or that are rivals, bounce at the beginning: not `timed`.
+//!
+//! When the two centres are displaced by D against each other at the time of the impulse, it adds D × λ to angular
+//! momentum with the arms of the step's beginning. So arms end at a point of both bodies then, r_a + D/2 and r_b − D/2;
+//! round shapes have the frame of that moment (`touch.rs`). In the rows themselves and not beside them: what an
+//! impulse does that its row does not know of may add energy, and has shot bodies out of piles.
+//!
+//! # A bound for each island
+//!
+//! Bodies that contacts connect are an island. Impacts of one are solved without a look at the others, so that a scene behaves alike
+//! beside another. Each has 16 waves, in the last 4 of which nothing bounces, and 256 visits of points and 8 for each point that has been
+//! looked at: what an impact takes grows with what it hits. What comes in even then is stopped by the solver, and no body of the
+//! island is displaced: one might be into a third that nobody has looked at.
+//!
+//! # Energy
+//!
+//! Friction takes energy at each point of a wave that is solved ([`law`]). Where it runs to and fro between points, or visits are spent, it
+//! may make some. With the changes Δv of a wave, E(τ) of v⁻ + τ Δv is a parabola, and the wave is given the largest τ ≤ 1 that makes
+//! none. Not where something kinematic takes part, which may.
+
+mod find;
+mod law;
+mod point;
+
+use crate::engine::lanes::{BodyRow, held};
+pub(crate) use find::{Find, impact_speeds};
+use law::{lossy_impulses, rough_impulses};
+pub(crate) use point::{Leads, On};
+use point::{Body, Point, Role, STILL};
+use std::collections::VecDeque;
+
+/// No lane, no point.
+const NONE: u32 = u32::MAX;
+
+/// Impacts spread until nothing comes in faster than this part of the fastest (1).
+const TOLERANCE: f32 = 1e-4;
+
+/// A point is looked at for a tenth of its way further than it gets in the step (1).
+const AHEAD: f32 = 1.1;
+
+/// Round shapes that come in along the normal of the beginning, but touch later, have the frame of then up to so many steps (1).
+const TURNED: f32 = 2.0;
+
+/// Least rebound over what forces make of rest in a step (1).
+const BOUNCES: f32 = 0.1;
+
+/// Part of v⁺ that friction may gain by rounding (1).
+const ROUNDING: f32 = 1e-6;
+
+/// Waves of an island, and how many of these nothing bounces in, at the end.
+const WAVES: [u32; 2] = [16, 4];
+
+/// Visits of an island, and for each point that was looked at.
+const VISITS: [usize; 2] = [256, 8];
+
+/// Spreads impacts; keeps its memory from step to step.
+#[derive(Clone, Debug, Default)]
+pub struct Spread {
+    /// Lanes that are hit, of the coloured batches and of the serial ones, then of both by island.
+    found: [Vec<u32>; 2],
+    hit: Vec<(u32, u32)>,
+    /// `[rows]`
+    bodies: Vec<Body>,
+    /// Union–find of bodies that contacts connect. `[rows]`
+    parent: Vec<u32>,
+    /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
+    /// `[2 lanes]`
+    next: Vec<u32>,
+    /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
+    listed: Vec<u32>,
+    /// In pairs; a point that is not there has no mass.
+    points: Vec<Point>,
+    /// Bodies that were pushed since their points were looked at.
+    queue: VecDeque<u32>,
+    /// Bodies of the island that were pushed.
+    pushed: Vec<u32>,
+    /// The first point of the island.
+    first: usize,
+    /// How often its points were solved.
+    visits: usize,
+    /// Slower is solved (m/s).
+    slowest: f32,
+    /// Something kinematic takes part in it.
+    is_driven: bool,
+}
+
+impl Spread {
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        let lists = [&self.next, &self.listed, &self.parent, &self.pushed, &self.found[0], &self.found[1]];
+        let queue = self.queue.capacity() * size_of::<u32>();
+        lists.map(held).iter().sum::<usize>()
+            + held(&self.points)
+            + held(&self.bodies)
+            + held(&self.hit)
+            + queue
+    }
+
+    /// Where [`find`] writes what it finds.
+    pub(crate) fn found(&mut self) -> &mut [Vec<u32>; 2] {
+        &mut self.found
+    }
+
+    /// Lets impacts spread from the lanes that were found, island by island; whether there were any, and how many islands were cut off.
+    pub(crate) fn run(&mut self, on: &mut On<'_>) -> Option<usize> {
+        if self.found.iter().all(Vec::is_empty) {
+            return None;
+        }
+        self.link(on);
+        self.hit.clear();
+        let lanes = on.batches[0].lanes() as u32;
+        for (part, first) in [0, lanes].into_iter().enumerate() {
+            for i in 0..self.found[part].len() {
+                let lane = first + self.found[part][i];
+                let root = self.island_of(on, lane);
+                self.hit.push((root, lane));
+            }
+        }
+        // Islands in the order of their first lanes would do as well; lanes of an island stay in order.
+        self.hit.sort_by_key(|&(root, _)| root);
+        let (mut begin, mut cut) = (0, 0);
+        while begin < self.hit.len() {
+            let root = self.hit[begin].0;
+            let end = begin + self.hit[begin..].partition_point(|&(other, _)| other == root);
+            cut += usize::from(!self.island(on, begin..end));
+            begin = end;
+        }
+        for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
+            on.put(point);
+            if point.role == Role::Left {
+                on.leave(point);
+            }
+            if on.record_impulses {
+                let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
+                *sum = [sum[0] + point.given[0], sum[1] + point.given[1]];
+            }
+        }
+        Some(cut)
+    }
+
+    /// Lets the impacts of an island spread; whether all of them could.
+    fn island(&mut self, on: &mut On<'_>, hit: std::ops::Range<usize>) -> bool {
+        (self.first, self.visits, self.is_driven) = (self.points.len(), 0, false);
+        self.pushed.clear();
+        for i in hit {
+            self.list(on, self.hit[i].1);
+        }
+        let arrived = self.points.len();
+        let mut is_done = false;
+        for wave in 0..WAVES[0] {
+            let bounces = wave + WAVES[1] < WAVES[0];
+            if wave == 0 {
+                let speeds = self.points[self.first..].iter().map(|p| -p.velocity(on.rows)[0]);
+                self.slowest = TOLERANCE * speeds.fold(0.0, f32::max);
+            }
+            let any = self.begin_wave(on, wave == 0, bounces);
+            if !any && wave > 0 {
+                is_done = true;
+                break;
+            }
+            let known = if wave == 0 { arrived } else { self.points.len() };
+            for place in self.first..known {
+                self.visit(on, place, bounces);
+            }
+            let is_solved = self.spread(on, bounces);
+            self.end_wave(on);
+            if !is_solved {
+                break;
+            }
+        }
+        if !is_done || !on.timed {
+            for i in 0..self.pushed.len() {
+                on.rows[self.pushed[i] as usize].delta[..3].fill(0.0);
+            }
+        }
+        is_done
+    }
+
+    /// Finds the points that bounce in this wave; whether there are any.
+    fn begin_wave(&mut self, on: &mut On<'_>, is_first: bool, bounces: bool) -> bool {
+        let mut any = false;
+        for place in self.first..self.points.len() {
+            let point = &mut self.points[place];
+            point.begun = point.impulse;
+            if point.role == Role::Bounces {
+                point.role = Role::Left;
+            }
+            if point.role == Role::Stops || point.mass <= 0.0 {
+                continue;
+            }
+            let Some(mut target) = rebounds(point, on, is_first) else { continue };
+            if !bounces {
+                // It is stopped when it is visited.
+                any = true;
+                continue;
+            }
+            if let Some(round) = point.round.take() {
+                let ends = point.rows.map(|row| &on.rows[row as usize]);
+                if let Some(frame) = round.frame(ends, [-AHEAD * on.dt, TURNED * on.dt]) {
+                    let mut turned = *point;
+                    turned.turn(&frame, on.rows);
+                    on.fall(&mut turned);
+                    let Some(then) = rebounds(&turned, on, is_first) else { continue };
+                    on.turn(&turned, &frame);
+                    (*point, target) = (turned, then);
+                }
+            }
+            let [v, slip] = point.velocity(on.rows);
+            (point.target, point.time) = (target[0], target[1]);
+            (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0) + ROUNDING * target[0]);
+            (point.role, point.impulse, point.begun) = (Role::Bounces, [0.0; 2], [0.0; 2]);
+            any = true;
+        }
+        for &row in &self.pushed {
+            let BodyRow { velocity, delta } = &on.rows[row as usize];
+            self.bodies[row as usize].before = [*velocity, *delta].map(|v| [v[0], v[1], v[2]]);
+        }
+        any
+    }
+
+    /// Keeps what a wave has given, or the part of it that makes no energy.
+    fn end_wave(&mut self, on: &mut On<'_>) {
+        let bounced = self.points[self.first..].iter().any(|p| p.role == Role::Bounces && p.friction > 0.0);
+        let part = if bounced && !self.is_driven { self.part_without_gain(on.rows) } else { 1.0 };
+        if part < 1.0 {
+            for &row in &self.pushed {
+                let (row, before) = (&mut on.rows[row as usize], self.bodies[row as usize].before);
+                for k in 0..3 {
+                    row.velocity[k] = part.mul_add(row.velocity[k] - before[0][k], before[0][k]);
+                    row.delta[k] = part.mul_add(row.delta[k] - before[1][k], before[1][k]);
+                }
+            }
+        }
+        for point in &mut self.points[self.first..] {
+            for k in 0..2 {
+                let gained = part * (point.impulse[k] - point.begun[k]);
+                point.given[k] += gained;
+                point.impulse[k] = point.begun[k] + gained;
+            }
+        }
+    }
+
+    /// The largest τ ≤ 1 that makes no energy; see the [module](self).
+    fn part_without_gain(&self, rows: &[BodyRow]) -> f32 {
+        let (mut linear, mut square) = (0.0_f64, 0.0_f64);
+        for &row in &self.pushed {
+            let (BodyRow { velocity, delta }, before) = (&rows[row as usize], self.bodies[row as usize].before[0]);
+            for k in 0..3 {
+                let inverse = f64::from(if k < 2 { velocity[3] } else { delta[3] });
+                if inverse > 0.0 {
+                    let (from, change) = (f64::from(before[k]), f64::from(velocity[k] - before[k]));
+                    linear += from * change / inverse;
+                    square += change * change / inverse;
+                }
+            }
+        }
+        // E(τ) − E(0) = τ linear + τ² square/2.
+        let part = if square > 0.0 { -2.0 * linear / square } else { 1.0 };
+        // What rounding leaves of an elastic wave is no gain.
+        if part > 1.0 - 1e-5 { 1.0 } else { part.max(0.0) as f32 }
+    }
+
+    /// Visits the points of bodies that were pushed, until none is left, or visits are spent; whether it is done.
+    fn spread(&mut self, on: &mut On<'_>, bounces: bool) -> bool {
+        let mut is_done = true;
+        while let Some(body) = self.queue.pop_front() {
+            self.bodies[body as usize].is_queued = false;
+            if !is_done {
+                continue;
+            }
+            let mut end = self.bodies[body as usize].first;
+            while end != NONE {
+                let lane = end / 2;
+                end = self.next[end as usize];
+                let first = self.list(on, lane);
+                self.visit(on, first, bounces);
+                self.visit(on, first + 1, bounces);
+            }
+            is_done = self.visits <= VISITS[0] + VISITS[1] * (self.points.len() - self.first);
+        }
+        is_done
+    }
+
+    /// Solves a point, if it comes in faster than is solved or has been hit.
+    fn visit(&mut self, on: &mut On<'_>, place: usize, bounces: bool) {
+        let point = &mut self.points[place];
+        if point.mass <= 0.0 || point.role == Role::Left && bounces {
+            return;
+        }
+        let mut touch = None;
+        if matches!(point.role, Role::Open | Role::Left) {
+            let Some(mut time) = arrival(point, on, self.slowest) else { return };
+            if bounces && will_bounce(point, on) {
+                // In the next wave.
+                return;
+            }
+            if let Some(round) = point.round.filter(|_| on.timed) {
+                let ends = point.rows.map(|row| &on.rows[row as usize]);
+                touch = round.frame(ends, [-on.dt, TURNED * on.dt]);
+            }
+            if let Some(frame) = &touch {
+                let mut turned = *point;
+                turned.turn(frame, on.rows);
+                let Some(then) = arrival(&turned, on, self.slowest) else { return };
+                (*point, time) = (turned, then);
+                point.round = None;
+                on.turn(point, frame);
+                on.fall(point);
+            }
+            point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
+            (point.role, point.target) = (Role::Stops, 0.0);
+            (point.impulse, point.begun) = ([0.0; 2], [0.0; 2]);
+        }
+        if on.timed {
+            for row in point.rows {
+                point.time = point.time.max(self.bodies[row as usize].time);
+            }
+            point.meet(on.rows);
+        }
+        let ([vn, vt], old) = (point.velocity(on.rows), point.impulse);
+        let wanted = [point.target - vn, -vt];
+        let mut new = rough_impulses(point.k, point.friction, old, wanted);
+        if point.role == Role::Bounces && point.friction > 0.0 {
+            let [k_nn, k_tt, k_nt] = point.k;
+            let from_none = [
+                k_nn.mul_add(old[0], k_nt.mul_add(old[1], wanted[0])),
+                k_nt.mul_add(old[0], k_tt.mul_add(old[1], wanted[1])),
+            ];
+            new = lossy_impulses(point.k, new, from_none, [point.slip, point.lost]);
+        }
+        self.visits += 1;
+        let delta = [new[0] - old[0], new[1] - old[1]];
+        if point.k[0] * (delta[0].abs() + delta[1].abs()) <= self.slowest {
+            return;
+        }
+        point.impulse = new;
+        self.push(on, place, delta);
+    }
+
+    /// Pushes both bodies of a point with an impulse (N·s), and has their points looked at.
+    fn push(&mut self, on: &mut On<'_>, place: usize, impulse: [f32; 2]) {
+        let point = self.points[place];
+        for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
+            if !is_pushed {
+                self.is_driven |= on.rows[row as usize].velocity[..3] != [0.0; 3];
+                continue;
+            }
+            let body = &mut self.bodies[row as usize];
+            if body.time == STILL.time {
+                let BodyRow { velocity, delta } = &on.rows[row as usize];
+                body.before = [*velocity, *delta].map(|v| [v[0], v[1], v[2]]);
+                self.pushed.push(row);
+            }
+            body.time = body.time.max(point.time);
+            if !std::mem::replace(&mut body.is_queued, true) {
+                self.queue.push_back(row);
+            }
+        }
+        point.push(on.rows, &mut self.bodies, impulse, if on.timed { point.time } else { 0.0 });
+    }
+
+    /// Links the ends of each body, and bodies that contacts connect.
+    fn link(&mut self, on: &On<'_>) {
+        let (count, lanes) = (on.rows.len(), on.batches[0].lanes() + on.batches[1].lanes());
+        self.bodies.clear();
+        self.bodies.extend(
+            on.rows.iter().map(|row| Body { flown: std::array::from_fn(|k| row.velocity[k]), ..STILL }),
+        );
+        self.parent.clear();
+        self.parent.extend(0..count as u32);
+        self.next.resize(2 * lanes, NONE);
+        self.listed.clear();
+        self.listed.resize(lanes, NONE);
+        self.points.clear();
+        let mut end = 0;
+        for part in 0..2 {
+            let batches = &on.batches[part];
+            for (&a, &b) in batches.row_a().iter().zip(batches.row_b()) {
+                for body in [a, b] {
+                    // The last row is that of empty lanes.
+                    if (body as usize) < count - 1 {
+                        self.next[end] = std::mem::replace(&mut self.bodies[body as usize].first, end as u32);
+                    }
+                    end += 1;
+                }
+                let moves = |row: u32| on.rows[row as usize].velocity[3] > 0.0;
+                if moves(a) && moves(b) {
+                    let (a, b) = (root(&mut self.parent, a), root(&mut self.parent, b));
+                    self.parent[a.max(b) as usize] = a.min(b);
+                }
+            }
+        }
+    }
+
+    /// What stands for the island of a lane.
+    fn island_of(&mut self, on: &On<'_>, lane: u32) -> u32 {
+        let (lane, lanes) = (lane as usize, on.batches[0].lanes());
+        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        // Body b is dynamic.
+        root(&mut self.parent, on.batches[part].row_b()[of])
+    }
+
+    /// The place of the first point of a lane.
+    fn list(&mut self, on: &On<'_>, lane: u32) -> usize {
+        let listed = &mut self.listed[lane as usize];
+        if *listed == NONE {
+            *listed = self.points.len() as u32;
+            let mut points = on.points(lane);
+            for point in points.iter_mut().filter(|point| point.mass > 0.0) {
+                // Arms end at one point at the time of the frame, if nothing is hit.
+                let [a, b] = point.rows.map(|row| self.bodies[row as usize].flown);
+                let lead = on.leads.of(point.contact);
+                point.apart = std::array::from_fn(|k| lead * (b[k] - a[k]));
+                point.is_round |= lead != 0.0;
+            }
+            self.points.extend(points);
+        }
+        *listed as usize
+    }
+}
+
+/// What stands for the island of a body; paths are halved on the way.
+fn root(parent: &mut [u32], mut body: u32) -> u32 {
+    while parent[body as usize] != body {
+        let above = parent[body as usize];
+        parent[body as usize] = parent[above as usize];
+        body = above;
+    }
+    body
+}
+
+/// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
+fn arrival(point: &Point, on: &On<'_>, slowest: f32) -> Option<f32> {
+    let ([vn, _], gap) = (point.velocity(on.rows), point.gap(on.rows));
+    (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
+}
+
+/// It comes in fast enough to bounce.
+fn will_bounce(point: &Point, on: &On<'_>) -> bool {
+    let speed = -point.velocity(on.rows)[0];
+    point.restitution > 0.0 && speed > point.slow && point.restitution * speed > BOUNCES * point.slow
+}
+
+/// How fast a point that comes in shall leave (m/s), and when it is hit (s); see the [module](self).
+fn rebounds(point: &Point, on: &On<'_>, is_first: bool) -> Option<[f32; 2]> {
+    if !will_bounce(point, on) {
+        return None;
+    }
+    let (v, s, a, e) = (point.velocity(on.rows)[0], point.gap(on.rows), point.falls, point.restitution);
+    let (dt, h) = (on.dt, on.h);
+    // Where it would be at the end of the step, and further.
+    if (v - a * 0.5 * (dt + h)).mul_add(AHEAD * dt, s) >= 0.0 {
+        return None;
+    }
+    if on.timed {
+        let w = v - 0.5 * a * h;
+        let square = w.mul_add(w, 2.0 * a * s);
+        let touch = 2.0 * s / (square.max(0.0).sqrt() - w);
+        // What is deeper has been so before, or is hit because another was.
+        let earliest = if is_first { -dt } else { 0.0 };
+        let time = if square > 0.0 && touch > earliest { touch.min(dt) } else { 0.0 };
+        if time != 0.0 {
+            let (gap, then) = ((w - 0.5 * a * time).mul_add(time, s), w - a * time);
+            let fall = 2.0 * a * gap;
+            let left = e * e * then.mul_add(then, fall) - fall;
+            return Some([left.max(0.0).sqrt() + a * time + 0.5 * a * h, time]);
+        }
+    }
+    // In flight, E = v²/2 + a (s − v h/2) is kept: the rebound has e² E at s.
+    let energy = e * e * (0.5 * v * v + a * (s - 0.5 * v * h));
+    let half = 0.5 * a * h;
+    Some([half + half.mul_add(half, 2.0 * (energy - a * s)).max(0.0).sqrt(), 0.0])
+}
