@@ -85,6 +85,8 @@ pub(super) struct Point {
     pub impulse: [f32; 2],
     pub begun: [f32; 2],
     pub given: [f32; 2],
+    /// Impulses of the last substep, along both (N·s).
+    pub borne: [f32; 2],
     /// When it is hit (s).
     pub time: f32,
     /// From a to b, as far as they have moved against each other when arms end at one point (m).
@@ -152,11 +154,7 @@ pub(super) struct Place {
 }
 
 impl On<'_> {
-    pub fn lanes(&self) -> usize {
-        self.batches[0].lanes() + self.batches[1].lanes()
-    }
-
-    pub fn place(&self, lane: u32) -> Place {
+    pub(super) fn place(&self, lane: u32) -> Place {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         let (batches, width) = (&self.batches[part], self.batches[part].width());
@@ -176,7 +174,7 @@ impl On<'_> {
     }
 
     /// A point has the frame of the moment of touch.
-    pub fn turn(&mut self, point: &Point, frame: &Frame) {
+    pub(super) fn turn(&mut self, point: &Point, frame: &Frame) {
         let Place { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let rows = point.rows.map(|row| &self.rows[row as usize]);
@@ -184,7 +182,7 @@ impl On<'_> {
     }
 
     /// What is left of the step is solved with the arms of the impact.
-    pub fn put(&mut self, point: &Point) {
+    pub(super) fn put(&mut self, point: &Point) {
         let Place { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let put = |vector: usize, value: f32| floats[first + vector * width] = value;
@@ -192,15 +190,26 @@ impl On<'_> {
     }
 
     /// A point that has bounced leaves by itself: it is not pushed out as well.
-    pub fn leave(&mut self, point: &Point) {
+    pub(super) fn leave(&mut self, point: &Point) {
         let raised = point.gap(self.rows).min(0.0);
         let Place { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         floats[first + layout.at(point.index as usize, layout.separation) * width] -= raised;
     }
 
+    /// A point bears no load any more.
+    pub(super) fn release(&mut self, point: &Point) {
+        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let mut forget = |of: usize| floats[first + layout.at(point.index as usize, of) * width] = 0.0;
+        forget(layout.normal_impulse);
+        if layout.has_friction {
+            forget(layout.tangent_impulse);
+        }
+    }
+
     /// Finds what forces make of both bodies of a point.
-    pub fn fall(&self, point: &mut Point) {
+    pub(super) fn fall(&self, point: &mut Point) {
         let [a, b] = point.rows.map(|row| {
             let [x, y, ..] = self.increments[row as usize];
             (point.normal[0].mul_add(x, point.normal[1] * y)) / self.h
@@ -209,7 +218,7 @@ impl On<'_> {
     }
 
     /// The points of a lane.
-    pub fn points(&self, lane: u32) -> [Point; 2] {
+    pub(super) fn points(&self, lane: u32) -> [Point; 2] {
         let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
         let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
@@ -236,6 +245,8 @@ impl On<'_> {
             (point.normal, point.arms, point.own_arms) = ([at(0), at(1)], arms, arms);
             point.k = [1.0 / mass, k_tt, k_nt];
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
+            let tangent = if layout.has_friction { at(layout.at(p, layout.tangent_impulse)) } else { 0.0 };
+            point.borne = [at(layout.at(p, layout.normal_impulse)), tangent];
             point.restitution = restitution;
             point.separation = at(layout.at(p, layout.separation));
             self.fall(&mut point);
@@ -290,7 +301,7 @@ impl Point {
     }
 
     /// Has the frame of the moment of touch from now on.
-    pub fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
+    pub(super) fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
         (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
