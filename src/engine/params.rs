@@ -38,7 +38,6 @@ pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 /// Approach speeds above this bounce (m/s), where a source has no other.
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 
-
 /// Most vertices of a convex polygon.
 pub const MAX_POLYGON_VERTICES: usize = 8;
 

@@ -46,10 +46,10 @@ use crate::engine::narrowphase::batch::Kind;
 use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Parameter};
 use frames::Roll;
+use glam::Vec2;
 use rest::hand_down::HandDown;
 use rest::shorten::LEFT;
 use rest::{LEAD, LESS, PER_CONTACT, PLACED};
-use glam::Vec2;
 use std::f32::consts::TAU;
 
 /// See the [module](self).

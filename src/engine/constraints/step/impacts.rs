@@ -2,8 +2,8 @@
 
 use super::Passes;
 use crate::engine::clock::Phase;
-use crate::engine::constraints::impacts::restitution::Rebound;
 use crate::engine::constraints::Workspace;
+use crate::engine::constraints::impacts::restitution::Rebound;
 use crate::engine::constraints::impacts::spread::{self, Find, Leads, On};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::records::batches::Part;
@@ -12,12 +12,7 @@ use crate::engine::constraints::records::bounces::Bounces;
 impl Passes<'_> {
     /// Lets what comes in bounce and, with `stops`, stop, before the step; see [`spread`]. `lead`: which number that the solver keeps per contact is
     /// the time of its frame.
-    pub(crate) fn spread_impacts(
-        &mut self,
-        timed: bool,
-        stops: bool,
-        lead: Option<usize>,
-    ) {
+    pub(crate) fn spread_impacts(&mut self, timed: bool, stops: bool, lead: Option<usize>) {
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
         let Some([least_gain, fastest]) = spread::impact_speeds(self.work, h, dt) else { return };

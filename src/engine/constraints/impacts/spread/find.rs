@@ -118,7 +118,8 @@ fn find<L: Lanes>(
         let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
         for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| of(&any, lane) > 0.0) {
             let speed = of(&any, lane) + of(&threshold, lane);
-            let e = if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
+            let e =
+                if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
             let is_stopped = stops && speed > of(&stops_at, lane);
             if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
                 found.push((segment.first_lane + first + lane) as u32);

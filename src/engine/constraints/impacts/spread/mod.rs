@@ -50,8 +50,8 @@ mod point;
 use crate::engine::lanes::{BodyRow, held};
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
-pub(crate) use point::{Leads, On};
 use point::{Body, Point, Role, STILL};
+pub(crate) use point::{Leads, On};
 use std::collections::VecDeque;
 
 /// No lane, no point.
@@ -313,7 +313,8 @@ impl Spread {
     fn part_without_gain(&self, on: &On<'_>) -> f32 {
         let (mut linear, mut square) = (0.0_f64, 0.0_f64);
         for &row in &self.pushed {
-            let (BodyRow { velocity, delta }, before) = (&on.rows[row as usize], self.bodies[row as usize].before);
+            let (BodyRow { velocity, delta }, before) =
+                (&on.rows[row as usize], self.bodies[row as usize].before);
             for k in 0..3 {
                 let inverse = f64::from(if k < 2 { velocity[3] } else { delta[3] });
                 if inverse > 0.0 {

@@ -80,11 +80,8 @@ fn close<L: Lanes>(
             let has_borne = last[2 * p] + L::splat(0.5);
             let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
             let normal = begun(last[2 * p], at(layout.normal_impulse));
-            let tangent = if layout.has_friction {
-                begun(last[2 * p + 1], at(layout.tangent_impulse))
-            } else {
-                zero
-            };
+            let tangent =
+                if layout.has_friction { begun(last[2 * p + 1], at(layout.tangent_impulse)) } else { zero };
             loads[2 * p] = is_closed.select_positive(normal, open);
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
@@ -109,23 +106,14 @@ fn close<L: Lanes>(
 #[inline(always)]
 pub(super) fn arms_of<L: Lanes>(record: &[L], layout: &Layout, p: usize) -> [[L; 2]; 2] {
     let arm = |first: usize, has: bool| {
-        if has {
-            [record[layout.at(p, first)], record[layout.at(p, first) + 1]]
-        } else {
-            [L::zero(); 2]
-        }
+        if has { [record[layout.at(p, first)], record[layout.at(p, first) + 1]] } else { [L::zero(); 2] }
     };
     [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])]
 }
 
 /// What impulses along n and t (N·s) do to a and b.
 #[inline(always)]
-pub(super) fn push<L: Lanes>(
-    [a, b]: [&mut [L; 8]; 2],
-    [nx, ny]: [L; 2],
-    arms: [[L; 2]; 2],
-    [n, t]: [L; 2],
-) {
+pub(super) fn push<L: Lanes>([a, b]: [&mut [L; 8]; 2], [nx, ny]: [L; 2], arms: [[L; 2]; 2], [n, t]: [L; 2]) {
     let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
     let turn = |arm: [L; 2]| arm[0].mul_add(n, arm[1] * t);
     (b[0], b[1]) = (b[3].mul_add(x, b[0]), b[3].mul_add(y, b[1]));
@@ -136,12 +124,7 @@ pub(super) fn push<L: Lanes>(
 
 /// Writes the loads of the `filled` lanes of a batch.
 #[inline(always)]
-pub(super) fn store<L: Lanes>(
-    quads: &mut [Quad],
-    index: LaneIndex<L::Index>,
-    filled: usize,
-    loads: [L; 4],
-) {
+pub(super) fn store<L: Lanes>(quads: &mut [Quad], index: LaneIndex<L::Index>, filled: usize, loads: [L; 4]) {
     if filled == L::WIDTH {
         L::scatter_quads::<2, 0>(quads, index, loads);
         return;

@@ -76,7 +76,8 @@ impl HandDown {
             self.all.build(bodies.len(), ends, is_dynamic);
             let hangs = |body: &&u32| self.upright.levels()[**body as usize] == UNSUPPORTED;
             let hanging = self.all.upwards().iter().rev().filter(hangs);
-            self.downwards.extend(hanging.map(|&body| (body, still(&self.all, body, |edge| &contacts[edge as usize]))));
+            self.downwards
+                .extend(hanging.map(|&body| (body, still(&self.all, body, |edge| &contacts[edge as usize]))));
         } else {
             self.all = Graph::default();
         }

@@ -55,9 +55,7 @@ fn sweep<L: Lanes>(
         for p in 0..layout.points {
             let arms = arms_of(record, layout, p);
             let is_closed = loads[2 * p] + L::splat(0.5);
-            let mass = |quantity: usize| {
-                is_closed.select_positive(record[layout.at(p, quantity)], zero)
-            };
+            let mass = |quantity: usize| is_closed.select_positive(record[layout.at(p, quantity)], zero);
             let along = |x: L, y: L, axis: usize, a: &[L; 8], b: &[L; 8]| {
                 let straight = x.mul_add(b[0] - a[0], y * (b[1] - a[1]));
                 a[2].neg_mul_add(arms[0][axis], b[2].mul_add(arms[1][axis], straight))

@@ -35,9 +35,9 @@ pub(super) mod loads;
 pub(super) mod shorten;
 
 use super::Shim;
-use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::constraints::kernels::velocity::rules::Soft;
 use crate::engine::constraints::step::StepParts;
+use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::lanes::BodyRow;
 
 /// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; then the overlap that a body was put

@@ -73,11 +73,7 @@ const AHEAD: usize = 3;
 impl Pass for Shorten {
     fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
         // Loads, separation and mass of each point, and the index of the contact.
-        PerLane {
-            floats_read: 9 + 2 * layout.points,
-            floats_written: layout.points,
-            ..PerLane::default()
-        }
+        PerLane { floats_read: 9 + 2 * layout.points, floats_written: layout.points, ..PerLane::default() }
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
