@@ -293,10 +293,12 @@ impl Spread {
         let part = if bounced && !self.is_driven { self.part_without_gain(on) } else { 1.0 };
         if part < 1.0 {
             for &row in &self.pushed {
-                let (row, before) = (&mut on.rows[row as usize], self.bodies[row as usize].before);
-                for k in 0..3 {
-                    row.velocity[k] = part.mul_add(row.velocity[k] - before[0][k], before[0][k]);
-                    row.delta[k] = part.mul_add(row.delta[k] - before[1][k], before[1][k]);
+                let [velocity, delta] = self.bodies[row as usize].before;
+                let row = &mut on.rows[row as usize];
+                for (now, before) in
+                    row.velocity.iter_mut().zip(velocity).chain(row.delta.iter_mut().zip(delta))
+                {
+                    *now = part.mul_add(*now - before, before);
                 }
             }
         }
