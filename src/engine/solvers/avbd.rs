@@ -90,7 +90,6 @@ pub static SOLVER: Variant = Variant {
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),
-        (Law::Rest, "pyramid:4 creeps at 9.6 mm/s: friction holds places of the substep's start alone"),
     ],
     impacts: ImpactLaw::None,
     make: || Box::new(Avbd::default()),
@@ -169,7 +168,8 @@ impl Avbd {
         if !passes.runs(phase) {
             return;
         }
-        let StepParts { work: Workspace { rows, motion, kept, .. }, contacts, input, clock, .. } = passes.parts();
+        let StepParts { work: Workspace { rows, motion, kept, .. }, contacts, input, clock, .. } =
+            passes.parts();
         let Features { rotation, friction, .. } = input.features;
         let (increments, bodies) = (motion.velocity_increments(), rows.len() - 1);
         work(&mut self.descent, &mut Bodies { rows, kept, contacts, increments, bodies, rotation, friction });

@@ -32,6 +32,7 @@ pub mod pgs;
 pub mod pgs_ngs;
 pub mod pgs_ngs_block;
 pub mod pgs_soft;
+pub mod pgs_substeps;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
@@ -47,12 +48,13 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 27] = [
+pub static VARIANTS: [&Variant; 28] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
     &pgs_ngs_block::SOLVER,
     &pgs_soft::SOLVER,
+    &pgs_substeps::SOLVER,
     &symmetric_gs::SOLVER,
     &sor::SOLVER,
     &random_order::SOLVER,
