@@ -36,6 +36,7 @@ pub mod pgs_substeps;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
+pub mod sap;
 pub mod shim;
 pub mod shock;
 pub mod soft_step;
@@ -48,7 +49,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 28] = [
+pub static VARIANTS: [&Variant; 29] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -64,6 +65,7 @@ pub static VARIANTS: [&Variant; 28] = [
     &apgd::SOLVER,
     &admm::SOLVER,
     &direct::SOLVER,
+    &sap::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,
