@@ -37,7 +37,7 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "regularization",
             unit: "",
-            default: 1e-3,
+            default: 1e-2,
             range: [1e-9, 1.0],
             meaning: "ε: how far contacts give way, as a share of their effective mass",
             trials: &[],

@@ -272,7 +272,8 @@ mod tests {
                 }
             }
         };
-        let some = |seed: f64| [0, 1, 2].map(|i| [0, 1, 2].map(|j| (seed + 3.1 * i as f64 + 1.7 * j as f64).sin()));
+        let some =
+            |seed: f64| [0, 1, 2].map(|i| [0, 1, 2].map(|j| (seed + 3.1 * i as f64 + 1.7 * j as f64).sin()));
         for i in 0..n as u32 {
             let mut block = some(f64::from(i));
             (0..3).for_each(|k| block[k][k] += 20.0);

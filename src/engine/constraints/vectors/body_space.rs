@@ -183,7 +183,10 @@ impl BodySpace {
                 if point.nodes[row] == FIXED || point.nodes[column] == FIXED {
                     continue;
                 }
-                let (r, c) = ([0, 1].map(|axis| point.jacobian[axis][row]), [0, 1].map(|axis| point.jacobian[axis][column]));
+                let (r, c) = (
+                    [0, 1].map(|axis| point.jacobian[axis][row]),
+                    [0, 1].map(|axis| point.jacobian[axis][column]),
+                );
                 // G J of the column, then Jᵀ of the row.
                 let gj = [0, 1].map(|axis| [0, 1, 2].map(|j| g[axis][0] * c[0][j] + g[axis][1] * c[1][j]));
                 let block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| r[0][i] * gj[0][j] + r[1][i] * gj[1][j]));
@@ -244,7 +247,8 @@ impl BodyPoint {
             if self.nodes[side] != FIXED {
                 let node = self.nodes[side] as usize;
                 (0..3).for_each(|k| {
-                    let pull = self.jacobian[0][side][k] * impulse[0] + self.jacobian[1][side][k] * impulse[1];
+                    let pull =
+                        self.jacobian[0][side][k] * impulse[0] + self.jacobian[1][side][k] * impulse[1];
                     velocities[node][k] += pull / inertia[node][k];
                 });
             }

@@ -233,7 +233,8 @@ impl Proximal {
         if found.is_none() {
             let at = space.points.iter().zip(u.iter()).zip(centre.iter());
             impulses.clear();
-            impulses.extend(at.map(|((point, u), centre)| PointLaw::Coulomb.of(point, *centre, *u, *epsilon).0));
+            impulses
+                .extend(at.map(|((point, u), centre)| PointLaw::Coulomb.of(point, *centre, *u, *epsilon).0));
         }
         found
     }
@@ -273,7 +274,11 @@ fn minimum(slope: impl Fn(f64) -> (f64, f64)) -> f64 {
         if first.abs() <= SLOPE * at_start.abs() {
             break;
         }
-        if first < 0.0 { low = alpha } else { high = alpha }
+        if first < 0.0 {
+            low = alpha
+        } else {
+            high = alpha
+        }
         let next = alpha - first / second;
         alpha = match next > low && next < high {
             true => next,
