@@ -164,6 +164,40 @@ impl BodySpace {
         }
     }
 
+    /// Label of the island of each point: points that share no node, directly or by others, have different ones.
+    pub fn islands(&self) -> Vec<u32> {
+        let mut parent: Vec<u32> = (0..self.inertia.len() as u32).collect();
+        fn root(parent: &mut [u32], mut node: u32) -> u32 {
+            while parent[node as usize] != node {
+                parent[node as usize] = parent[parent[node as usize] as usize];
+                node = parent[node as usize];
+            }
+            node
+        }
+        for &[a, b] in &self.edges {
+            let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+        let of = |p: &BodyPoint| p.nodes.into_iter().find(|&node| node != FIXED);
+        self.points.iter().map(|p| of(p).map_or(FIXED, |node| root(&mut parent, node))).collect()
+    }
+
+    /// How far impulses are from Coulomb's law, in N·s: the natural map of each point, at the velocities that follow from them.
+    pub fn natural_map(&self, impulses: &[Point2]) -> Vec<f64> {
+        let mut v = self.free.clone();
+        for (point, &impulse) in self.points.iter().zip(impulses) {
+            point.push(&self.inertia, &mut v, impulse);
+        }
+        let one = |(point, l): (&BodyPoint, &Point2)| {
+            let u = self.velocity(point, &v);
+            let normal = (l[0] - point.mass[0] * u[0]).max(0.0);
+            let bound = point.friction * normal;
+            let tangent = (l[1] - point.mass[1] * u[1]).max(-bound).min(bound);
+            (l[0] - normal).abs().max((l[1] - tangent).abs())
+        };
+        self.points.iter().zip(impulses).map(one).collect()
+    }
+
     /// u of a point (m/s).
     pub fn velocity(&self, point: &BodyPoint, v: &[Part3]) -> Point2 {
         let moved = point.along(v);
