@@ -313,6 +313,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
         "broken": value(&found.broken)?,
+        "islands_answered_by": world.answers().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     }))
 }
 
@@ -341,8 +342,14 @@ fn head(world: &World, scene: &Scene) -> String {
 
 fn counts(world: &World) -> String {
     let c = &world.counts;
+    let each = |(method, islands): &(&str, u64)| format!("{method} {islands}");
+    let by_method: Vec<String> = world.answers().iter().map(each).collect();
+    let answers = match by_method.is_empty() {
+        true => String::new(),
+        false => format!("\nislands answered by: {}\n", by_method.join(", ")),
+    };
     format!(
-        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
+        "{answers}\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
          {:.0} % of lanes filled, {} bytes of records\n",
         c.pairs,
         c.contacts,

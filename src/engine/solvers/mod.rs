@@ -32,9 +32,11 @@ pub mod pgs;
 pub mod pgs_ngs;
 pub mod pgs_ngs_block;
 pub mod pgs_soft;
+pub mod pgs_substeps;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
+pub mod sap;
 pub mod shim;
 pub mod shock;
 pub mod soft_step;
@@ -47,12 +49,13 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 27] = [
+pub static VARIANTS: [&Variant; 29] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
     &pgs_ngs_block::SOLVER,
     &pgs_soft::SOLVER,
+    &pgs_substeps::SOLVER,
     &symmetric_gs::SOLVER,
     &sor::SOLVER,
     &random_order::SOLVER,
@@ -62,6 +65,7 @@ pub static VARIANTS: [&Variant; 27] = [
     &apgd::SOLVER,
     &admm::SOLVER,
     &direct::SOLVER,
+    &sap::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,

@@ -3,10 +3,11 @@
 //!
 //! **Source.** `silcowitz2010`, algorithm 1; the sweeps are those of [`super::pgs`].
 //!
-//! **Departures.** Sweeps are symmetric pairs, as conjugate gradients want of a preconditioner. The last
-//! iteration does not go on beyond its sweeps, so that impulses end within their bounds.
+//! **Departures.** The last iteration does not go on beyond its sweep, so that impulses end within their bounds.
+//! Symmetric pairs of sweeps, as conjugate gradients want of a preconditioner, were tried: per sweep they leave 1.3 to 4.4
+//! times more residual on five of six frozen problems.
 //!
-//! **Cost.** That of [`super::pgs`] with two sweeps an iteration; between iterations impulses are
+//! **Cost.** That of [`super::pgs`]; between iterations impulses are
 //! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 2790 B per contact.
 //!
 //! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
@@ -24,17 +25,17 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::records::point_vector::{difference, dot, scaled, sum, update};
-use crate::engine::constraints::{Passes, Schedule, SweepOrder};
+use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
     name: "nncg",
     source: "silcowitz2010",
-    summary: "conjugate gradients around symmetric sweeps",
-    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    summary: "conjugate gradients around sweeps",
+    budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
+    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: || Schedule::boxed(step),
     ..Variant::BASE
 };
@@ -50,9 +51,6 @@ fn step(passes: &mut Passes<'_>) {
         let mut previous = f64::INFINITY;
         for k in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rule);
-            passes.set_order(SweepOrder::Reverse);
-            passes.sweep(Phase::Solve, &rule);
-            passes.set_order(SweepOrder::Forward);
             passes.iteration_done();
             if k + 1 == budget.velocity_iterations {
                 break;

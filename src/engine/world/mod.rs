@@ -22,6 +22,7 @@ use collide::Narrow;
 use glam::Vec2;
 use traits::Traits;
 
+mod answers;
 mod candidates;
 mod collide;
 mod counts;

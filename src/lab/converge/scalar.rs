@@ -36,7 +36,7 @@ pub(super) fn curves(
         ("Jacobi, mass splitting", problem, Sequence::Natural, 1, |p, l, s| {
             sweeps::jacobi(p, Target::Rigid, l, Splitting::Mass, s)
         }),
-        ("NNCG", problem, Sequence::Natural, 2, |p, l, s| nncg(p, Target::Rigid, l, s)),
+        ("NNCG", problem, Sequence::Natural, 1, |p, l, s| nncg(p, Target::Rigid, l, s)),
     ];
     let mut curves = Vec::new();
     for (name, problem, order, sweeps, method) in methods {

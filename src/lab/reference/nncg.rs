@@ -4,8 +4,7 @@
 //! multiple of the previous direction, as the Fletcher–Reeves method does with gradients.
 //!
 //! **Source**: Silcowitz-Hansen, Niebe & Erleben 2010, algorithm 1.
-//! **Departures**: the sweep is symmetric, as conjugate gradients want of a preconditioner.
-//! **Cost**: two sweeps per iteration.
+//! **Cost**: a sweep per iteration.
 //! **Fails when** friction keeps switching: β > 1 restarts so often that it falls back to
 //! Gauss–Seidel.
 
@@ -13,7 +12,7 @@ use super::problem::{ContactProblem, Pair};
 use super::residual::Target;
 use super::sweeps::{Rows, Run, Stop, gauss_seidel, iterate};
 
-/// NNCG from `start`; one iteration is a symmetric sweep and an extrapolation.
+/// NNCG from `start`; one iteration is a sweep and an extrapolation.
 pub fn nncg(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop) -> Run {
     let rows = Rows::new(problem, target);
     let n = problem.contacts.len();
@@ -22,7 +21,6 @@ pub fn nncg(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop
     iterate(problem, target, start, stop, |impulses, velocities| {
         let before = impulses.clone();
         gauss_seidel(problem, &rows, 0..n, impulses, velocities);
-        gauss_seidel(problem, &rows, (0..n).rev(), impulses, velocities);
         let descent: Vec<Pair> =
             impulses.iter().zip(&before).map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let square: f64 = descent.iter().map(|d| d[0] * d[0] + d[1] * d[1]).sum();

@@ -7,11 +7,18 @@
 //! signed such that a growing separation is positive,
 //!
 //! ```text
-//! C_n = s + n·(x − o) + A_n Δθ + B_n Δθ_o − α min(C_n⁰, 0),   C_t = t·(x − o) + A_t Δθ + B_t Δθ_o − C_t⁰
+//! C_n = s + ε + n·(x − o) + A_n Δθ + B_n Δθ_o − α C_n⁰,   C_t = (1 − α) d + t·(x − o) + A_t Δθ + B_t Δθ_o − C_t⁰
 //! ```
 //!
-//! with ±n for body b and a, arms A and B of the own and the other body, and C⁰ at the start of the substep. So
-//! a contact has one record for each of its bodies, and nothing of it is computed again in an iteration.
+//! with ±n for body b and a, arms A and B of the own and the other body, the margin ε, the drift d of the point since it
+//! stuck, and C⁰ at the start of the substep; C_n⁰ is 0 where there is a gap, which may close. So a contact has one
+//! record for each of its bodies, and nothing of it is computed again in an iteration.
+//!
+//! # Where bodies begin
+//!
+//! A body that rests is held against its weight, and begins best where it is; one that falls begins best at its inertial
+//! place. So it begins at x + h v + w h² a, w being the share of a by which it was accelerated in the last substep:
+//! w = (v − v_last)·h a/|h a|², from 0 to 1.
 //!
 //! # One body
 //!
@@ -29,19 +36,27 @@ use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, he
 /// Least and greatest penalty (N/m).
 const PENALTY: [f32; 2] = [1.0, 1e9];
 
-/// Kept per point: λn, λt (N), kn, kt (N/m).
+/// Overlap that is no error (m): `COLLISION_MARGIN` of the source.
+const MARGIN: f32 = 5e-4;
+/// A point that has drifted farther (m) does not stick: `STICK_THRESH` of the source.
+const REACH: f32 = 0.01;
+
+/// Kept per point: λn, λt (N), kn, kt (N/m), and how far it has drifted since it stuck (m).
 pub const NORMAL: usize = 0;
 /// See [`NORMAL`].
 pub const TANGENT: usize = 1;
 const NORMAL_PENALTY: usize = 2;
 const TANGENT_PENALTY: usize = 3;
-/// Numbers kept per point.
-pub const PER_POINT: usize = 4;
+/// Numbers kept per point, two times four for gathers; the last three are not used.
+pub const PER_POINT: usize = 8;
+/// Numbers kept per body: its velocity before the forces of the last substep, and one that is not used.
+pub const PER_BODY: usize = 4;
 
 /// Lane vectors of a contact: ±n and µ, then per point those of [`POINT`].
 const RECORD: usize = 3 + 2 * POINT;
-/// A_n, A_t, B_n, B_t, s, min(C_n⁰, 0), C_t⁰, and 1 if the point is there.
-const POINT: usize = 8;
+/// A_n, A_t, B_n, B_t, s + ε, C_n⁰, d − C_t⁰, d, and 1 if the point is there.
+const POINT: usize = 9;
+const IS_THERE: usize = 8;
 /// Lane vectors of a body: its inertial place, M/h² (kg/s²), I/h², and 0 if it does not turn.
 const BODY: usize = 6;
 
@@ -61,6 +76,10 @@ pub(crate) struct Bodies<'a> {
     pub rows: &'a mut [BodyRow],
     pub kept: &'a mut Kept,
     pub contacts: &'a [Contact],
+    /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
+    pub increments: &'a [[f32; 4]],
+    /// The last row is none.
+    pub bodies: usize,
     pub rotation: bool,
     pub friction: bool,
 }
@@ -96,7 +115,7 @@ impl Descent {
         }
     }
 
-    /// Begins a substep of `h` (s): records of all contacts, then bodies go to their inertial place, moving for
+    /// Begins a substep of `h` (s): records of all contacts, then bodies go to where they begin, moving for
     /// `motion` (s); of multipliers and penalties remain the shares `keep`.
     pub(crate) fn begin(&mut self, on: &mut Bodies<'_>, h: f32, motion: f32, keep: [f32; 2]) {
         let Descent { lanes, bodies, ends, contacts } = self;
@@ -108,6 +127,16 @@ impl Descent {
             }
         }
         at_width!(lanes.width, begin_bodies(lanes, bodies, on, h));
+        // A body without contacts takes no step of its own: it stays at its inertial place.
+        for body in lanes.solved() {
+            let (row, force) = (&mut on.rows[body], &on.increments[body]);
+            let held = 1.0 - share(force, row, on.kept.body(body));
+            (0..3).for_each(|k| row.delta[k] -= held * motion * force[k]);
+        }
+        for (body, (row, force)) in on.rows.iter().zip(on.increments).enumerate().take(on.bodies) {
+            let last = on.kept.body(body);
+            (0..3).for_each(|k| last[k] = row.velocity[k] - force[k]);
+        }
         for point in on.kept.points().chunks_exact_mut(PER_POINT) {
             for k in [NORMAL, TANGENT] {
                 point[k] *= keep[0];
@@ -128,10 +157,22 @@ impl Descent {
         at_width!(self.lanes.width, raise(&self.lanes.contacts, &self.contacts, on, alpha, beta));
     }
 
+    /// Points that stick take up how far they have drifted; the others forget it.
+    pub(crate) fn hold(&mut self, on: &mut Bodies<'_>) {
+        at_width!(self.lanes.width, hold(&self.lanes.contacts, &self.contacts, on));
+    }
+
     /// v ← v + (x − y)/h, which is (x − x_begin)/h.
     pub(crate) fn velocities(&mut self, on: &mut Bodies<'_>, h: f32) {
         at_width!(self.lanes.width, velocities(&self.lanes, &self.bodies, on, h));
     }
+}
+
+/// w: the share of its forces, `force` = h a, that accelerated a body in the last substep.
+fn share(force: &[f32; 4], row: &BodyRow, last: &[f32]) -> f32 {
+    let square = force[0] * force[0] + force[1] * force[1];
+    let along = |k: usize| (row.velocity[k] - force[k] - last[k]) * force[k];
+    if square > 0.0 { ((along(0) + along(1)) / square).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// Δx, Δy, Δθ and the inverse inertia of bodies.
@@ -142,9 +183,11 @@ fn moved<L: Lanes>(rows: &[BodyRow], index: LaneIndex<L::Index>) -> [L; 4] {
 
 /// The records of contacts, of the places where bodies are.
 #[inline(never)]
-fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &Bodies<'_>) {
+fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut Bodies<'_>) {
     use quad::*;
     let quads: &[Quad] = bytemuck::cast_slice(on.contacts);
+    let kept = on.kept.by_point().map(|points| bytemuck::cast_slice::<f32, Quad>(points));
+    let margin = L::splat(MARGIN);
     let records: &mut [L] = bytemuck::cast_slice_mut(records);
     let sides: &[f32] = &ends.side;
     let bodies = ends.own.list().batches().zip(ends.other.list().batches());
@@ -181,10 +224,14 @@ fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &Bodies<'_>) {
             let (a, b) = (arms(own_arm), arms(other_arm).map(|arm| -arm));
             let d = [x[0] - o[0], x[1] - o[1]];
             let along = |u: [L; 2], axis: usize| u[0] * d[0] + u[1] * d[1] + a[axis] * x[2] + b[axis] * o[2];
-            let first_n = (separation + along(n, 0)).min(zero);
+            let first_n = separation + along(n, 0);
+            let first_n = first_n.select_positive(zero, first_n + margin);
             let first_t = along([n[1], -n[0]], 1);
+            let [drift, ..] = L::gather_quads::<2, 1>(kept[p], contact);
             let point = &mut record[3 + POINT * p..][..POINT];
-            point.copy_from_slice(&[a[0], a[1], b[0], b[1], separation, first_n, first_t, is_there]);
+            let offset = drift - first_t;
+            let separation = separation + margin;
+            point.copy_from_slice(&[a[0], a[1], b[0], b[1], separation, first_n, offset, drift, is_there]);
         }
     }
 }
@@ -217,13 +264,16 @@ struct Rows<L> {
 fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], alpha: L) -> Rows<L> {
     let n = [record[0], record[1]];
     let t = [n[1], -n[0]];
-    let [a_n, a_t, b_n, b_t, separation, first_n, first_t, is_there] =
+    let [a_n, a_t, b_n, b_t, separation, first_n, offset, drift, is_there] =
         std::array::from_fn(|k| record[3 + POINT * p + k]);
     let d = [x[0] - o[0], x[1] - o[1]];
     let along = |u: [L; 2], a: L, b: L, c: L| {
         u[0].mul_add(d[0], u[1].mul_add(d[1], a.mul_add(x[2], b.mul_add(o[2], c))))
     };
-    let error = [along(n, a_n, b_n, alpha.neg_mul_add(first_n, separation)), along(t, a_t, b_t, -first_t)];
+    let error = [
+        along(n, a_n, b_n, alpha.neg_mul_add(first_n, separation)),
+        along(t, a_t, b_t, alpha.neg_mul_add(drift, offset)),
+    ];
     let normal = kept[NORMAL_PENALTY].neg_mul_add(error[0], kept[NORMAL]).max(L::zero());
     let normal = is_there.select_positive(normal, L::zero());
     let bound = record[2] * normal;
@@ -234,7 +284,7 @@ fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], al
 /// The numbers kept at both points of contacts.
 #[inline(always)]
 fn kept_of<L: Lanes>([first, second]: [&[Quad]; 2], contact: LaneIndex<L::Index>) -> [[L; 4]; 2] {
-    [L::gather_quads::<1, 0>(first, contact), L::gather_quads::<1, 0>(second, contact)]
+    [L::gather_quads::<2, 0>(first, contact), L::gather_quads::<2, 0>(second, contact)]
 }
 
 #[inline(never)]
@@ -257,7 +307,7 @@ fn descend<L: Lanes>(lanes: &BodyLanes, [bodies, ends]: [&[Block]; 2], on: &mut 
             let o = moved::<L>(on.rows, other);
             for (p, kept) in kept_of::<L>(kept, contact).into_iter().enumerate() {
                 let rows = rows(record, p, x, o, kept, alpha);
-                let is_there = record[3 + POINT * p + 7];
+                let is_there = record[3 + POINT * p + IS_THERE];
                 // A row at its bound keeps its stiffness: without it a body would go past where the row
                 // takes hold again, and back, for ever.
                 let rubs = record[2].select_positive(kept[TANGENT_PENALTY], zero);
@@ -321,8 +371,28 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f
                 slack.select_positive(grown(tangent_penalty, error[1]), tangent_penalty),
             ]
         });
-        L::scatter_quads::<1, 0>(first, contact, new[0]);
-        L::scatter_quads::<1, 0>(second, contact, new[1]);
+        L::scatter_quads::<2, 0>(first, contact, new[0]);
+        L::scatter_quads::<2, 0>(second, contact, new[1]);
+    }
+}
+
+#[inline(never)]
+fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>) {
+    let records: &[L] = bytemuck::cast_slice(records);
+    let kept = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
+    let (zero, reach) = (L::zero(), L::splat(REACH));
+    let bodies = ends.own.list().batches().zip(ends.other.list().batches());
+    let batches = ends.contact.list().batches().zip(bodies);
+    for (record, (contact, (own, other))) in records.chunks_exact(RECORD).zip(batches) {
+        let (x, o) = (moved::<L>(on.rows, own), moved::<L>(on.rows, other));
+        for p in 0..2 {
+            let forces = L::gather_quads::<2, 0>(kept[p], contact);
+            // With α = 0 the tangential error is the drift.
+            let drift = rows(record, p, x, o, forces, zero).error[1];
+            let slack = record[2] * forces[NORMAL] - forces[TANGENT].max(-forces[TANGENT]);
+            let near = (reach - drift.max(-drift)).select_positive(drift, zero);
+            L::scatter_quads::<2, 1>(kept[p], contact, [slack.select_positive(near, zero), zero, zero, zero]);
+        }
     }
 }
 

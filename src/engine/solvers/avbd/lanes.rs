@@ -82,6 +82,11 @@ impl BodyLanes {
         lists + held(&self.batches) + held(&self.order) + held(&self.colors) + held(&self.seen_by)
     }
 
+    /// Bodies that are solved.
+    pub(crate) fn solved(&self) -> impl Iterator<Item = usize> {
+        self.order.iter().map(|&body| body as usize)
+    }
+
     /// Gives lanes to the bodies that have contacts and are dynamic, by colours, or one by one in the `sequence` of
     /// contacts; `inert` is the number of bodies.
     pub fn assign(

@@ -174,6 +174,16 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         let [mut moved, mut slide] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n);
         let mut angle = [a[TURN], b[TURN]];
         let hidden = [before.a[W], before.b[W]];
+        let answer = |arm: [L; 2]| {
+            let mut k = mass_sum;
+            if N::ROTATION {
+                k = (inertia[1] * arm[1]).mul_add(arm[1], k);
+                if O::HAS_ROW && segment.pushes_a() {
+                    k = (inertia[0] * arm[0]).mul_add(arm[0], k);
+                }
+            }
+            k
+        };
         let mut sum = [zero; 2];
         for p in 0..N::POINTS {
             let (arm_n, arm_t) =
@@ -182,18 +192,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             let mut separation = record[layout.at(p, layout.separation)] + moved;
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
-            let at_first = [arm_n, arm_t];
-            let [arm_n, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
-            let answer = |arm: [L; 2]| {
-                let mut k = mass_sum;
-                if N::ROTATION {
-                    k = (inertia[1] * arm[1]).mul_add(arm[1], k);
-                    if O::HAS_ROW && segment.pushes_a() {
-                        k = (inertia[0] * arm[0]).mul_add(arm[0], k);
-                    }
-                }
-                k
-            };
+            let [arm_n, _] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
             // A point that is not there has no mass.
             let is_there = record[layout.at(p, layout.normal_mass)];
             let overlap = is_there.select_positive(-separation.max(deepest).min(zero), zero);
@@ -202,20 +201,26 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             let wanted = of_impulse.neg_mul_add(old, overlap);
             let push = is_there.select_positive(wanted / (answer(arm_n) + compliance), zero);
             // With compliance a push can be taken back, which leaves a rounding of it at most.
-            let normal = inv_h.mul_add(push, old).max(zero);
-            record[at] = normal;
+            record[at] = inv_h.mul_add(push, old).max(zero);
             sum[0] = sum[0] + push;
             moved = mass_sum.mul_add(push, moved);
             spin::<L, N, O>(&mut angle, inertia, arm_n, push);
-            if N::FRICTION {
+        }
+        if N::FRICTION {
+            for p in 0..N::POINTS {
+                let (arm_n, arm_t) =
+                    (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
                 let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(angle[0]), turn(angle[1]));
                 let turns = [sine_a + hidden[0], sine_b + hidden[1]];
-                let drift = with_arms::<L, N, O>(slide, turns, at_first[1]);
-                let drift = with_arms::<L, N, O>(drift, [-versine_a, -versine_b], at_first[0]);
+                let drift = with_arms::<L, N, O>(slide, turns, arm_t);
+                let drift = with_arms::<L, N, O>(drift, [-versine_a, -versine_b], arm_n);
+                let [_, arm_t] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
+                let is_there = record[layout.at(p, layout.normal_mass)];
                 let wanted = is_there.select_positive(-(drift / answer(arm_t)), zero);
                 let at = layout.at(p, layout.tangent_impulse);
                 let old = if first { zero } else { record[at] };
                 let new = inv_h.mul_add(wanted, old);
+                let normal = record[layout.at(p, layout.normal_impulse)];
                 let bound = record[layout.friction] * normal;
                 // Within the cone: bound − |λt| is not negative.
                 let over = new.max(-new) - bound;
@@ -276,7 +281,10 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite, const BOUNCES: bool>(
             sum[0] = sum[0] + delta;
             along_n = mass_sum.mul_add(delta, along_n);
             spin::<L, N, O>(&mut w, inertia, arm, delta);
-            if N::FRICTION {
+        }
+        if N::FRICTION {
+            for p in 0..N::POINTS {
+                let pushed = record[layout.at(p, layout.normal_impulse)];
                 let arm = arms::<L, N, O>(record, &layout, p, 1);
                 let vt = with_arms::<L, N, O>(along_t, w, arm);
                 let bound = record[layout.friction] * pushed;

@@ -1,0 +1,52 @@
+//! Rigid sequential impulses in substeps: the rows of [`super::pgs`], swept once or twice in each of many short substeps.
+//!
+//! What [`super::tgs_soft`] and its like add to this are springs and relaxing sweeps. So the row tells what of their
+//! quality is due to substeps alone.
+//!
+//! **Source.** `macklin2019` (small steps instead of iterations); the rows of `catto2006`.
+//!
+//! **Departures.** The source displaces positions (that is [`super::xpbd`]); here velocities are solved, with a warm start in
+//! every substep, the first one over contacts and the others over bodies.
+//!
+//! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps. Sweeps of a step
+//! request 3370 B per contact.
+//!
+//! **Fails when** one sweep per substep is all there is: what a sweep leaves over is applied once more by the warm
+//! start of the next substep, and grows in pyramids (`papers/solver2d.md`); two sweeps damp it. Baumgarte's push adds
+//! energy as in [`super::pgs`].
+
+use super::Variant;
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{Passes, Schedule};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "pgs_substeps",
+    source: "macklin2019",
+    summary: "rigid sequential impulses in substeps",
+    budget: Budget { substeps: 8, velocity_iterations: 2, relax_iterations: 0, position_iterations: 0 },
+    parameters: &[Parameter::BAUMGARTE],
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        if substep == 0 {
+            passes.integrate_velocities();
+            passes.warm_start();
+        } else {
+            passes.integrate_and_warm_start();
+        }
+        for _ in 0..budget.velocity_iterations {
+            passes.sweep(Phase::Solve, &rule);
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}
