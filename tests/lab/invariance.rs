@@ -4,12 +4,12 @@
 //! taken back. Times are short, because what rounds differently parts for ever after enough impacts.
 
 use crate::common::settings;
-use proptest::prelude::*;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::solvers::{VARIANTS, Variant};
 use simpulse::lab::scenes::{Geometry, Scene, SceneBody};
 use simpulse::lab::torture::family;
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// Steps of a comparison.
 const STEPS: u32 = 40;
@@ -144,7 +144,7 @@ const SYMMETRIES: [Symmetry; 8] = [
     },
     Symmetry { name: "heavier", image: heavier, back: stays, amount: |u| 10f64.powf(6.0 * u - 3.0) },
     Symmetry { name: "stepped", image: stepped, back: stays, amount: |u| 10f64.powf(2.0 * u - 1.0) },
-    Symmetry { name: "in company", image: in_company, back: stays, amount: |u| 300.0 + 100.0 * u },
+    Symmetry { name: "in_company", image: in_company, back: stays, amount: |u| 300.0 + 100.0 * u },
     Symmetry { name: "thrice", image: thrice, back: stays, amount: |u| 100.0 + 100.0 * u },
 ];
 
@@ -185,23 +185,36 @@ fn scene(number: u32) -> Scene {
     family.case(77, number).scene
 }
 
-/// What rounding becomes in [`STEPS`] steps with impacts (m): a thousandth of a body's size.
-const TOLERANCE: f64 = 1e-3;
+/// What rounding may become in [`STEPS`] steps with impacts (m): a hundredth of a body's size.
+const TOLERANCE: f64 = 1e-2;
 
+/// Scenes of each comparison.
+const SCENES: u32 = 24;
+
+/// Scenes of [`SCENES`] that part from their image by more than [`TOLERANCE`].
+fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
+    let apart = |&n: &u32| {
+        let u = (f64::from(n) + 0.5) / f64::from(SCENES);
+        deviation(symmetry, variant, &scene(n), u) > TOLERANCE
+    };
+    (0..SCENES).filter(apart).count() as u32
+}
+
+/// What is known: how many of [`SCENES`] scenes part under each symmetry, solver by solver. Present truth, with its
+/// reasons at the head of the file; a solver that is mended changes its line. `SIMPULSE_BLESS=1` writes it.
 #[test]
-#[ignore = "prints"]
-fn what_is_found() {
-    for symmetry in &SYMMETRIES {
-        for variant in &VARIANTS {
-            let mut found: Vec<f64> = (0..24)
-                .map(|n| deviation(symmetry, variant, &scene(n), f64::from(n) / 24.0 + 0.02))
-                .collect();
-            found.sort_by(f64::total_cmp);
-            let broken = found.iter().filter(|d| **d > TOLERANCE).count();
-            println!(
-                "{:<11} {:<16} median {:.1e} p80 {:.1e} worst {:.1e} broken {broken}",
-                symmetry.name, variant.name, found[12], found[19], found[23]
-            );
-        }
+fn every_symmetry_holds_or_is_known_not_to() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/lab/invariance.txt");
+    let known = std::fs::read_to_string(&path).unwrap_or_default();
+    let head: String = known.lines().filter(|l| l.starts_with('#')).map(|l| format!("{l}\n")).collect();
+    let mut found = head;
+    for variant in &VARIANTS {
+        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant)));
+        found += &format!("{}:{}\n", variant.name, counts.collect::<String>());
     }
+    if std::env::var_os("SIMPULSE_BLESS").is_some() {
+        std::fs::write(&path, &found).unwrap();
+        return;
+    }
+    assert_eq!(known, found, "SIMPULSE_BLESS=1 writes what is so now; the file's head says why");
 }
