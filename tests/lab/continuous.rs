@@ -1,6 +1,7 @@
 //! Continuous collision: nothing fast gets through, nothing slow is touched, and lanes do not matter.
 
 use crate::common::{run, settings, with_width};
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
 use simpulse::engine::world::Settings;
@@ -88,4 +89,29 @@ fn fast_bodies_stay_in_their_rooms() {
     assert_eq!(escapes(&on(soft_step)), 0);
     // Else the scenes would be too easy.
     assert!(escapes(&settings(soft_step)) > 20);
+}
+
+/// A box between a wall of 2 m and a door that comes at it with 1 m/s and goes on into the wall.
+#[test]
+fn what_a_door_presses_does_not_leave_through_the_wall() {
+    let still =
+        |position, half: [f64; 2]| SceneBody::fixed(position, SceneShape::rectangle(half[0], half[1]));
+    let door = SceneBody::new(BodyKind::Kinematic, [1.5, 2.55], SceneShape::rectangle(1.0, 2.5));
+    let scene = Scene::new(
+        "door",
+        vec![
+            still([0.0, -1.0], [10.0, 1.0]),
+            still([7.0, 3.0], [1.0, 7.0]),
+            SceneBody::dynamic([5.5, 0.5], SceneShape::rectangle(0.5, 0.5)),
+            door.moving([1.0, 0.0], 0.0),
+        ],
+    );
+    for variant in ["soft_step", "pgs", "pgs_soft", "box2d", "rapier"] {
+        let mut world = scene.build(on(find(variant).unwrap())).unwrap();
+        for step in 0..400 {
+            world.step().unwrap();
+            let [x, y] = world.bodies.center(2);
+            assert!(x < 6.01 && y > -0.01, "{variant} at step {step}: ({x}, {y})");
+        }
+    }
 }

@@ -8,7 +8,8 @@
 //!
 //! Static and kinematic shapes stop every fast body; dynamic ones stop those that ask for it
 //! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). What a slow body does to a fast one is left to
-//! contacts, as is the turn of a rod, whose middle goes nowhere.
+//! contacts, as is the turn of a rod, whose middle goes nowhere. Nor does a slow body's middle get into something static,
+//! whatever presses it ([`press`]).
 //!
 //! **Cost.** One comparison a body; for a fast one, its bounds against those of all fixed shapes, and a few distances for
 //! those that it may meet. One lane: the same bits at every width.
@@ -16,9 +17,11 @@
 //! **Source.** Conservative advancement: `mirtich1996`.
 
 mod advance;
+mod press;
 
 use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::Proxy;
+use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
@@ -46,6 +49,8 @@ pub struct Moving<'w> {
     pub shapes: &'w [Shape],
     /// One per shape.
     pub proxies: &'w [Proxy],
+    /// Of the step.
+    pub contacts: &'w [Contact],
 }
 
 impl Continuous {
@@ -72,6 +77,7 @@ impl Continuous {
 
     /// Shortens the motions of fast bodies to where they meet what they would pass; returns how many are fast.
     pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) -> usize {
+        press::hold(moving.bodies, moving.contacts, &self.safe_squared, rows);
         self.fast.clear();
         for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
             let [x, y, ..] = row.delta;

@@ -184,7 +184,8 @@ impl World {
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
-            let moving = Moving { bodies: &self.bodies, shapes: &self.shapes, proxies: &self.proxies };
+            let World { bodies, shapes, proxies, contacts, .. } = self;
+            let moving = Moving { bodies, shapes, proxies, contacts };
             self.counts.fast = self.continuous.shorten(moving, &mut self.work.rows);
         }
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
