@@ -9,7 +9,7 @@
 //! Static and kinematic shapes stop every fast body; dynamic ones stop those that ask for it
 //! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). What a slow body does to a fast one is left to
 //! contacts, as is the turn of a rod, whose middle goes nowhere. Nor does a slow body's middle get into something static,
-//! whatever presses it ([`press`]).
+//! whatever presses it.
 //!
 //! **Cost.** One comparison a body; for a fast one, its bounds against those of all fixed shapes, and a few distances for
 //! those that it may meet. One lane: the same bits at every width.
