@@ -13,6 +13,7 @@ use super::run::RunArgs;
 use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
+use super::torture::TortureArgs;
 use super::values;
 use super::verify::VerifyArgs;
 use clap::{Args, Parser, Subcommand};
@@ -66,6 +67,7 @@ pub enum Command {
     Capture(CaptureArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
+    Torture(TortureArgs),
     Profile(ProfileArgs),
     Growth(GrowthArgs),
     Savings(SavingsArgs),

@@ -20,6 +20,7 @@ pub mod run;
 pub mod savings;
 pub mod snapshot;
 pub mod study;
+pub mod torture;
 pub mod values;
 pub mod verify;
 
@@ -82,6 +83,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
+        Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
@@ -235,7 +237,7 @@ fn described(scene: &Description) -> String {
     if let Some((quantity, expected, unit)) = scene.reference {
         text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
     }
-    text += "holds if nothing blows up and no body passes through a static one";
+    text += "holds if nothing blows up and no body passes through a static or kinematic one";
     for demand in scene.demands {
         text += &format!("; {}", demand.meaning());
     }

@@ -77,6 +77,9 @@ pub struct RunArgs {
     /// Write every K-th step [default: of CSV files the last step only, of a recording all]
     #[arg(long, value_name = "K")]
     pub every: Option<u32>,
+    /// Stop fast bodies at what they would pass: continuous collision [default: the solver's]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub continuous: Option<bool>,
     /// Print all phases, counts and errors
     #[arg(long)]
     pub all: bool,
@@ -96,6 +99,7 @@ struct Found {
 /// Runs the scene; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = settings(&args.setting, args.order, args.lanes)?;
+    let settings = Settings { continuous: args.continuous.unwrap_or(settings.continuous), ..settings };
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
@@ -139,6 +143,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let bar = Bar::new();
     let diverged = |failure: Failure| {
         note(&format!("failed: {} {failure}; nothing written\n", args.scene));
+        if args.json {
+            let message = failure.to_string();
+            print_json(&json!({ "scene": args.scene, "failure": value(&failure)?, "message": message }))?;
+        }
         Ok(ExitCode::FAILURE)
     };
     for step in 1..=scene.steps {
@@ -306,6 +314,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "solver": s.solver.name,
         "budget": s.budget,
         "parameters": overrides::by_name(s.solver, &s.parameters),
+        "continuous": s.continuous,
         "order": s.order,
         "lanes": world.lane_width().lanes(),
         "step_ns": found.times.step_ns(),

@@ -52,6 +52,8 @@ pub struct BodyDef {
     pub angular_damping: f64,
     /// Bodies of the same non-zero group do not collide.
     pub group: i32,
+    /// Where it is fast, dynamic bodies stop it, too, see [`crate::engine::continuous`].
+    pub bullet: bool,
     /// Shapes that move as one.
     pub shapes: Vec<ShapeDef>,
 }
@@ -76,6 +78,7 @@ impl BodyDef {
             linear_damping: 0.0,
             angular_damping: 0.0,
             group: 0,
+            bullet: false,
             shapes,
         }
     }
@@ -124,6 +127,8 @@ pub struct Bodies {
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub group: Vec<i32>,
+    /// Whether dynamic bodies stop it, where it is fast.
+    pub bullet: Vec<bool>,
     /// Whether a body is made of discs about its centre of mass: turning it moves no contact.
     pub round: Vec<bool>,
 }
@@ -168,6 +173,7 @@ impl Bodies {
         self.local_center.push(Vec2::new(cx as f32, cy as f32));
         self.kind.push(def.kind);
         self.group.push(def.group);
+        self.bullet.push(def.bullet);
         self.round.push(false);
         self.kind.len() - 1
     }

@@ -8,7 +8,7 @@
 //! contacts                  manifolds with impulses
 //! broadphase  narrowphase   which shapes touch, and where
 //! coloring  clock           independent sets; times of phases
-//! constraints               batches, records, passes
+//! constraints  continuous   batches, records, passes; fast bodies
 //! solvers                   schedules of passes, one file each
 //! world                     the step
 //! ```
@@ -40,6 +40,7 @@ pub mod clock;
 pub mod coloring;
 pub mod constraints;
 pub mod contacts;
+pub mod continuous;
 pub mod error;
 pub mod lanes;
 pub mod narrowphase;

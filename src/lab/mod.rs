@@ -12,6 +12,7 @@
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
+//! torture                        scenes at random, and what no solver may do in them
 //! ```
 
 pub mod advise;
@@ -31,5 +32,6 @@ pub mod reference;
 pub mod report;
 pub mod scenes;
 pub mod study;
+pub mod torture;
 pub mod units;
 pub mod verify;

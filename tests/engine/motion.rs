@@ -19,6 +19,7 @@ fn body(kind: BodyKind, position: [f64; 2]) -> BodyDef {
         linear_damping: 0.0,
         angular_damping: 0.0,
         group: 0,
+        bullet: false,
         shapes: vec![ShapeDef { shape, density: 2.0, friction: 0.5, restitution: 0.0 }],
     }
 }

@@ -73,7 +73,7 @@ const ENGINE: &[&[&str]] = &[
     &["clock", "shapes", "contacts", "coloring"],
     &["bodies"],
     &["broadphase", "narrowphase"],
-    &["constraints"],
+    &["constraints", "continuous"],
     &["solvers"],
     &["world"],
 ];
@@ -85,7 +85,7 @@ const LAB: &[&[&str]] = &[
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile", "compare"],
+    &["profile", "compare", "torture"],
 ];
 
 #[test]

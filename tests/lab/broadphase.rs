@@ -372,6 +372,7 @@ fn body_def(kind: BodyKind, position: [f64; 2]) -> BodyDef {
         linear_damping: 0.0,
         angular_damping: 0.0,
         group: 0,
+        bullet: false,
         shapes: Vec::new(),
     }
 }

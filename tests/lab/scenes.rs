@@ -556,6 +556,7 @@ fn body() -> impl Strategy<Value = SceneBody> {
                 linear_damping: damping[0],
                 angular_damping: damping[1],
                 group,
+                bullet: group % 2 == 0,
                 shapes,
             }
         },

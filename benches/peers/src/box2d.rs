@@ -34,7 +34,7 @@ impl Box2d {
             }
             def.gravity = vector(scene.gravity);
             def.enableSleep = false;
-            def.enableContinuous = false;
+            def.enableContinuous = contender.continuous;
             def.workerCount = 1;
             def.contactHertz = contender.hertz;
             let world = b2CreateWorld(&def);

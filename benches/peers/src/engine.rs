@@ -3,7 +3,7 @@
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::lanes::LaneWidth;
 
-/// A scene inside an engine: one thread, no sleeping, no continuous collision.
+/// A scene inside an engine: one thread, no sleeping.
 pub trait Engine {
     /// Advances by the scene's step. Errors: the engine itself says that it diverged.
     fn step(&mut self) -> Result<(), String>;
@@ -118,6 +118,8 @@ pub struct Contender {
     /// Whether manifolds whose bodies hardly moved are kept, the default where there is such
     /// a thing: not in simpulse.
     pub recycling: bool,
+    /// Whether fast bodies are stopped by what they would pass.
+    pub continuous: bool,
 }
 
 impl Contender {
@@ -147,7 +149,8 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
     let mut all = Vec::new();
     let mut add = |maker, settings: &[(u32, f32)]| {
-        let contender = |&(substeps, hertz)| Contender { maker, substeps, hertz, recycling: true };
+        let contender =
+            |&(substeps, hertz)| Contender { maker, substeps, hertz, recycling: true, continuous: false };
         all.extend(settings.iter().map(contender));
     };
     let default = [(4, 30.0)];
@@ -164,7 +167,7 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
     add(Maker::Solver("box2d"), &default);
     add(Maker::Solver("rapier"), &default);
-    let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false };
+    let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false, continuous: false };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all
 }

@@ -22,6 +22,7 @@ mod picture;
 mod race;
 mod rapier;
 mod table;
+mod torture;
 
 use clap::Parser;
 use std::path::PathBuf;
@@ -62,6 +63,9 @@ struct Args {
     /// Random seed of scenes that have one
     #[arg(long)]
     seed: Option<u64>,
+    /// The campaign of `simpulse torture` instead: so many random scenes under Box2D and rapier
+    #[arg(long, value_name = "N")]
+    torture: Option<u32>,
     /// Folder for peers.csv and peers.svg
     #[arg(long, default_value = "results")]
     out: PathBuf,
@@ -75,6 +79,9 @@ fn main() {
 }
 
 fn run(args: &Args) -> Result<(), String> {
+    if let Some(scenes) = args.torture {
+        return torture::run(args.seed.unwrap_or(1), scenes);
+    }
     let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
     let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
         [] => SCENES.to_vec(),

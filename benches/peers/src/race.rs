@@ -15,7 +15,7 @@ use simpulse::lab::scenes::{self, Scene};
 use std::time::Instant;
 
 /// The scene in the contender's engine. Errors: what the engine cannot hold.
-fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String> {
+pub fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String> {
     Ok(match contender.maker {
         Maker::Box2d => Box::new(Box2d::new(scene, contender)?),
         Maker::Rapier => Box::new(Rapier::new(scene, contender)?),

@@ -21,7 +21,7 @@ impl Rapier {
         p.num_solver_iterations = contender.substeps as usize;
         p.contact_softness.natural_frequency = contender.hertz;
         p.static_contact_softness.natural_frequency = 2.0 * contender.hertz;
-        p.max_ccd_substeps = 0;
+        p.max_ccd_substeps = usize::from(contender.continuous);
         p.contact_recycling = contender.recycling;
         let mut groups: Vec<i32> = Vec::new();
         let mut bodies = Vec::with_capacity(scene.bodies.len());
@@ -39,6 +39,7 @@ impl Rapier {
                 .gravity_scale(body.gravity_scale as f32)
                 .linear_damping(body.linear_damping as f32)
                 .angular_damping(body.angular_damping as f32)
+                .ccd_enabled(contender.continuous)
                 .can_sleep(false);
             let handle = world.bodies.insert(rigid);
             let filter = groups_of(body.group, &mut groups)?;

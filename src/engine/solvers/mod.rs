@@ -137,6 +137,8 @@ pub struct Variant {
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// What it does where bodies hit each other, as its source has it.
     pub impacts: ImpactLaw,
+    /// Whether [continuous collision](crate::engine::continuous) is on where nothing is said.
+    pub continuous: bool,
     /// Numbers that it keeps from step to step, beside impulses.
     pub kept: KeptSize,
     /// What it cannot promise, and why.
@@ -164,6 +166,7 @@ impl Variant {
         parameters: &[],
         softness: None,
         impacts: ImpactLaw::Bias,
+        continuous: false,
         kept: KeptSize::NONE,
         breaks: &[],
         make: || Schedule::boxed(|_| {}),

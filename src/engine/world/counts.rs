@@ -1,5 +1,7 @@
 //! What a step counted, and how it can end.
 
+use crate::engine::params::DIVERGED_SPEED;
+
 /// Counts of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepCounts {
@@ -21,6 +23,8 @@ pub struct StepCounts {
     pub overflow: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,
+    /// Bodies that moved farther than half their width; only with continuous collision.
+    pub fast: usize,
     /// Bytes of prepared constraint records.
     pub constraint_bytes: usize,
 }
@@ -41,6 +45,18 @@ pub enum Quantity {
     Angle,
 }
 
+/// What a simulation that failed broke.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum Criterion {
+    /// The bounds of speeds, and that places and angles are numbers.
+    #[default]
+    Bounds,
+    /// That kinetic energy has a source.
+    Energy,
+}
+
 /// Where and when a simulation left all bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
@@ -52,12 +68,20 @@ pub struct Divergence {
     pub quantity: Quantity,
     /// How large that is (m/s or rad/s); NaN if it is not finite.
     pub speed: f32,
+    /// What was broken.
+    pub criterion: Criterion,
 }
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Divergence { step, body, quantity, speed } = self;
-        write!(f, "diverged at step {step}: body {body} ")?;
+        let Divergence { step, body, quantity, speed, criterion } = self;
+        write!(f, "diverged at step {step}: ")?;
+        if *criterion == Criterion::Energy {
+            let fastest =
+                "kinetic energy beyond 100 times what start, weight and kinematic bodies give; the fastest, ";
+            write!(f, "{fastest}")?;
+        }
+        write!(f, "body {body} ")?;
         match quantity {
             Quantity::Speed if speed.is_finite() => write!(f, "moves at {speed:.3e} m/s"),
             Quantity::Spin if speed.is_finite() => write!(f, "spins at {speed:.3e} rad/s"),
@@ -65,6 +89,10 @@ impl std::fmt::Display for Divergence {
             Quantity::Spin => write!(f, "has no finite spin"),
             Quantity::Position => write!(f, "has no finite position"),
             Quantity::Angle => write!(f, "has no finite angle"),
+        }?;
+        if *criterion == Criterion::Bounds && speed.is_finite() {
+            write!(f, ", more than {DIVERGED_SPEED:e}")?;
         }
+        write!(f, "; try more substeps, a shorter step or another solver")
     }
 }

@@ -89,6 +89,7 @@ impl World {
             component("shapes", &arrays![self.shapes, self.shape_body, self.surfaces]),
             component("bounds", &[arrays![self.proxies][0], opaque(self.fat_boxes.held_bytes())]),
             component("broad phase", &[opaque(self.broadphase.held_bytes())]),
+            component("continuous collision", &[opaque(self.continuous.held_bytes())]),
             component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
             component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
             component("colouring", &[opaque(self.assignment.held_bytes())]),

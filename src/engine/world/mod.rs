@@ -13,6 +13,7 @@ use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
 use crate::engine::constraints::records::assign::Assignment;
 use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
+use crate::engine::continuous::{Continuous, Moving};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
@@ -33,7 +34,7 @@ mod pairs;
 mod settings;
 mod traits;
 
-pub use counts::{Divergence, Quantity, StepCounts};
+pub use counts::{Criterion, Divergence, Quantity, StepCounts};
 pub use held::{HeldWorld, Probe};
 pub use memory::{Component, Memory};
 pub use settings::{Order, Settings};
@@ -79,6 +80,7 @@ pub struct World {
     pairs_are_stale: bool,
     narrow: Narrow,
     assignment: Assignment,
+    continuous: Continuous,
     /// What the present lanes were assigned for.
     lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
     /// Substep that the impulses of `contacts` belong to (s); none before there are any.
@@ -110,6 +112,7 @@ impl World {
             pairs_are_stale: true,
             narrow: Narrow::default(),
             assignment: Assignment::default(),
+            continuous: Continuous::default(),
             lanes_are_for: None,
             impulses_of: None,
             solver: (settings.solver.make)(),
@@ -147,6 +150,8 @@ impl World {
             let dynamic = body.kind == BodyKind::Dynamic;
             self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
         }
+        let first = self.shapes.len() - body.shapes.len();
+        self.continuous.add(body.kind == BodyKind::Dynamic, &self.shapes[first..]);
         self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
         self.traits.add(body, self.bodies.round[index]);
         self.features = self.traits.features();
@@ -179,6 +184,11 @@ impl World {
     /// Velocities and motions of the rows to the bodies.
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
+        if self.settings.continuous {
+            let World { bodies, shapes, proxies, contacts, .. } = self;
+            let moving = Moving { bodies, shapes, proxies, contacts };
+            self.counts.fast = self.continuous.shorten(moving, &mut self.work.rows);
+        }
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
     }
 
@@ -297,7 +307,7 @@ impl World {
         } else {
             (Quantity::Angle, f32::NAN)
         };
-        Err(Divergence { step: self.step_index, body, quantity, speed })
+        Err(Divergence { step: self.step_index, body, quantity, speed, criterion: Criterion::Bounds })
     }
 
     /// Hash (FNV-1a) of every bit of the body state.

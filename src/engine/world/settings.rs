@@ -52,6 +52,8 @@ pub struct Settings {
     pub integrator: Integrator,
     /// How spins turn bodies.
     pub rotation: RotationUpdate,
+    /// Whether fast bodies are stopped by what they would pass, see [`crate::engine::continuous`].
+    pub continuous: bool,
     /// Needs modelled on top of those that the scene has, to measure what they cost.
     pub extra_features: Features,
 }
@@ -76,6 +78,7 @@ impl Settings {
             broadphase: BroadPhaseKind::default(),
             integrator: Integrator::default(),
             rotation: RotationUpdate::default(),
+            continuous: solver.continuous,
             extra_features: Features::NONE,
         }
     }

@@ -24,6 +24,7 @@ pub(super) fn bodies(problem: &ContactProblem) -> Bodies {
             linear_damping: 0.0,
             angular_damping: 0.0,
             group: 0,
+            bullet: false,
             shapes: Vec::new(),
         };
         // Zero inverses become infinite masses, and those zero inverses again.

@@ -35,8 +35,10 @@ pub struct Balance {
     unexplained_max: f64,
     kinetic_start: f64,
     kinetic_max: f64,
-    /// Work of weight, applied forces and kinematic bodies so far (J).
-    work: f64,
+    /// Work of weight and applied forces so far, and the least that it ever was (J).
+    work: [f64; 2],
+    /// The fastest point of a kinematic body at which it touched another (m/s).
+    drive: f64,
 }
 
 /// A scene whose kinetic energy exceeds all that it can have by this factor has blown up (1).
@@ -89,7 +91,8 @@ impl Balance {
             friction: 0.0,
             impact: 0.0,
             unexplained_max: 0.0,
-            work: 0.0,
+            work: [0.0; 2],
+            drive: 0.0,
             kinetic_start: bodies.iter().map(BodyState::kinetic_energy).sum(),
             kinetic_max: bodies.iter().map(BodyState::kinetic_energy).sum(),
         }
@@ -130,7 +133,7 @@ impl Balance {
                 about(after) - about(before) - self.dt * (acts_at(body).perp_dot(after.force) + after.torque);
             energy += shadow_energy_change(before, after, self.dt / self.substeps);
             kinetic += after.kinetic_energy();
-            self.work +=
+            self.work[0] +=
                 after.force.dot(after.position - before.position) + after.torque * after.turn_since(before);
         }
         let mut lost = 0.0;
@@ -148,10 +151,11 @@ impl Balance {
             let impulse = point.impulse_on_b();
             momentum -= impulse;
             angular -= (acts_at(other) + point.anchor_b).perp_dot(impulse);
-            let given = impulse.dot(wall.before.velocity_at(point.anchor_a));
-            energy -= given;
-            self.work += given;
+            let driven = wall.before.velocity_at(point.anchor_a);
+            energy -= impulse.dot(driven);
+            self.drive = self.drive.max(driven.length());
         }
+        self.work[1] = self.work[1].min(self.work[0]);
         self.momentum += momentum;
         self.momentum_max = self.momentum_max.max(self.momentum.length());
         self.angular += angular;
@@ -187,10 +191,12 @@ impl Balance {
         }
     }
 
-    /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, were
-    /// given since, and would gain by falling their own size.
+    /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, fell for since they were
+    /// highest, would gain by falling their own size, and had if all of them left the fastest kinematic point at
+    /// twice its speed. Read from poses and velocities: impulses may be what explodes.
     pub fn is_blown_up(&self, kinetic: f64) -> bool {
-        let has = self.kinetic_start + self.work.max(0.0) + self.weight * self.body_size;
+        let driven = 0.5 * self.mass * (2.0 * self.drive).powi(2);
+        let has = self.kinetic_start + (self.work[0] - self.work[1]) + driven + self.weight * self.body_size;
         has > 0.0 && kinetic > BLOW_UP * has
     }
 }

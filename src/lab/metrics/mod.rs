@@ -33,7 +33,7 @@ pub mod violation;
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, pair_key};
-use crate::engine::world::{Divergence, Quantity, World};
+use crate::engine::world::{Criterion, Divergence, Quantity, World};
 use balance::{Balance, ratio, weight};
 use distribution::Distribution;
 use glam::{DVec2, Vec2};
@@ -321,7 +321,7 @@ fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
         .flat_map(|b| [(Quantity::Speed, b.velocity.length()), (Quantity::Spin, b.angular_velocity.abs())]);
     let (i, (quantity, speed)) =
         speeds.enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1)).unwrap_or_default();
-    Divergence { step, body: i / 2, quantity, speed: speed as f32 }
+    Divergence { step, body: i / 2, quantity, speed: speed as f32, criterion: Criterion::Energy }
 }
 
 /// Every body in double precision.

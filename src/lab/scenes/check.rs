@@ -108,6 +108,7 @@ fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
         linear_damping: body.linear_damping,
         angular_damping: body.angular_damping,
         group: body.group,
+        bullet: body.bullet,
         shapes: shapes.collect::<Result<_, _>>()?,
     };
     if def.kind == BodyKind::Dynamic {

@@ -65,6 +65,9 @@ pub struct SceneBody {
     /// Bodies of the same non-zero group do not collide.
     #[serde(default, skip_serializing_if = "is_no_group")]
     pub group: i32,
+    /// Dynamic bodies stop it, too, where it is fast and continuous collision is on.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub bullet: bool,
     /// Shapes that move as one.
     pub shapes: Vec<SceneShape>,
 }
@@ -333,6 +336,10 @@ fn is_origin(point: &[f64; 2]) -> bool {
 
 fn is_no_group(group: &i32) -> bool {
     *group == 0
+}
+
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 fn is_default_density(value: &f64) -> bool {

@@ -3,7 +3,7 @@
 //! A run that fell has fallen, however fast it was and however small its errors are: nobody wants
 //! it. Every scene demands that its kinetic energy has a source (see
 //! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes
-//! through a static one; what else it demands stands in its row of the catalogue.
+//! through a static or kinematic one; what else it demands stands in its row of the catalogue.
 
 use super::truth::View;
 use crate::engine::bodies::BodyKind;
@@ -119,6 +119,7 @@ pub struct Watch {
     /// Bodies that touched at the start.
     touching: Vec<[usize; 2]>,
     walls: Walls,
+    moving: Vec<MovingWalls>,
     /// At the start, and the largest kinetic energy so far (J).
     energy: [f64; 2],
     broken: Option<Broken>,
@@ -154,7 +155,8 @@ impl Watch {
             start,
             reach,
             touching,
-            walls: Walls::new(world),
+            walls: Walls::of(world, None),
+            moving: MovingWalls::all(world),
             energy: [kinetic[0] + kinetic[1], kinetic[0]],
             broken: None,
         }
@@ -175,13 +177,20 @@ impl Watch {
         let through = || {
             let paths = self.previous.iter().zip(&now).enumerate();
             let mut paths = paths.filter(|(i, _)| world.bodies.is_dynamic(*i));
-            paths.any(|(_, (&from, &to))| self.walls.are_crossed(from, to))
+            paths.any(|(_, (&from, &to))| {
+                self.walls.are_crossed(from, to)
+                    || self
+                        .moving
+                        .iter()
+                        .any(|m| m.walls.are_crossed(m.last.inside(from), m.pose(world).inside(to)))
+            })
         };
         let mark = broken.or_else(|| through().then_some(Mark::Tunnelled));
         self.broken = mark.map(|mark| Broken { mark, step: world.step_index });
         if self.demands.iter().any(|d| matches!(d, Demand::GainsNoEnergy)) {
             self.energy[1] = self.energy[1].max(energies(world)[0]);
         }
+        self.moving.iter_mut().for_each(|m| m.last = m.pose(world));
         self.previous = now;
     }
 
@@ -240,16 +249,17 @@ struct Walls {
 const DISC_EDGES: usize = 16;
 
 impl Walls {
-    fn new(world: &World) -> Self {
+    /// Of all static bodies, or of one body in its own frame.
+    fn of(world: &World, one: Option<usize>) -> Self {
         let bodies = &world.bodies;
         let mut edges = Vec::new();
         for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
             let i = body as usize;
-            if bodies.kind[i] != BodyKind::Static {
+            if one.map_or(bodies.kind[i] != BodyKind::Static, |own| own != i) {
                 continue;
             }
-            let rotation = bodies.pose(i).rotation.as_dvec2();
-            let place = |v: DVec2| DVec2::from(bodies.center(i)) + rotation.rotate(v);
+            let frame = if one.is_some() { Frame::default() } else { Frame::of(world, i) };
+            let place = |v: DVec2| frame.center + frame.rotation.rotate(v);
             let mut corners = Vec::new();
             shape.for_each_vertex(|v| corners.push(place(v.as_dvec2())));
             if let Shape::Circle { center, radius } = shape {
@@ -280,6 +290,53 @@ impl Walls {
             let side = |p: DVec2, q: DVec2, point: DVec2| (q - p).perp_dot(point - p) > 0.0;
             side(a, b, from) != side(a, b, to) && side(from, to, a) != side(from, to, b)
         })
+    }
+}
+
+/// Centre of mass (m) and (cos θ, sin θ) of a body.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    center: DVec2,
+    rotation: DVec2,
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Frame { center: DVec2::ZERO, rotation: DVec2::X }
+    }
+}
+
+impl Frame {
+    fn of(world: &World, i: usize) -> Self {
+        let center = DVec2::from(world.bodies.center(i));
+        Frame { center, rotation: world.bodies.pose(i).rotation.as_dvec2() }
+    }
+
+    /// A place of the world in this frame.
+    fn inside(&self, place: DVec2) -> DVec2 {
+        DVec2::new(self.rotation.x, -self.rotation.y).rotate(place - self.center)
+    }
+}
+
+/// Outlines of a kinematic body, in its frame.
+#[derive(Clone, Debug)]
+struct MovingWalls {
+    body: usize,
+    walls: Walls,
+    /// After the step before.
+    last: Frame,
+}
+
+impl MovingWalls {
+    fn all(world: &World) -> Vec<Self> {
+        let kinematic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Kinematic);
+        let of =
+            |body| MovingWalls { body, walls: Walls::of(world, Some(body)), last: Frame::of(world, body) };
+        kinematic.map(of).collect()
+    }
+
+    fn pose(&self, world: &World) -> Frame {
+        Frame::of(world, self.body)
     }
 }
 
@@ -357,11 +414,29 @@ mod tests {
             SceneBody::fixed([20.0, 0.0], SceneShape::disc(2.0)),
             SceneBody::dynamic([50.0, 50.0], SceneShape::disc(1.0)),
         ];
-        let walls = Walls::new(&build(&Scene::new("x", yard)));
+        let walls = Walls::of(&build(&Scene::new("x", yard)), None);
         assert_eq!(walls.edges.len(), 4 + 1 + DISC_EDGES);
         let crossed = |a: [f64; 2], b: [f64; 2]| walls.are_crossed(a.into(), b.into());
         assert!(crossed([0.0, 1.5], [0.0, 0.5]) && crossed([-9.0, 0.0], [9.0, 0.1]));
         assert!(crossed([4.0, 11.0], [4.0, 9.0]) && !crossed([6.0, 11.0], [6.0, 9.0]));
         assert!(crossed([23.0, 0.1], [21.0, 0.1]) && !crossed([-2.0, 2.0], [2.0, 2.0]));
+    }
+
+    #[test]
+    fn a_wall_that_moves_is_passed_where_it_is_by_then() {
+        let door = SceneBody::new(BodyKind::Kinematic, [0.0, 0.0], SceneShape::rectangle(0.5, 5.0));
+        let ball = SceneBody::dynamic([2.0, 0.0], SceneShape::disc(0.1));
+        let mut world = build(&Scene::new("x", vec![door, ball]));
+        let mut watch = Watch::new(&world, &[]);
+        let mut observe = |door: f32, ball: f32| {
+            (world.bodies.position_x[0], world.bodies.position_x[1]) = (door, ball);
+            watch.observe(&world);
+            watch.broken().map(|b| b.mark)
+        };
+        // Both move by 3 m: the ball ends where the door was, and never met it.
+        assert_eq!(observe(-3.0, -1.0), None);
+        assert_eq!(observe(-1.0, 1.0), None);
+        // The ball stands, and the door passes it.
+        assert_eq!(observe(3.0, 1.0), Some(Mark::Tunnelled));
     }
 }

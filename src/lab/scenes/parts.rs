@@ -35,6 +35,7 @@ impl SceneBody {
             linear_damping: 0.0,
             angular_damping: 0.0,
             group: 0,
+            bullet: false,
             shapes: vec![shape],
         }
     }

@@ -23,7 +23,7 @@ pub mod telling;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Divergence, Order, Quantity, Settings};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
@@ -473,7 +473,8 @@ fn timed_records(
         interleaved.run(1, &all)?;
     }
     let place = |i: usize| running.binary_search(&i).ok();
-    let untimed = Divergence { step: 0, body: 0, quantity: Quantity::Speed, speed: 0.0 };
+    let untimed =
+        Divergence { step: 0, body: 0, quantity: Quantity::Speed, speed: 0.0, criterion: Criterion::Bounds };
     let sample = |interleaved: &Interleaved, i: usize| match rows[i].outcome.errors {
         Ok(_) => place(i).map_or(Err(untimed), |place| interleaved.sample(place)),
         Err(divergence) => Err(divergence),

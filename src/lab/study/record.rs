@@ -5,7 +5,7 @@ use super::interleave::Sample;
 use super::pareto::{self, Point};
 use super::sweep::Swept;
 use crate::engine::params::Budget;
-use crate::engine::world::{Divergence, Order, Quantity};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity};
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::Truth;
@@ -132,6 +132,9 @@ pub struct Failure {
     /// What of it is out of bounds.
     #[serde(default)]
     pub quantity: Quantity,
+    /// What was broken.
+    #[serde(default)]
+    pub criterion: Criterion,
     /// m/s or rad/s; none where it is not a finite number.
     pub speed: Option<f32>,
 }
@@ -139,14 +142,14 @@ pub struct Failure {
 impl From<Divergence> for Failure {
     fn from(d: Divergence) -> Self {
         let speed = Some(d.speed).filter(|s| s.is_finite());
-        Failure { step: d.step, body: d.body, quantity: d.quantity, speed }
+        Failure { step: d.step, body: d.body, quantity: d.quantity, criterion: d.criterion, speed }
     }
 }
 
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let &Failure { step, body, quantity, speed } = self;
-        Divergence { step, body, quantity, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
+        let &Failure { step, body, quantity, criterion, speed } = self;
+        Divergence { step, body, quantity, criterion, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
     }
 }
 
@@ -224,7 +227,13 @@ pub(crate) mod tests {
     }
 
     pub fn failed(lanes: usize) -> Record {
-        let failure = Failure { step: 7, body: 2, quantity: Quantity::Speed, speed: None };
+        let failure = Failure {
+            step: 7,
+            body: 2,
+            quantity: Quantity::Speed,
+            criterion: Criterion::Bounds,
+            speed: None,
+        };
         Record { sample: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
@@ -276,11 +285,24 @@ pub(crate) mod tests {
 
     #[test]
     fn a_failure_without_a_finite_speed_says_so() {
-        let of =
-            |quantity, speed| Failure::from(Divergence { step: 3, body: 1, quantity, speed }).to_string();
-        assert_eq!(of(Quantity::Speed, f32::NAN), "diverged at step 3: body 1 has no finite speed");
-        assert_eq!(of(Quantity::Speed, 2e5), "diverged at step 3: body 1 moves at 2.000e5 m/s");
-        assert_eq!(of(Quantity::Spin, 2e5), "diverged at step 3: body 1 spins at 2.000e5 rad/s");
-        assert_eq!(of(Quantity::Position, f32::NAN), "diverged at step 3: body 1 has no finite position");
+        let of = |quantity, speed, criterion| {
+            Failure::from(Divergence { step: 3, body: 1, quantity, speed, criterion }).to_string()
+        };
+        let bounds = |quantity, speed| of(quantity, speed, Criterion::Bounds);
+        let cure = "; try more substeps, a shorter step or another solver";
+        let expected = [
+            (bounds(Quantity::Speed, f32::NAN), "body 1 has no finite speed"),
+            (bounds(Quantity::Speed, 2e5), "body 1 moves at 2.000e5 m/s, more than 1e5"),
+            (bounds(Quantity::Spin, 2e5), "body 1 spins at 2.000e5 rad/s, more than 1e5"),
+            (bounds(Quantity::Position, f32::NAN), "body 1 has no finite position"),
+            (
+                of(Quantity::Speed, 82.0, Criterion::Energy),
+                "kinetic energy beyond 100 times what start, weight and kinematic bodies give; the fastest, \
+                 body 1 moves at 8.200e1 m/s",
+            ),
+        ];
+        for (text, what) in expected {
+            assert_eq!(text, format!("diverged at step 3: {what}{cure}"));
+        }
     }
 }

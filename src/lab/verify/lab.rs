@@ -37,6 +37,12 @@ impl Lab {
         self
     }
 
+    /// The same laboratory with continuous collision.
+    pub(super) fn continuous(&self) -> Self {
+        let settings = Settings { continuous: true, ..self.settings.clone() };
+        Lab { settings, change: self.change }
+    }
+
     /// The same laboratory, in which every scene is changed before it is built: to see that
     /// wrong physics fails. The truths stay those of the unchanged scenes.
     pub fn changing(self, change: fn(&mut Scene)) -> Self {

@@ -58,6 +58,7 @@
 //!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
 
 mod balance;
+mod bullets;
 mod carried;
 mod changes;
 mod columns;

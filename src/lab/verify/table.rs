@@ -1,8 +1,8 @@
 //! The list of cases.
 
 use super::{
-    Case, balance, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs, paradox,
-    ratios, rocking, slender, sliding, stacks, sudden, together,
+    Case, balance, bullets, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs,
+    paradox, ratios, rocking, slender, sliding, stacks, sudden, together,
 };
 use std::sync::LazyLock;
 
@@ -22,6 +22,7 @@ pub static NEEDS_JOINTS: &[(&str, &str)] = &[
 pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
         balance::CASES,
+        bullets::CASES,
         carried::CASES,
         changes::CASES,
         columns::CASES,

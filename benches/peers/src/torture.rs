@@ -1,0 +1,60 @@
+//! The campaign of `simpulse torture` under the other engines: the same scenes, the same judge.
+
+use crate::engine::{Contender, Engine, Maker};
+use crate::race::build;
+use simpulse::lab::torture::families::FAMILIES;
+use simpulse::lab::torture::{self, Campaign, Case, Outcome, Row, table};
+
+/// Another engine, as the judge sees it.
+struct Judged(Box<dyn Engine>);
+
+impl torture::Engine for Judged {
+    fn step(&mut self) -> Result<(), String> {
+        self.0.step()
+    }
+
+    fn pose(&self, body: usize) -> [[f64; 2]; 2] {
+        let state = self.0.state(body);
+        [state.position.map(f64::from), state.rotation.map(f64::from)]
+    }
+}
+
+/// Every engine at its defaults, and with the other choice of continuous collision.
+fn engines() -> Vec<(&'static str, Contender)> {
+    let own = |maker, continuous| Contender { maker, substeps: 4, hertz: 30.0, recycling: true, continuous };
+    vec![
+        ("Box2D", own(Maker::Box2d, true)),
+        ("Box2D, not continuous", own(Maker::Box2d, false)),
+        ("rapier", own(Maker::Rapier, false)),
+        ("rapier, continuous", own(Maker::Rapier, true)),
+    ]
+}
+
+/// One case in one engine. Errors: what it cannot hold.
+fn one(case: &Case, contender: &Contender) -> Result<Outcome, String> {
+    let contender = Contender { substeps: case.substeps.unwrap_or(contender.substeps), ..*contender };
+    let mut engine = Judged(build(&contender, &case.scene)?);
+    torture::run(case, &mut engine).map_err(|e| e.to_string())
+}
+
+/// Prints the table by family. One thread: Box2D makes its worlds in a list without a lock. Errors: none that an engine
+/// makes; what it refuses is counted.
+pub fn run(seed: u64, scenes: u32) -> Result<(), String> {
+    let (engines, mut rows, mut refused) = (engines(), Vec::new(), 0);
+    for (family, number) in (Campaign { seed, families: FAMILIES.iter().collect(), scenes }).list() {
+        let case = family.case(seed, number);
+        for (name, contender) in &engines {
+            let (family, solver) = (family.name.to_string(), name.to_string());
+            match one(&case, contender) {
+                Ok(outcome) => rows.push(Row { seed, family, number, solver, outcome }),
+                Err(message) => {
+                    eprintln!("{}, {name}: {message}", case.scene.name);
+                    refused += 1;
+                }
+            }
+        }
+    }
+    let names: Vec<String> = engines.iter().map(|(name, _)| name.to_string()).collect();
+    println!("{}{refused} runs refused", table::text(&table::lines(&rows, &names)));
+    Ok(())
+}

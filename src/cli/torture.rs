@@ -1,0 +1,237 @@
+//! `simpulse torture`: scenes at random, by family and seed, and what no solver may do in them.
+
+use super::output::{note, print, print_json, value};
+use super::progress::Bar;
+use super::values::Solvers;
+use crate::engine::solvers::{DEFAULT, Variant, find};
+use crate::engine::world::Settings;
+use crate::lab::error::Error;
+use crate::lab::files::Pending;
+use crate::lab::report::environment::Environment;
+use crate::lab::torture::families::{FAMILIES, Family};
+use crate::lab::torture::minimise::minimise;
+use crate::lab::torture::table::{lines, text};
+use crate::lab::torture::{Campaign, Row, family, run_solver};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde_json::json;
+use std::collections::HashSet;
+use std::fs::{File, OpenOptions, create_dir_all, read_to_string};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Draw scenes at random and count what no solver may do in them
+///
+/// Ten families of scenes that are hard in ten ways: drops, stacks of large mass ratios, fast bodies, mixed
+/// surfaces, pistons and stirrers, overlaps, extreme steps, centimetres beside a hundred metres, plates and
+/// needles, far from the origin. Every scene runs under every solver, on all cores; poses alone are judged,
+/// in double precision. A scene fails if it diverges, makes energy, flings a body, lets one escape from its
+/// walls, ends with bodies inside each other or does not come to rest where it should. The same seed draws
+/// the same scenes.
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+Examples:
+  simpulse torture                                     a thousand scenes
+  simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; the same again goes on where it stopped
+  simpulse torture --families driven,fast --solvers soft_step,box2d,rapier --keep failed/
+  simpulse torture --only driven:17 --keep failed/     one scene again, and its minimised file")]
+pub struct TortureArgs {
+    /// Scenes, over all families
+    #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub scenes: u32,
+    /// Random seed: everything is drawn from it
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Families of scenes [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", value_parser = family_value())]
+    pub families: Vec<&'static Family>,
+    /// One scene, as FAMILY:NUMBER
+    #[arg(long, value_name = "FAMILY:NUMBER", conflicts_with_all = ["scenes", "families"])]
+    pub only: Option<String>,
+    /// Solvers; the default solver where none are given
+    #[command(flatten)]
+    pub solvers: Solvers,
+    /// Stop fast bodies at what they would pass: continuous collision [default: the solver's]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub continuous: Option<bool>,
+    /// Write every scene that fails, minimised, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
+    /// Write a line of JSON for every scene and solver; scenes that are there already are not run again
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
+    /// Exit with code 1 where a solver fails more scenes than this
+    #[arg(long, value_name = "N")]
+    pub allow: Option<u32>,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl TortureArgs {
+    fn settings(&self, solver: &'static Variant) -> Settings {
+        let own = Settings::new(solver);
+        Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own }
+    }
+
+    /// What a solver is called in rows: with what is not its default.
+    fn name(&self, solver: &Variant) -> String {
+        match self.continuous {
+            Some(true) if !solver.continuous => format!("{}, continuous", solver.name),
+            Some(false) if solver.continuous => format!("{}, not continuous", solver.name),
+            _ => solver.name.to_string(),
+        }
+    }
+}
+
+fn family_value() -> impl TypedValueParser<Value = &'static Family> {
+    PossibleValuesParser::new(FAMILIES.iter().map(|f| f.name)).try_map(|name| family(&name))
+}
+
+/// A scene that waits for its turn.
+type Job = (&'static Family, u32, &'static Variant);
+
+/// Runs the command.
+pub fn run(args: &TortureArgs) -> Result<ExitCode, Error> {
+    let solvers = match args.solvers.solvers.is_empty() {
+        true => vec![find(DEFAULT)?],
+        false => args.solvers.chosen(),
+    };
+    let names: Vec<String> = solvers.iter().map(|v| args.name(v)).collect();
+    if let Some(folder) = &args.keep {
+        create_dir_all(folder).map_err(Error::io(folder))?;
+    }
+    let scenes = chosen(args)?;
+    let wanted: HashSet<(&str, u32)> = scenes.iter().map(|(f, n)| (f.name, *n)).collect();
+    let (mut rows, log) = match &args.log {
+        Some(path) => opened(path)?,
+        None => (Vec::new(), None),
+    };
+    rows.retain(|row| {
+        row.seed == args.seed
+            && names.contains(&row.solver)
+            && wanted.contains(&(row.family.as_str(), row.number))
+    });
+    let done: HashSet<(String, u32, String)> =
+        rows.iter().map(|r| (r.family.clone(), r.number, r.solver.clone())).collect();
+    let jobs: Vec<Job> = scenes
+        .iter()
+        .flat_map(|&(family, number)| solvers.iter().map(move |&solver| (family, number, solver)))
+        .filter(|(family, number, solver)| {
+            !done.contains(&(family.name.to_string(), *number, args.name(solver)))
+        })
+        .collect();
+    if jobs.len() < scenes.len() * solvers.len() {
+        note(&format!("{} of {} runs are in the log\n", rows.len(), scenes.len() * solvers.len()));
+    }
+    rows.extend(run_all(args, &jobs, log)?);
+    let lines = lines(&rows, &names);
+    let worst = lines.iter().filter(|l| l.family == "all").map(|l| l.failed).max().unwrap_or(0);
+    if args.json {
+        let rows = if args.only.is_some() { Some(value(&rows)?) } else { None };
+        let environment = Environment::current();
+        let found =
+            json!({ "environment": environment, "seed": args.seed, "lines": value(&lines)?, "rows": rows });
+        print_json(&found)?;
+    } else {
+        print(&text(&lines))?;
+    }
+    Ok(match args.allow {
+        Some(allowed) if worst > allowed => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
+    })
+}
+
+fn chosen(args: &TortureArgs) -> Result<Vec<(&'static Family, u32)>, Error> {
+    let Some(only) = &args.only else {
+        let all = || FAMILIES.iter().collect();
+        let families = if args.families.is_empty() { all() } else { args.families.clone() };
+        return Ok(Campaign { seed: args.seed, families, scenes: args.scenes }.list());
+    };
+    let invalid = || Error::invalid("--only", format!("'{only}' is not FAMILY:NUMBER, as 'drops:17'"));
+    let (name, number) = only.split_once(':').ok_or_else(invalid)?;
+    Ok(vec![(family(name)?, number.parse().map_err(|_| invalid())?)])
+}
+
+/// The rows of a log, and the log to go on with. A last line that was cut off is left out.
+fn opened(path: &Path) -> Result<(Vec<Row>, Option<File>), Error> {
+    let text = match path.exists() {
+        true => read_to_string(path).map_err(Error::io(path))?,
+        false => String::new(),
+    };
+    let mut rows = Vec::new();
+    let whole = text.rfind('\n').map_or(0, |end| end + 1);
+    for (k, line) in text[..whole].lines().enumerate() {
+        let row = serde_json::from_str(line).map_err(|e| Error::Format {
+            path: path.to_path_buf(),
+            message: format!("line {} is not of a campaign: {e}", k + 1),
+        })?;
+        rows.push(row);
+    }
+    let file = OpenOptions::new().create(true).append(true).open(path).map_err(Error::io(path))?;
+    file.set_len(whole as u64).map_err(Error::io(path))?;
+    Ok((rows, Some(file)))
+}
+
+/// Runs every job, on as many threads as there are cores; rows in the order of the jobs.
+fn run_all(args: &TortureArgs, jobs: &[Job], log: Option<File>) -> Result<Vec<Row>, Error> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = args.threads.map_or(cores, usize::from).min(jobs.len()).max(1);
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let (found, log, bar) = (Mutex::new(Vec::new()), Mutex::new(log), Bar::new());
+    let work = || -> Result<(), Error> {
+        loop {
+            let k = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&(family, number, solver)) = jobs.get(k) else { return Ok(()) };
+            let row = one(args, family, number, solver)?;
+            if let Some(log) = lock(&log).as_mut() {
+                let line = serde_json::to_string(&row).map_err(|e| Error::invalid("--log", e.to_string()))?;
+                writeln!(log, "{line}").map_err(Error::io(args.log.clone().unwrap_or_default()))?;
+            }
+            lock(&found).push((k, row));
+            bar.step(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len(), "runs");
+        }
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let joined = workers.into_iter().map(|w| w.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
+        joined.collect::<Result<Vec<()>, Error>>()
+    })?;
+    drop(bar);
+    let mut rows = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    rows.sort_by_key(|(k, _)| *k);
+    Ok(rows.into_iter().map(|(_, row)| row).collect())
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// One scene under one solver; kept, minimised, if it fails and a folder is given.
+fn one(
+    args: &TortureArgs,
+    family: &'static Family,
+    number: u32,
+    solver: &'static Variant,
+) -> Result<Row, Error> {
+    let case = family.case(args.seed, number);
+    let settings = args.settings(solver);
+    let outcome = run_solver(&case, &settings)?;
+    if let (Some(folder), Some(fault)) = (&args.keep, outcome.faults.first()) {
+        let mut least = minimise(&case, fault.verdict, |case| run_solver(case, &settings))?;
+        let (verdict, name) = (fault.verdict.word(), solver.name);
+        least.scene.name = format!("{}, {verdict} under {name}", least.scene.name);
+        let path = folder.join(format!("{}_{number}_{}_{name}_{verdict}.json", family.name, args.seed));
+        let mut file = Pending::new(&path)?;
+        file.write_all(least.scene.to_json().as_bytes()).map_err(Error::io(&path))?;
+        file.commit()?;
+    }
+    let (family, solver) = (family.name.to_string(), args.name(solver));
+    Ok(Row { seed: args.seed, family, number, solver, outcome })
+}

@@ -1,0 +1,294 @@
+//! Looks at a run from outside, at its poses alone.
+
+use super::{Case, Engine, Fault, Outcome, Room, Verdict};
+use crate::engine::bodies::BodyKind;
+use crate::engine::solvers::{DEFAULT, find};
+use crate::engine::world::{Settings, World};
+use crate::lab::error::Error;
+use crate::lab::metrics::overlaps::Overlaps;
+use crate::lab::metrics::state::BodyState;
+use glam::DVec2;
+
+/// Energy, in what was lent, from which on some came from nowhere. The bound is generous where nothing is driven, see
+/// [`Ledger`], and what discretisation adds to a fall in long steps is less than a third.
+pub const ENERGY: f64 = 1.5;
+
+/// Speed, in the fastest that free fall, start and kinematic bodies give, from which on a body was flung. A lever or a
+/// heavy body that hits a light one at most doubles a speed, twice in a row.
+pub const FLUNG: f64 = 4.0;
+
+/// Overlap, in half the width of the thinner shape, from which on it is sunk.
+pub const SUNK: f64 = 0.5;
+
+/// Speed at rest, in √(g ℓ) with ℓ the mean reach of the bodies: 9 mm/s for bodies of 0.3 m.
+pub const RESTLESS: f64 = 0.005;
+
+/// Path lengths are summed over every so many steps: what rounds at 10 km is no path.
+const STRIDE: u32 = 6;
+
+/// What the bodies of a scene may have of energy.
+///
+/// With heights over the floor and V the fastest point of a kinematic body,
+///
+/// ```text
+/// lent = Σ ½ m v₀² + ½ I ω₀² + m g y₀  +  [driven] Σ ½ m (2V)² + m g H  +  [overlapping at the start] Σ m g H
+/// ```
+///
+/// What a kinematic body hits without loss leaves at 2V, and what it or an overlap pushes can be lifted to the ceiling,
+/// H over the floor.
+///
+/// Energy is read from poses. A body's velocity is its way over a step; of two steps in a row the slower counts, so that
+/// a pose that is corrected without a velocity is no motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ledger {
+    /// J
+    pub lent: f64,
+    /// The fastest that anything should be (m/s).
+    pub speed: f64,
+}
+
+/// Watches one run.
+pub struct Judge<'c> {
+    case: &'c Case,
+    /// Of the case's scene; never stepped, holds masses and shapes, and poses when overlaps are looked for.
+    mirror: World,
+    bodies: Vec<BodyState>,
+    ledger: Ledger,
+    reach: f64,
+    step: u32,
+    /// Speeds (m/s) and energies of motion (J) over the step before.
+    before: Vec<[f64; 2]>,
+    paths: Vec<(DVec2, f64)>,
+    outcome: Outcome,
+}
+
+impl<'c> Judge<'c> {
+    /// Before the first step. Errors: a scene that is not valid.
+    pub fn new(case: &'c Case) -> Result<Self, Error> {
+        let mirror = case.scene.build(Settings::new(find(DEFAULT)?))?;
+        let gravity = DVec2::from(case.scene.gravity);
+        let bodies: Vec<_> =
+            (0..mirror.bodies.len()).map(|i| BodyState::of(&mirror.bodies, i, gravity)).collect();
+        let reaches = reaches(&mirror);
+        let dynamic = |i: &usize| mirror.bodies.is_dynamic(*i);
+        let count = (0..bodies.len()).filter(dynamic).count().max(1);
+        let reach = (0..bodies.len()).filter(dynamic).map(|i| reaches[i]).sum::<f64>() / count as f64;
+        let ledger = ledger(case, &mirror, &bodies, &reaches);
+        let paths = bodies.iter().map(|b| (b.position, 0.0)).collect();
+        let before = vec![[0.0; 2]; bodies.len()];
+        Ok(Judge { case, mirror, bodies, ledger, reach, step: 0, before, paths, outcome: Outcome::default() })
+    }
+
+    /// Looks at one more step; whether the run is worth going on with.
+    pub fn observe(&mut self, engine: &dyn Engine, is_well: bool) -> bool {
+        self.step += 1;
+        if !is_well {
+            self.fault(Verdict::Diverged, None);
+            return false;
+        }
+        let dt = self.case.scene.dt;
+        let mut total = 0.0;
+        for i in 0..self.bodies.len() {
+            if !self.mirror.bodies.is_dynamic(i) {
+                continue;
+            }
+            let [position, rotation] = engine.pose(i).map(DVec2::from);
+            if !position.is_finite() || !rotation.is_finite() {
+                self.fault(Verdict::Diverged, Some(i));
+                return false;
+            }
+            let body = &mut self.bodies[i];
+            let was = *body;
+            (body.position, body.rotation) = (position, rotation);
+            let velocity = (position - was.position) / dt;
+            let spin = body.turn_since(&was) / dt;
+            let moving = BodyState { velocity, angular_velocity: spin, ..*body };
+            let now = [velocity.length(), moving.kinetic_energy()];
+            let [speed, kinetic] = [0, 1].map(|k| now[k].min(self.before[i][k]));
+            self.before[i] = now;
+            total += kinetic + height_energy(&self.case.room, body, 0.5 * (position + was.position));
+            if speed > FLUNG * self.ledger.speed {
+                self.fault(Verdict::Flung, Some(i));
+            }
+            let Room { low, high, wall } = self.case.room;
+            let gone =
+                (0..2).any(|k| position[k] < low[k] - 0.5 * wall || position[k] > high[k] + 0.5 * wall);
+            if gone {
+                self.fault(Verdict::Escaped, Some(i));
+            }
+            let last_second = f64::from(self.case.scene.steps - self.step) * dt < 1.0;
+            if self.step.is_multiple_of(STRIDE) {
+                let (place, path) = &mut self.paths[i];
+                *path += if last_second { place.distance(position) } else { 0.0 };
+                *place = position;
+            }
+        }
+        // Nothing can be lent to a scene without gravity, motion and drive.
+        if self.ledger.lent > 0.0 {
+            self.outcome.energy = self.outcome.energy.max(total / self.ledger.lent);
+        }
+        if self.outcome.energy > ENERGY {
+            self.fault(Verdict::Energy, None);
+        }
+        true
+    }
+
+    /// What was found.
+    pub fn finish(mut self) -> Outcome {
+        if self.outcome.has(Verdict::Diverged) {
+            return self.outcome;
+        }
+        let seconds = f64::min(1.0, f64::from(self.step) * self.case.scene.dt);
+        self.outcome.rest_speed = self.paths.iter().map(|p| p.1).fold(0.0, f64::max) / seconds;
+        let gravity = DVec2::from(self.case.scene.gravity).length();
+        if self.case.rests && self.outcome.rest_speed > RESTLESS * (gravity * self.reach).sqrt() {
+            self.fault(Verdict::Restless, None);
+        }
+        // What a piston presses has nowhere to go.
+        let is_driven = self.bodies.iter().any(|b| b.kind == BodyKind::Kinematic);
+        let (depth, body) = self.deepest();
+        self.outcome.depth = depth;
+        if depth > SUNK && !is_driven {
+            self.fault(Verdict::Sunk, Some(body));
+        }
+        self.outcome.faults.sort_by_key(|f| f.verdict);
+        self.outcome
+    }
+
+    /// The deepest overlap, in half the width of the thinner shape, and the second body of it.
+    fn deepest(&mut self) -> (f64, usize) {
+        let bodies = &mut self.mirror.bodies;
+        for (i, body) in self.bodies.iter().enumerate() {
+            let high = body.position.as_vec2();
+            let low = (body.position - high.as_dvec2()).as_vec2();
+            [bodies.position_x[i], bodies.position_y[i]] = high.to_array();
+            [bodies.position_x_lo[i], bodies.position_y_lo[i]] = low.to_array();
+            [bodies.rotation_cos[i], bodies.rotation_sin[i]] = body.rotation.as_vec2().to_array();
+        }
+        let (mut deepest, world) = ((0.0, 0), &self.mirror);
+        Overlaps::default().find(world, |pair, manifold| {
+            let thin = |s: u32| f64::from(world.shapes[s as usize].min_half_extent());
+            // A line has no width.
+            let half = pair.map(thin).into_iter().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
+            let depth = manifold.points().iter().map(|p| f64::from(-p.separation)).fold(0.0, f64::max);
+            if depth / half > deepest.0 {
+                deepest = (depth / half, world.shape_body[pair[1] as usize] as usize);
+            }
+        });
+        deepest
+    }
+
+    fn fault(&mut self, verdict: Verdict, body: Option<usize>) {
+        if !self.outcome.has(verdict) {
+            self.outcome.faults.push(Fault { verdict, step: self.step, body });
+        }
+    }
+}
+
+/// m g y over the floor (J); the floor is the corner of the room that is lowest along gravity.
+fn height_energy(room: &Room, body: &BodyState, position: DVec2) -> f64 {
+    let corner = |k: usize| if body.force[k] < 0.0 { room.low[k] } else { room.high[k] };
+    -body.force.dot(position - DVec2::new(corner(0), corner(1)))
+}
+
+/// Farthest point of each body from its centre of mass (m).
+fn reaches(world: &World) -> Vec<f64> {
+    let mut reaches = vec![0.0_f64; world.bodies.len()];
+    for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
+        let radius = f64::from(shape.radius());
+        shape.for_each_vertex(|v| {
+            let reach = &mut reaches[body as usize];
+            *reach = reach.max(f64::from(v.length()) + radius);
+        });
+    }
+    reaches
+}
+
+/// See [`Ledger`].
+fn ledger(case: &Case, mirror: &World, bodies: &[BodyState], reaches: &[f64]) -> Ledger {
+    let room = &case.room;
+    let height = room.high[1] - room.low[1];
+    let driven = |(b, reach): (&BodyState, &f64)| match b.kind {
+        BodyKind::Kinematic => b.velocity.length() + b.angular_velocity.abs() * reach,
+        _ => 0.0,
+    };
+    let drive = bodies.iter().zip(reaches).map(driven).fold(0.0, f64::max);
+    let mut overlap = false;
+    Overlaps::default().find(mirror, |_, manifold| {
+        overlap |= manifold.points().iter().any(|p| f64::from(p.separation) < -1e-3 * height);
+    });
+    let (mut lent, mut fastest) = (0.0, 0.0_f64);
+    for body in bodies.iter().filter(|b| b.kind == BodyKind::Dynamic) {
+        let lift = body.force.length() * height;
+        lent += body.kinetic_energy() + height_energy(room, body, body.position);
+        lent += if drive > 0.0 { 0.5 * body.mass() * (2.0 * drive).powi(2) + lift } else { 0.0 };
+        lent += if overlap { lift } else { 0.0 };
+        fastest = fastest.max(body.velocity.length());
+    }
+    let fall = 2.0 * DVec2::from(case.scene.gravity).length() * height;
+    Ledger { lent, speed: (fastest * fastest + fall).sqrt() + 2.0 * drive }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+    use crate::lab::torture::run;
+
+    /// Body 4 goes where it is told.
+    struct Led<F: Fn(u32) -> [f64; 2]>(u32, F);
+
+    impl<F: Fn(u32) -> [f64; 2]> Engine for Led<F> {
+        fn step(&mut self) -> Result<(), String> {
+            self.0 += 1;
+            Ok(())
+        }
+
+        fn pose(&self, _: usize) -> [[f64; 2]; 2] {
+            [(self.1)(self.0), [1.0, 0.0]]
+        }
+    }
+
+    /// A disc of 0.5 m that rests on the floor of a room of 8 × 4 m with walls of 1 m.
+    fn judged(way: impl Fn(u32) -> [f64; 2]) -> Outcome {
+        let room = Room::new(0.0, 4.0, 4.0, 1.0);
+        let mut bodies = room.walls();
+        bodies.push(SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5)));
+        let scene = Scene::new("x", bodies).steps(120);
+        let case = Case { family: "drops", number: 0, scene, room, rests: true, substeps: None };
+        run(&case, &mut Led(0, way)).unwrap()
+    }
+
+    fn verdicts(way: impl Fn(u32) -> [f64; 2]) -> Vec<Verdict> {
+        judged(way).faults.iter().map(|f| f.verdict).collect()
+    }
+
+    #[test]
+    fn what_rests_is_well_and_what_does_not_is_named() {
+        assert_eq!(verdicts(|_| [0.0, 0.5]), []);
+        // √(g ℓ) = 2.24 m/s, so 11 mm/s are allowed.
+        assert_eq!(verdicts(|k| [0.010 / 60.0 * f64::from(k), 0.5]), []);
+        assert_eq!(verdicts(|k| [0.013 / 60.0 * f64::from(k), 0.5]), [Verdict::Restless]);
+        assert_eq!(verdicts(|_| [0.0, 0.24]), [Verdict::Sunk]);
+        assert_eq!(verdicts(|_| [0.0, 0.26]), []);
+        assert_eq!(verdicts(|_| [f64::NAN, 0.5]), [Verdict::Diverged]);
+        // In the middle of the wall and beyond.
+        assert!(!verdicts(|_| [4.49, 0.5]).contains(&Verdict::Escaped));
+        assert!(verdicts(|_| [4.51, 0.5]).contains(&Verdict::Escaped));
+    }
+
+    #[test]
+    fn energy_comes_from_two_steps_of_motion_and_not_from_one_jump() {
+        // m g y = 0.5 × 10 × m: lent are 5 J/kg, and 7.5 are too much.
+        let jump = |k: u32| [if k < 60 { 0.0 } else { 1.0 }, 0.5];
+        let found = judged(jump);
+        assert!(found.faults.is_empty() && (found.energy - 1.0).abs() < 1e-6, "{found:?}");
+        let slide = |speed: f64| move |k: u32| [speed / 60.0 * f64::from(k.min(20)), 0.5];
+        // ½ v² = 2.5 J/kg at 2.236 m/s.
+        assert_eq!(verdicts(slide(2.2)), []);
+        assert_eq!(verdicts(slide(2.3)), [Verdict::Energy]);
+        // √(2 g 4 m) = 8.94 m/s; four times that is too fast for one step after another.
+        assert!(verdicts(|k| [40.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&Verdict::Flung));
+        assert!(!verdicts(|k| [35.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&Verdict::Flung));
+    }
+}

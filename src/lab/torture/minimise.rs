@@ -1,0 +1,89 @@
+//! The smallest scene that still fails.
+
+use super::{Case, Outcome, Verdict};
+use crate::engine::bodies::BodyKind;
+use crate::lab::error::Error;
+
+/// Runs that a minimisation may take.
+const MOST_RUNS: u32 = 150;
+
+/// Steps that stay after the one at which a fault was seen.
+const AFTER: u32 = 10;
+
+/// Leaves bodies out, halves of them first and single ones last, and steps after the fault, as long as `verdict` stands
+/// (delta debugging). `run` judges a case. Errors: those of `run`.
+///
+/// Source: Zeller, Hildebrandt 2002 (delta debugging).
+pub fn minimise(
+    case: &Case,
+    verdict: Verdict,
+    mut run: impl FnMut(&Case) -> Result<Outcome, Error>,
+) -> Result<Case, Error> {
+    let mut runs = 0;
+    let mut fails = |case: &Case| -> Result<Option<u32>, Error> {
+        runs += 1;
+        if runs > MOST_RUNS {
+            return Ok(None);
+        }
+        let outcome = run(case)?;
+        Ok(outcome.faults.iter().find(|f| f.verdict == verdict).map(|f| f.step))
+    };
+    let mut best = case.clone();
+    // What is judged at the end needs its time.
+    let shortens = !matches!(verdict, Verdict::Sunk | Verdict::Restless);
+    if let Some(step) = fails(&best)?.filter(|_| shortens) {
+        best.scene.steps = best.scene.steps.min(step + AFTER);
+    }
+    let mut size = removable(&best).len().div_ceil(2);
+    while size > 0 {
+        let mut from = 0;
+        loop {
+            let bodies = removable(&best);
+            // A scene needs a body that moves.
+            if from >= bodies.len() || bodies.len() <= 1 {
+                break;
+            }
+            let gone = &bodies[from..(from + size).min(bodies.len())];
+            let mut fewer = best.clone();
+            let mut number = 0..;
+            fewer.scene.bodies.retain(|_| number.next().is_some_and(|i: usize| !gone.contains(&i)));
+            if gone.len() < bodies.len() && fails(&fewer)?.is_some() {
+                best = fewer;
+            } else {
+                from += size;
+            }
+        }
+        size = if size == 1 { 0 } else { size.div_ceil(2) };
+    }
+    Ok(best)
+}
+
+/// Bodies that may be left out: walls are the room.
+fn removable(case: &Case) -> Vec<usize> {
+    let bodies = case.scene.bodies.iter().enumerate();
+    bodies.filter(|(_, b)| b.kind != BodyKind::Static).map(|(i, _)| i).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::torture::{Fault, families::FAMILIES};
+
+    #[test]
+    fn two_culprits_remain_of_many_bodies() {
+        let case = FAMILIES[0].case(1, 4);
+        let bodies = &case.scene.bodies;
+        assert!(bodies.len() > 12, "{}", bodies.len());
+        let culprits = [bodies[5].clone(), bodies[bodies.len() - 1].clone()];
+        let run = |case: &Case| {
+            let mut outcome = Outcome::default();
+            if culprits.iter().all(|c| case.scene.bodies.contains(c)) {
+                outcome.faults.push(Fault { verdict: Verdict::Flung, step: 30, body: None });
+            }
+            Ok(outcome)
+        };
+        let least = minimise(&case, Verdict::Flung, run).unwrap();
+        assert_eq!(least.scene.bodies[4..], culprits);
+        assert_eq!(least.scene.steps, 40);
+    }
+}

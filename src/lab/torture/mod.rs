@@ -1,0 +1,264 @@
+//! A campaign: scenes drawn at random from families, and what no solver may do in any of them.
+//!
+//! A solver is tuned on scenes that somebody thought of. Here [`families`] draw others, by seed; each runs
+//! under every solver, and a [`judge`] looks on from outside, in double precision, at poses alone: whatever
+//! moves the bodies, this crate's solvers or another engine, is an [`Engine`] to it. What fails is
+//! [minimised](minimise) into a scene file.
+//!
+//! | verdict | what is forbidden |
+//! |---|---|
+//! | diverged | a speed or a place out of all bounds |
+//! | energy | more energy than gravity, kinematic bodies and the start lend, see [`judge::Ledger`] |
+//! | flung | one body much faster than anything in the scene could make it |
+//! | escaped | a body beyond the middle of the walls that close the scene |
+//! | sunk | at the end, two bodies past the middle of the thinner one |
+//! | restless | still in motion when nothing has driven it for seconds |
+//!
+//! A step that takes longer than the time that it simulates is counted as late: it depends on the machine,
+//! so it is told and fails nothing.
+
+pub mod families;
+pub mod judge;
+pub mod minimise;
+pub mod shapes;
+pub mod table;
+
+use crate::engine::solvers::Variant;
+use crate::engine::world::{Settings, World};
+use crate::lab::error::Error;
+use crate::lab::scenes::Scene;
+use families::{FAMILIES, Family};
+use judge::Judge;
+use std::time::Instant;
+
+/// A scene with what is demanded of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// [`Family::name`].
+    pub family: &'static str,
+    /// Which of its scenes, from 0.
+    pub number: u32,
+    /// What is simulated.
+    pub scene: Scene,
+    /// What closes it.
+    pub room: Room,
+    /// Whether it should be at rest in its last second.
+    pub rests: bool,
+    /// Substeps in the place of the solver's own, for solvers that take several.
+    pub substeps: Option<u32>,
+}
+
+/// The inside of four static walls (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Room {
+    /// Lower left corner.
+    pub low: [f64; 2],
+    /// Upper right corner.
+    pub high: [f64; 2],
+    /// Thickness of the walls.
+    pub wall: f64,
+}
+
+/// What moves the bodies of a scene.
+pub trait Engine {
+    /// Advances by the scene's step. Errors: what is wrong, where the engine itself says that it diverged.
+    fn step(&mut self) -> Result<(), String>;
+    /// Centre of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
+    fn pose(&self, body: usize) -> [[f64; 2]; 2];
+}
+
+/// What no solver may do, in the order in which a run is named after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// A speed or a place out of all bounds.
+    Diverged,
+    /// More energy than was lent.
+    Energy,
+    /// One body is much faster than anything could make it.
+    Flung,
+    /// A body left the room.
+    Escaped,
+    /// Two bodies are past the middle of the thinner one at the end.
+    Sunk,
+    /// Still in motion at the end.
+    Restless,
+}
+
+impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Verdict; 6] = [
+        Verdict::Diverged,
+        Verdict::Energy,
+        Verdict::Flung,
+        Verdict::Escaped,
+        Verdict::Sunk,
+        Verdict::Restless,
+    ];
+
+    /// For tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Diverged => "diverged",
+            Verdict::Energy => "energy",
+            Verdict::Flung => "flung",
+            Verdict::Escaped => "escaped",
+            Verdict::Sunk => "sunk",
+            Verdict::Restless => "restless",
+        }
+    }
+}
+
+/// A verdict with where and how much.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Fault {
+    /// What happened.
+    pub verdict: Verdict,
+    /// First step at which it was seen, from 1.
+    pub step: u32,
+    /// The body, where it is about one.
+    pub body: Option<usize>,
+}
+
+/// What became of a scene under a solver.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Outcome {
+    /// The first of each verdict, in their order.
+    pub faults: Vec<Fault>,
+    /// Most energy ever, in what was lent (1).
+    pub energy: f64,
+    /// Deepest overlap at the end, in half the width of the thinner shape (1).
+    pub depth: f64,
+    /// How fast the fastest body moves in the last second, along its path (m/s).
+    pub rest_speed: f64,
+    /// Longest step (ms). Of the machine, not of the solver's result.
+    pub slowest_ms: f64,
+    /// Steps that took longer than the time that they simulate.
+    pub late: u32,
+}
+
+impl Outcome {
+    /// Whether anything forbidden happened.
+    pub fn fails(&self) -> bool {
+        !self.faults.is_empty()
+    }
+
+    /// Whether this did.
+    pub fn has(&self, verdict: Verdict) -> bool {
+        self.faults.iter().any(|f| f.verdict == verdict)
+    }
+}
+
+/// One scene under one solver.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Row {
+    /// Of the campaign.
+    pub seed: u64,
+    /// [`Family::name`].
+    pub family: String,
+    /// Which of its scenes.
+    pub number: u32,
+    /// Who ran it, with what was chosen beside its defaults.
+    pub solver: String,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// Which scenes of a campaign.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// Everything is drawn from it.
+    pub seed: u64,
+    /// By their order in [`FAMILIES`].
+    pub families: Vec<&'static Family>,
+    /// Over all families.
+    pub scenes: u32,
+}
+
+impl Campaign {
+    /// Family and number of each scene, families in turn.
+    pub fn list(&self) -> Vec<(&'static Family, u32)> {
+        let count = self.families.len().max(1) as u32;
+        let nth = |i: u32| self.families.get((i % count) as usize).map(|f| (*f, i / count));
+        (0..self.scenes).filter_map(nth).collect()
+    }
+}
+
+/// The family of this name. Errors: there is none.
+pub fn family(name: &str) -> Result<&'static Family, Error> {
+    FAMILIES
+        .iter()
+        .find(|f| f.name == name)
+        .ok_or_else(|| Error::unknown("family", name, FAMILIES.iter().map(|f| f.name)))
+}
+
+/// Runs a case from start to end, or to where it diverges. Errors: a scene that is not valid.
+pub fn run(case: &Case, engine: &mut dyn Engine) -> Result<Outcome, Error> {
+    let mut judge = Judge::new(case)?;
+    let (budget, mut slowest, mut late) = (1e3 * case.scene.dt, 0.0_f64, 0);
+    for _ in 0..case.scene.steps {
+        let start = Instant::now();
+        let stepped = engine.step();
+        let ms = 1e3 * start.elapsed().as_secs_f64();
+        slowest = slowest.max(ms);
+        late += u32::from(ms > budget);
+        if !judge.observe(engine, stepped.is_ok()) {
+            break;
+        }
+    }
+    Ok(Outcome { slowest_ms: slowest, late, ..judge.finish() })
+}
+
+/// Runs a case under one of this crate's solvers. Errors: a scene that is not valid.
+pub fn run_solver(case: &Case, settings: &Settings) -> Result<Outcome, Error> {
+    let mut settings = settings.clone();
+    settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
+    run(case, &mut Own(case.scene.build(settings)?))
+}
+
+/// Substeps that a solver takes in a case; one that takes a single one by design keeps it.
+pub fn substeps(case: &Case, solver: &Variant, own: u32) -> u32 {
+    case.substeps.filter(|_| solver.budget.substeps > 1).unwrap_or(own)
+}
+
+/// A world of this crate.
+struct Own(World);
+
+impl Engine for Own {
+    fn step(&mut self) -> Result<(), String> {
+        self.0.step().map_err(|d| d.to_string())
+    }
+
+    fn pose(&self, i: usize) -> [[f64; 2]; 2] {
+        let rotation = self.0.bodies.pose(i).rotation.as_dvec2();
+        [self.0.bodies.center(i), rotation.to_array()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::find;
+
+    #[test]
+    fn families_take_turns_and_numbers_grow() {
+        let families = vec![&FAMILIES[0], &FAMILIES[3]];
+        let list = Campaign { seed: 1, families, scenes: 5 }.list();
+        let named: Vec<_> = list.iter().map(|(f, n)| (f.name, *n)).collect();
+        let [a, b] = [FAMILIES[0].name, FAMILIES[3].name];
+        assert_eq!(named, [(a, 0), (b, 0), (a, 1), (b, 1), (a, 2)]);
+        assert!(family("dropz").unwrap_err().to_string().contains("drops"));
+    }
+
+    #[test]
+    fn a_run_is_the_same_twice_and_its_rows_survive_a_file() {
+        let case = FAMILIES[0].case(7, 3);
+        let settings = Settings::new(find("soft_step").unwrap());
+        let still = |o: Outcome| Outcome { slowest_ms: 0.0, late: 0, ..o };
+        let [a, b] = [0, 1].map(|_| still(run_solver(&case, &settings).unwrap()));
+        assert_eq!(a, b);
+        let row = Row { seed: 7, family: "drops".into(), number: 3, solver: "soft_step".into(), outcome: a };
+        let text = serde_json::to_string(&row).unwrap();
+        assert_eq!(serde_json::from_str::<Row>(&text).unwrap(), row);
+    }
+}

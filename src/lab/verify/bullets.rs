@@ -1,0 +1,61 @@
+//! A28: bodies that are faster than they are wide, with continuous collision.
+
+use super::Required::Yes;
+use super::lab::*;
+use super::{Case, Failure, Finding, Lab};
+use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+
+pub(super) static CASES: &[Case] = &[
+    Case::new(
+        "A28.wall",
+        "how far bodies of 5 cm at 300 m/s get into a wall of 1 cm, worst of shapes and of times within a step",
+        "m",
+        "slop: a contact, and not the other side",
+        wall,
+        Yes("with continuous collision a step ends where a body would pass a surface"),
+    ),
+    Case::new(
+        "A28.plate",
+        "how far a bullet of 5 cm at 300 m/s gets into a dynamic plate of 1 cm that is a thousand times as heavy",
+        "m",
+        "slop, as above",
+        plate,
+        Yes("bullets end their step at dynamic bodies, too"),
+    ),
+];
+
+/// Metres per step: 300 m/s at 60 Hz.
+const WAY: f64 = 5.0;
+
+/// Deepest that the far side of what is thrown from the left gets beyond x = 0, where the target's near side is.
+fn thrown(lab: &Lab, target: &SceneBody, bullet: bool) -> Result<f64, Failure> {
+    let lab = lab.continuous();
+    let shapes =
+        [SceneShape::disc(0.05), SceneShape::rectangle(0.05, 0.05), SceneShape::rectangle(0.05, 0.02)];
+    let mut deepest = f64::NEG_INFINITY;
+    for (shape, k) in shapes.iter().flat_map(|shape| (0..10).map(move |k| (shape, k))) {
+        let start = -12.0 - WAY * f64::from(k) / 10.0;
+        let thrown = SceneBody { bullet, ..SceneBody::dynamic([start, 0.0], shape.clone()) };
+        let bodies = vec![target.clone(), thrown.moving([60.0 * WAY, 0.0], 0.0)];
+        let scene = Scene::new("bullet", bodies).weightless();
+        lab.run(scene, 0.5, |world| {
+            // Where the target has gone meanwhile.
+            let moved = center(world, 0)[0] - target.position[0];
+            deepest = largest([deepest, center(world, 1)[0] + 0.05 - moved]);
+        })?;
+    }
+    Ok(deepest)
+}
+
+/// A28. What stops at a wall has its far side at the wall's near one.
+fn wall(lab: &Lab) -> Result<Finding, Failure> {
+    let wall = SceneBody::fixed([0.005, 0.0], SceneShape::rectangle(0.005, 2.0));
+    Ok(Finding::new(thrown(lab, &wall, false)?.max(0.0), 0.0, SLOP))
+}
+
+/// A28. A plate of 1 cm × 2 m with a thousand times the mass of the largest thing thrown, 0.01 m² of 1 kg/m²: 500 kg/m².
+fn plate(lab: &Lab) -> Result<Finding, Failure> {
+    let plate = SceneShape::rectangle(0.005, 1.0).density(500.0);
+    let plate = SceneBody::dynamic([0.005, 0.0], plate);
+    Ok(Finding::new(thrown(lab, &plate, true)?.max(0.0), 0.0, SLOP))
+}

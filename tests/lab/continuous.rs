@@ -1,0 +1,117 @@
+//! Continuous collision: nothing fast gets through, nothing slow is touched, and lanes do not matter.
+
+use crate::common::{run, settings, with_width};
+use simpulse::engine::bodies::BodyKind;
+use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers::{VARIANTS, Variant, find};
+use simpulse::engine::world::Settings;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+use simpulse::lab::torture::{Verdict, family, run_solver};
+
+fn on(variant: &'static Variant) -> Settings {
+    Settings { continuous: true, ..settings(variant) }
+}
+
+/// A wall of 1 cm at x = 0, and `what` that flies at it with 300 m/s from 7.3 m off.
+fn shot(what: SceneShape, target: SceneBody, bullet: bool) -> Scene {
+    let body = SceneBody { bullet, ..SceneBody::dynamic([-7.3, 0.1], what) };
+    Scene::new("shot", vec![target, body.moving([300.0, 0.0], 20.0)]).weightless()
+}
+
+fn wall() -> SceneBody {
+    SceneBody::fixed([0.0, 0.0], SceneShape::rectangle(0.005, 3.0))
+}
+
+#[test]
+fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
+    let shapes = [
+        SceneShape::disc(0.05),
+        SceneShape::rectangle(0.05, 0.03),
+        SceneShape::polygon(vec![[-0.05, -0.05], [0.05, -0.05], [0.0, 0.05]]),
+    ];
+    for variant in &VARIANTS {
+        for shape in &shapes {
+            let scene = shot(shape.clone(), wall(), false);
+            let x = |settings| run(&scene, settings, 60).bodies.center(1)[0];
+            assert!(x(on(variant)) < 0.0, "{} {shape:?}", variant.name);
+            let off = Settings { continuous: false, ..settings(variant) };
+            assert!(x(off) > 0.0, "{} {shape:?}: 5 m in a step", variant.name);
+        }
+    }
+}
+
+#[test]
+fn dynamic_bodies_stop_those_that_ask_for_it() {
+    let soft_step = find("soft_step").unwrap();
+    let plate = SceneBody::dynamic([0.0, 0.0], SceneShape::rectangle(0.005, 3.0).density(1e4));
+    let x = |bullet| {
+        let scene = shot(SceneShape::disc(0.05), plate.clone(), bullet);
+        let world = run(&scene, on(soft_step), 60);
+        world.bodies.center(1)[0] - world.bodies.center(0)[0]
+    };
+    assert!(x(true) < 0.0 && x(false) > 0.0, "{} {}", x(true), x(false));
+}
+
+#[test]
+fn two_bullets_do_not_pass_each_other() {
+    let ball = |x: f64, v: f64| {
+        let body = SceneBody::dynamic([x, 0.0], SceneShape::disc(0.05)).moving([v, 0.0], 0.0);
+        SceneBody { bullet: true, ..body }
+    };
+    let scene = Scene::new("duel", vec![ball(-8.3, 300.0), ball(9.1, -250.0)]).weightless();
+    let world = run(&scene, on(find("soft_step").unwrap()), 60);
+    assert!(world.bodies.center(0)[0] < world.bodies.center(1)[0]);
+}
+
+#[test]
+fn what_is_not_fast_keeps_its_bits_and_lanes_do_not_matter() {
+    for variant in &VARIANTS {
+        let scene = crate::common::scene("pyramid:6");
+        let hash = |continuous| run(&scene, Settings { continuous, ..settings(variant) }, 60).state_hash();
+        assert_eq!(hash(true), hash(false), "{}", variant.name);
+    }
+    let case = family("fast").unwrap().case(5, 3);
+    let soft_step = find("soft_step").unwrap();
+    let hashes = LaneWidth::ALL.map(|width| {
+        let settings = Settings { continuous: true, ..with_width(soft_step, width) };
+        run(&case.scene, settings, 120).state_hash()
+    });
+    assert!(hashes.iter().all(|h| *h == hashes[0]), "{hashes:?}");
+}
+
+#[test]
+fn fast_bodies_stay_in_their_rooms() {
+    let soft_step = find("soft_step").unwrap();
+    let escapes = |settings: &Settings| {
+        let case = |number| family("fast").unwrap().case(1, number);
+        (0..60).filter(|&n| run_solver(&case(n), settings).unwrap().has(Verdict::Escaped)).count()
+    };
+    assert_eq!(escapes(&on(soft_step)), 0);
+    // Else the scenes would be too easy.
+    assert!(escapes(&settings(soft_step)) > 20);
+}
+
+/// A box between a wall of 2 m and a door that comes at it with 1 m/s and goes on into the wall.
+#[test]
+fn what_a_door_presses_does_not_leave_through_the_wall() {
+    let still =
+        |position, half: [f64; 2]| SceneBody::fixed(position, SceneShape::rectangle(half[0], half[1]));
+    let door = SceneBody::new(BodyKind::Kinematic, [1.5, 2.55], SceneShape::rectangle(1.0, 2.5));
+    let scene = Scene::new(
+        "door",
+        vec![
+            still([0.0, -1.0], [10.0, 1.0]),
+            still([7.0, 3.0], [1.0, 7.0]),
+            SceneBody::dynamic([5.5, 0.5], SceneShape::rectangle(0.5, 0.5)),
+            door.moving([1.0, 0.0], 0.0),
+        ],
+    );
+    for variant in ["soft_step", "pgs", "pgs_soft", "box2d", "rapier"] {
+        let mut world = scene.build(on(find(variant).unwrap())).unwrap();
+        for step in 0..400 {
+            world.step().unwrap();
+            let [x, y] = world.bodies.center(2);
+            assert!(x < 6.01 && y > -0.01, "{variant} at step {step}: ({x}, {y})");
+        }
+    }
+}

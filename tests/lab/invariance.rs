@@ -1,0 +1,220 @@
+//! Law: nothing depends on where one stands, what one measures in, or what is far away.
+//!
+//! A scene and its image under a symmetry of the laws of motion run side by side for a short time, and the image is
+//! taken back. Times are short, because what rounds differently parts for ever after enough impacts.
+
+use crate::common::settings;
+use simpulse::engine::bodies::BodyKind;
+use simpulse::engine::solvers::{VARIANTS, Variant};
+use simpulse::lab::scenes::{Geometry, Scene, SceneBody};
+use simpulse::lab::torture::family;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Steps of a comparison.
+const STEPS: u32 = 40;
+
+/// A symmetry: what becomes of a scene, and where its image's dynamic bodies are in the scene itself.
+struct Symmetry {
+    name: &'static str,
+    image: fn(&Scene, f64) -> Scene,
+    /// Centre of a body of the image, back in the scene.
+    back: fn([f64; 2], f64) -> [f64; 2],
+    /// From a number in 0..1, what the other two are given.
+    amount: fn(f64) -> f64,
+}
+
+fn turn([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
+    let (sin, cos) = angle.sin_cos();
+    [cos * x - sin * y, sin * x + cos * y]
+}
+
+fn each(scene: &Scene, change: impl FnMut(&mut SceneBody)) -> Scene {
+    let mut scene = scene.clone();
+    scene.bodies.iter_mut().for_each(change);
+    scene
+}
+
+fn turned(scene: &Scene, angle: f64) -> Scene {
+    let image = each(scene, |body| {
+        body.position = turn(body.position, angle);
+        body.velocity = turn(body.velocity, angle);
+        body.angle += angle;
+    });
+    Scene { gravity: turn(scene.gravity, angle), ..image }
+}
+
+fn mirrored(scene: &Scene, _: f64) -> Scene {
+    each(scene, |body| {
+        for x in [&mut body.position[0], &mut body.velocity[0], &mut body.angle, &mut body.angular_velocity] {
+            *x = -*x;
+        }
+        for shape in &mut body.shapes {
+            match &mut shape.geometry {
+                Geometry::Circle(c) => c.center[0] = -c.center[0],
+                Geometry::Box(b) => (b.center[0], b.angle) = (-b.center[0], -b.angle),
+                Geometry::Polygon(p) => p.points.iter_mut().for_each(|p| p[0] = -p[0]),
+                Geometry::Capsule(c) => (c.a[0], c.b[0]) = (-c.a[0], -c.b[0]),
+                Geometry::Segment(s) => (s.a[0], s.b[0]) = (-s.a[0], -s.b[0]),
+            }
+        }
+    })
+}
+
+fn moved(scene: &Scene, by: f64) -> Scene {
+    each(scene, |body| body.position = [body.position[0] + by, body.position[1] - by])
+}
+
+/// Lengths times `factor`, times as they are: velocities and gravity times the same.
+fn scaled(scene: &Scene, factor: f64) -> Scene {
+    let long = |p: &mut [f64; 2]| *p = [factor * p[0], factor * p[1]];
+    let mut image = each(scene, |body| {
+        long(&mut body.position);
+        long(&mut body.velocity);
+        for shape in &mut body.shapes {
+            match &mut shape.geometry {
+                Geometry::Circle(c) => {
+                    long(&mut c.center);
+                    c.radius *= factor;
+                }
+                Geometry::Box(b) => {
+                    long(&mut b.center);
+                    long(&mut b.half);
+                    b.radius *= factor;
+                }
+                Geometry::Polygon(p) => {
+                    p.points.iter_mut().for_each(long);
+                    p.radius *= factor;
+                }
+                Geometry::Capsule(c) => {
+                    long(&mut c.a);
+                    long(&mut c.b);
+                    c.radius *= factor;
+                }
+                Geometry::Segment(s) => {
+                    long(&mut s.a);
+                    long(&mut s.b);
+                }
+            }
+        }
+    });
+    long(&mut image.gravity);
+    image
+}
+
+fn heavier(scene: &Scene, factor: f64) -> Scene {
+    each(scene, |body| body.shapes.iter_mut().for_each(|shape| shape.density *= factor))
+}
+
+/// A second scene that has nothing to do with the first, behind it in the list.
+fn in_company(scene: &Scene, by: f64) -> Scene {
+    let mut image = scene.clone();
+    let other = family("ratios").unwrap().case(99, 4).scene;
+    let shifted = moved(&Scene { bodies: other.bodies, ..scene.clone() }, by);
+    image.bodies.extend(shifted.bodies);
+    image
+}
+
+fn thrice(scene: &Scene, by: f64) -> Scene {
+    let mut image = scene.clone();
+    for k in 1..3 {
+        image.bodies.extend(moved(scene, by * f64::from(k)).bodies);
+    }
+    image
+}
+
+fn stays(p: [f64; 2], _: f64) -> [f64; 2] {
+    p
+}
+
+const SYMMETRIES: [Symmetry; 8] = [
+    Symmetry { name: "turned", image: turned, back: |p, a| turn(p, -a), amount: |u| 2.0 * PI * u },
+    Symmetry { name: "mirrored", image: mirrored, back: |[x, y], _| [-x, y], amount: |u| u },
+    Symmetry {
+        name: "moved",
+        image: moved,
+        back: |[x, y], by| [x - by, y + by],
+        amount: |u| if u < 0.5 { 1e3 } else { -1e3 },
+    },
+    Symmetry {
+        name: "scaled",
+        image: scaled,
+        back: |[x, y], k| [x / k, y / k],
+        amount: |u| 10f64.powf(4.0 * u - 2.0),
+    },
+    Symmetry { name: "heavier", image: heavier, back: stays, amount: |u| 10f64.powf(6.0 * u - 3.0) },
+    Symmetry { name: "stepped", image: stepped, back: stays, amount: |u| 10f64.powf(2.0 * u - 1.0) },
+    Symmetry { name: "in_company", image: in_company, back: stays, amount: |u| 300.0 + 100.0 * u },
+    Symmetry { name: "thrice", image: thrice, back: stays, amount: |u| 100.0 + 100.0 * u },
+];
+
+/// Times times `factor`, lengths as they are: velocities over it, gravity over its square.
+fn stepped(scene: &Scene, factor: f64) -> Scene {
+    let slow = |p: [f64; 2], by: f64| [p[0] / by, p[1] / by];
+    let image = each(scene, |body| {
+        body.velocity = slow(body.velocity, factor);
+        body.angular_velocity /= factor;
+    });
+    Scene { gravity: slow(scene.gravity, factor * factor), dt: factor * scene.dt, ..image }
+}
+
+/// Farthest that a body of the scene is from its image after some steps (m); infinite where one of them diverges and the
+/// other does not.
+fn deviation(symmetry: &Symmetry, variant: &'static Variant, scene: &Scene, u: f64) -> f64 {
+    let amount = (symmetry.amount)(u);
+    let image = (symmetry.image)(scene, amount);
+    let [mut a, mut b] = [scene, &image].map(|scene| scene.build(settings(variant)).unwrap());
+    for _ in 0..STEPS {
+        match (a.step().is_ok(), b.step().is_ok()) {
+            (true, true) => {}
+            (false, false) => return 0.0,
+            _ => return f64::INFINITY,
+        }
+    }
+    let dynamic = (0..scene.bodies.len()).filter(|&i| scene.bodies[i].kind == BodyKind::Dynamic);
+    let apart = dynamic.map(|i| {
+        let ([x, y], [u, v]) = (a.bodies.center(i), (symmetry.back)(b.bodies.center(i), amount));
+        (x - u).hypot(y - v)
+    });
+    apart.fold(0.0, f64::max)
+}
+
+/// A stack or two, or shapes that fall, near enough to touch within the time.
+fn scene(number: u32) -> Scene {
+    let family = family(["ratios", "drops", "slender"][number as usize % 3]).unwrap();
+    family.case(77, number).scene
+}
+
+/// What rounding may become in [`STEPS`] steps with impacts (m): a hundredth of a body's size.
+const TOLERANCE: f64 = 1e-2;
+
+/// Scenes of each comparison.
+const SCENES: u32 = 24;
+
+/// Scenes of [`SCENES`] that part from their image by more than [`TOLERANCE`].
+fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
+    let apart = |&n: &u32| {
+        let u = (f64::from(n) + 0.5) / f64::from(SCENES);
+        deviation(symmetry, variant, &scene(n), u) > TOLERANCE
+    };
+    (0..SCENES).filter(apart).count() as u32
+}
+
+/// What is known: how many of [`SCENES`] scenes part under each symmetry, solver by solver. Present truth, with its
+/// reasons at the head of the file; a solver that is mended changes its line. `SIMPULSE_BLESS=1` writes it.
+#[test]
+fn every_symmetry_holds_or_is_known_not_to() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/lab/invariance.txt");
+    let known = std::fs::read_to_string(&path).unwrap_or_default();
+    let head: String = known.lines().filter(|l| l.starts_with('#')).map(|l| format!("{l}\n")).collect();
+    let mut found = head;
+    for variant in &VARIANTS {
+        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant)));
+        found += &format!("{}:{}\n", variant.name, counts.collect::<String>());
+    }
+    if std::env::var_os("SIMPULSE_BLESS").is_some() {
+        std::fs::write(&path, &found).unwrap();
+        return;
+    }
+    assert_eq!(known, found, "SIMPULSE_BLESS=1 writes what is so now; the file's head says why");
+}
