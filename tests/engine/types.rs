@@ -119,12 +119,12 @@ type Seen = Arc<Mutex<Vec<(Phase, usize)>>>;
 fn chain(solver: &'static Variant, width: LaneWidth, order: Order) -> (World, Seen) {
     let mut world = World::new(Settings { order, ..Settings::new(solver).exactly(width) });
     let block = Shape::rectangle("box", glam::Vec2::new(20.0, 1.0), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
-    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ShapeDef::new(block)]));
+    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ShapeDef::new(block)])).unwrap();
     for i in 0..6 {
         let disc = Shape::circle("disc", glam::Vec2::ZERO, 0.4).unwrap();
         let mut body = BodyDef::new(BodyKind::Dynamic, [i as f64, 0.4], vec![ShapeDef::new(disc)]);
         body.velocity = [if i == 5 { 3.0 } else { 0.0 }, 0.0];
-        world.add_body(&body);
+        world.add_body(&body).unwrap();
     }
     let seen = Seen::default();
     let ends: Vec<[u32; 2]> = (1..6).map(|i| [i, i + 1]).collect();

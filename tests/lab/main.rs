@@ -15,6 +15,7 @@ mod plastic;
 mod profile;
 mod recycling;
 mod rest;
+mod saved;
 mod scenes;
 mod schema;
 mod solver2d;

@@ -33,12 +33,12 @@ fn boxes(places: &[[f64; 2]], with_wall: bool, gravity: Vec2) -> World {
         let shape = Shape::rectangle("box", Vec2::from(half), Vec2::ZERO, 0.0, 0.0).unwrap();
         vec![ShapeDef::new(shape)]
     };
-    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], block([300.0, 1.0])));
+    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], block([300.0, 1.0]))).unwrap();
     if with_wall {
-        world.add_body(&BodyDef::new(BodyKind::Static, [-1.0, 10.0], block([1.0, 20.0])));
+        world.add_body(&BodyDef::new(BodyKind::Static, [-1.0, 10.0], block([1.0, 20.0]))).unwrap();
     }
     for &place in places {
-        world.add_body(&BodyDef::new(BodyKind::Dynamic, place, block([0.5, 0.5])));
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, place, block([0.5, 0.5]))).unwrap();
     }
     world
 }
@@ -263,7 +263,7 @@ fn placed_overlap_goes_in_a_tenth_of_a_second() {
         World::new(Settings { gravity: [0.0; 2], ..common::settings(solvers::find("shim").unwrap()) });
     for x in [-0.4, 0.4] {
         let disc = Shape::circle("disc", Vec2::ZERO, 0.5).unwrap();
-        world.add_body(&BodyDef::new(BodyKind::Dynamic, [x, 0.0], vec![ShapeDef::new(disc)]));
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, [x, 0.0], vec![ShapeDef::new(disc)])).unwrap();
     }
     let (dt, h) = (world.settings.dt, world.settings.h());
     let [stiffness, damping_ratio] = [0, 1].map(|i| world.settings.parameters[i]);

@@ -13,7 +13,7 @@ use crate::engine::params::SPECULATIVE_DISTANCE;
 use glam::Vec2;
 
 /// What the narrow phase keeps from step to step.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Narrow {
     /// Sorted by shape pair.
     pub candidates: Vec<Candidate>,
@@ -58,7 +58,7 @@ impl World {
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
             (narrow.is_changed, narrow.jobs_are_current) = (true, false);
         }
-        if self.settings.record_impulses {
+        if self.settings.record_impulses || self.settings.contact_events {
             self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
         }
         let bodies = &self.bodies;

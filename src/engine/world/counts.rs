@@ -25,7 +25,7 @@ pub struct StepCounts {
     pub constraint_bytes: usize,
 }
 
-/// What of a body left all bounds.
+/// Which quantity of a body is out of bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
@@ -48,11 +48,13 @@ pub struct Divergence {
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// What of it is out of bounds.
+    /// Which quantity is out of bounds.
     pub quantity: Quantity,
     /// How large that is (m/s or rad/s); NaN if it is not finite.
     pub speed: f32,
 }
+
+impl std::error::Error for Divergence {}
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -83,10 +83,10 @@ impl World {
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
             kept: self.work.kept.clone(),
-            solver: self.solver.boxed(),
+            solver: self.solver.clone(),
             impulses_of: self.impulses_of,
             is_changed: self.narrow.is_changed,
-            types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
+            types: self.work.types.iter().map(|joined| joined.kind.clone()).collect(),
         };
         let timings = self.timings;
         self.frozen_step();
@@ -102,7 +102,7 @@ impl World {
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.work.kept.clone_from(kept);
-        self.solver = solver.boxed();
+        self.solver = solver.clone();
         self.impulses_of = *impulses_of;
         // The list is another, but no contact has come or gone.
         (self.narrow.is_changed, self.lanes_are_for) = (*is_changed, None);
@@ -266,7 +266,7 @@ impl HeldWorld<'_> {
     /// Brings back what constraints of other types keep.
     fn restore_types(&mut self) {
         for (joined, before) in self.world.work.types.iter_mut().zip(&self.before.types) {
-            joined.kind = before.boxed();
+            joined.kind = before.clone();
         }
     }
 

@@ -57,26 +57,7 @@ impl World {
         };
         let opaque = |bytes: usize| (bytes, bytes);
         let b = &self.bodies;
-        let lanes = [
-            &b.position_x,
-            &b.position_y,
-            &b.position_x_lo,
-            &b.position_y_lo,
-            &b.rotation_cos,
-            &b.rotation_sin,
-            &b.velocity_x,
-            &b.velocity_y,
-            &b.angular_velocity,
-            &b.inv_mass,
-            &b.inv_inertia,
-            &b.force_x,
-            &b.force_y,
-            &b.torque,
-            &b.gravity_scale,
-            &b.linear_damping,
-            &b.angular_damping,
-        ];
-        let mut bodies: Vec<_> = lanes.iter().map(|a| (a.bytes(), 4 * a.len())).collect();
+        let mut bodies: Vec<_> = b.arrays().iter().map(|a| (a.bytes(), 4 * a.len())).collect();
         bodies.extend(arrays![b.local_center, b.kind, b.group, b.round]);
         let w = &self.work;
         let mut records = Vec::new();

@@ -4,41 +4,49 @@
 //! bounds → pairs → manifolds → colours → records → solver stages → impulses, poses
 //! ```
 
-use crate::engine::bodies::{Bodies, BodyDef, BodyKind};
+use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kernels::motion::{self, MotionInput};
 use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
 use crate::engine::constraints::records::assign::Assignment;
 use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
-use crate::engine::shapes::{Shape, combine};
+use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
-use glam::Vec2;
+use edit::{Slots, Standing};
+use events::Events;
+use std::fmt;
 use traits::Traits;
 
 mod candidates;
 mod collide;
 mod counts;
+mod edit;
+mod events;
 mod held;
 mod lanes;
 mod memory;
 mod pairs;
+mod queries;
+#[cfg(feature = "serde")]
+mod saved;
 mod settings;
 mod traits;
 
 pub use counts::{Divergence, Quantity, StepCounts};
+pub use events::{ContactEvent, ContactPoint};
 pub use held::{HeldWorld, Probe};
 pub use memory::{Component, Memory};
+pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
 /// What is known of a shape for its contacts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     friction: f32,
     restitution: f32,
@@ -51,6 +59,9 @@ struct Surface {
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
+///
+/// A clone goes on with the same bits; a watch on iterations is not copied.
+#[derive(Clone)]
 pub struct World {
     /// Body state.
     pub bodies: Bodies,
@@ -86,6 +97,22 @@ pub struct World {
     solver: Box<dyn Solver>,
     solver_is: &'static Variant,
     work: Workspace,
+    slots: Slots,
+    /// What is to be as it was before the next step.
+    applied: Vec<Standing>,
+    events: Events,
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World")
+            .field("solver", &self.settings.solver.name)
+            .field("step_index", &self.step_index)
+            .field("bodies", &self.handles().count())
+            .field("shapes", &self.shapes.len())
+            .field("contacts", &self.contacts.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl World {
@@ -114,49 +141,11 @@ impl World {
             solver: (settings.solver.make)(),
             solver_is: settings.solver,
             work: Workspace::default(),
+            slots: Slots::default(),
+            applied: Vec::new(),
+            events: Events::default(),
             settings,
         }
-    }
-
-    /// Adds a body whose shapes are valid; returns its index.
-    pub fn add_body(&mut self, body: &BodyDef) -> usize {
-        let parts: Vec<_> = body.shapes.iter().map(|s| s.shape.mass(s.density)).collect();
-        let mass = combine(&parts);
-        let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
-        let index = self.bodies.push(body, &mass);
-        self.bodies.round[index] = body.shapes.iter().all(|part| {
-            matches!(part.shape.translated(-center), Shape::Circle { center, .. } if center == Vec2::ZERO)
-        });
-        for part in &body.shapes {
-            let shape = part.shape.translated(-center);
-            // Fat boxes are made at the first step.
-            let aabb = shape.aabb(&self.bodies.pose(index));
-            let mut reach = 0.0_f32;
-            shape.for_each_vertex(|v| reach = reach.max(v.length()));
-            let (class, number) = self.narrow.shapes.push(&shape);
-            self.shapes.push(shape);
-            self.shape_body.push(index as u32);
-            self.surfaces.push(Surface {
-                friction: part.friction as f32,
-                restitution: part.restitution as f32,
-                reach: reach + shape.radius(),
-                class,
-                number,
-            });
-            let dynamic = body.kind == BodyKind::Dynamic;
-            self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
-        }
-        self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
-        self.traits.add(body, self.bodies.round[index]);
-        self.features = self.traits.features();
-        self.pairs_are_stale = true;
-        index
-    }
-
-    /// Adds constraints of another type than contacts. They take part in every pass of the solver.
-    pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
-        self.work.types.push(Joined::new(kind));
-        self.lanes_are_for = None;
     }
 
     /// What the scene needs of its constraints.
@@ -172,6 +161,10 @@ impl World {
         clock.lap(Phase::Store);
         self.step_index += 1;
         self.timings = clock.stop();
+        self.end_edits();
+        if self.settings.contact_events {
+            self.find_events();
+        }
         self.check()
     }
 
@@ -213,6 +206,9 @@ impl World {
         self.update_pairs();
         clock.lap(Phase::Pairs);
         self.update_contacts();
+        if self.settings.contact_events {
+            self.note_approach();
+        }
         clock.lap(Phase::Collide);
         self.assign_lanes(&self.kernel_features());
         clock.lap(Phase::Color);
@@ -244,7 +240,7 @@ impl World {
             h: s.h(),
             parameters: s.parameters,
             phases,
-            record_impulses: s.record_impulses,
+            record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),
             points: self.counts.points,
         };

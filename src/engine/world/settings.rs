@@ -25,8 +25,8 @@ pub struct Settings {
     pub solver: &'static Variant,
     /// Lanes per instruction, at most.
     pub width: LaneWidth,
-    /// Scenes with few contacts per colour run with fewer lanes, but not with fewer than these; see
-    /// [`Self::exactly`]. The results are the same bits.
+    /// Fewest lanes that a step may fall back to where colours are small; see [`Self::exactly`]. Every width gives the
+    /// same bits.
     pub narrowest: LaneWidth,
     /// Constraint order.
     pub order: Order,
@@ -42,6 +42,8 @@ pub struct Settings {
     pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
+    /// Find [`World::contact_events`](crate::engine::world::World::contact_events) after each step.
+    pub contact_events: bool,
     /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
     pub observe_rule: bool,
     /// Read the clock around every phase.
@@ -52,7 +54,7 @@ pub struct Settings {
     pub integrator: Integrator,
     /// How spins turn bodies.
     pub rotation: RotationUpdate,
-    /// Needs modelled on top of those that the scene has, to measure what they cost.
+    /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
 }
 
@@ -71,6 +73,7 @@ impl Settings {
             parameters: solver.defaults(),
             impacts: Impacts::Own,
             record_impulses: false,
+            contact_events: false,
             observe_rule: false,
             timed: false,
             broadphase: BroadPhaseKind::default(),

@@ -29,7 +29,7 @@
 use crate::engine::lanes::{BodyRow, held};
 
 /// Rows as they were before a wave; keeps its memory from step to step.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Rebounds {
     /// `[rows]`
     before: Vec<BodyRow>,

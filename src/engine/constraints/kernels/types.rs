@@ -98,8 +98,14 @@ pub trait ConstraintType: fmt::Debug + Send {
     fn boxed(&self) -> Box<dyn ConstraintType>;
 }
 
+impl Clone for Box<dyn ConstraintType> {
+    fn clone(&self) -> Self {
+        (**self).boxed()
+    }
+}
+
 /// A type and the lanes of its constraints.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Joined {
     /// The type.
     pub kind: Box<dyn ConstraintType>,

@@ -29,7 +29,7 @@ impl Entry {
 }
 
 /// Constraints against one kind of body, and their colours.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Group {
     entries: Vec<Entry>,
     /// Their rows, with a exempt unless it is dynamic.
@@ -38,7 +38,7 @@ struct Group {
 }
 
 /// Gives constraints their lanes; keeps its memory from call to call.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Assignment {
     /// By [`OppositeKind`].
     groups: [Group; 3],
