@@ -1,11 +1,12 @@
-//! The laboratory: what is simulated, what is known about it, and how solvers compare.
+#![doc = include_str!("README.md")]
+//! # Floors
 //!
-//! Floors, each importing from those before it only:
+//! Each imports from those before it only:
 //!
 //! ```text
 //! error                          what can go wrong
 //! files  overrides  interned     result files; parameters by name; names read from files
-//! units  estimate                numbers for people; what a run will take
+//! units  estimate                human-readable numbers; what a run will take
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! recording                      whole runs in a file, and the page that plays them

@@ -1,6 +1,7 @@
 //! Pictures, recordings and pages as a user meets them; pages in a real browser where there is one.
 
 mod browser;
+mod documents;
 mod files;
 mod replay;
 mod report;
