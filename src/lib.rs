@@ -61,6 +61,7 @@ pub use simpulse_engine::engine;
 pub mod lab;
 
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
 
 #[doc = include_str!("CHANGELOG.md")]

@@ -10,7 +10,7 @@ pub enum Phase {
     Pairs,
     /// Narrow phase and impulse matching.
     Collide,
-    /// Colouring and lane assignment.
+    /// Coloring and lane assignment.
     Color,
     /// Constraint preparation.
     Prepare,

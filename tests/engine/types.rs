@@ -1,4 +1,4 @@
-//! A constraint type from outside: two points that keep a distance. It joins the colours, batches
+//! A constraint type from outside: two points that keep a distance. It joins the colors, batches
 //! and passes of every solver without a line in any of them.
 
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
@@ -239,10 +239,10 @@ fn split_masses_count_rods_and_come_back() {
 }
 
 #[test]
-fn rods_are_in_the_passes_and_colours_of_the_contacts() {
+fn rods_are_in_the_passes_and_colors_of_the_contacts() {
     let (mut world, seen) = chain(find("soft_step").unwrap(), LaneWidth::W8, Order::Colored);
     world.step().unwrap();
-    // Six discs on the ground, and five rods in two colours.
+    // Six discs on the ground, and five rods in two colors.
     assert_eq!((world.counts.contacts, world.counts.colors, world.counts.overflow), (6, 3, 0));
     let of = |phase: Phase| -> usize {
         seen.lock().unwrap().iter().filter(|(p, _)| *p == phase).map(|(_, rods)| rods).sum()

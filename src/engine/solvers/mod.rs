@@ -124,6 +124,35 @@ pub enum Law {
 }
 
 /// A row of [`VARIANTS`].
+///
+/// A solver from outside needs no row in the table to run:
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::clock::Phase;
+/// use simpulse::engine::constraints::kernels::velocity::rules::Baumgarte;
+/// use simpulse::engine::constraints::{Passes, Schedule};
+/// use simpulse::engine::solvers::Variant;
+/// use simpulse::engine::world::{Settings, World};
+///
+/// static MINE: Variant = Variant { name: "mine", make: || Schedule::boxed(step), ..Variant::BASE };
+///
+/// fn step(passes: &mut Passes<'_>) {
+///     let rule = Baumgarte::rule(0.2, 0.005, 3.0, passes.h());
+///     passes.integrate_velocities();
+///     passes.warm_start();
+///     for _ in 0..passes.budget().velocity_iterations {
+///         passes.sweep(Phase::Solve, &rule);
+///         passes.iteration_done();
+///     }
+///     passes.integrate_positions();
+///     passes.end_substep(0);
+/// }
+///
+/// let mut world = World::new(Settings::new(&MINE));
+/// world.step()?;
+/// # Ok::<(), simpulse::engine::world::Divergence>(())
+/// ```
 #[derive(Debug)]
 pub struct Variant {
     /// Name on the command line; also the name of its file.

@@ -5,11 +5,11 @@
 //!
 //! **Source.** `cottle1992` (the splitting); otherwise [`super::pgs`].
 //!
-//! **Departures.** Colours are taken in random order, and contacts only where they are solved one by
+//! **Departures.** Colors are taken in random order, and contacts only where they are solved one by
 //! one. The seed is the same in every step, so that a step is a function of its state and all widths
 //! give the same bits.
 //!
-//! **Cost.** That of [`super::pgs`], and a sort of colours (in natural order: of contacts) per sweep;
+//! **Cost.** That of [`super::pgs`], and a sort of colors (in natural order: of contacts) per sweep;
 //! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
 //! contact.
 //!

@@ -42,6 +42,17 @@ pub enum Quantity {
 }
 
 /// Where and when a simulation left all bounds.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let mut world = World::new(Settings::new(solvers::find("pgs")?));
+/// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
+/// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
+/// let divergence = world.step().unwrap_err();
+/// assert_eq!(divergence.to_string(), "diverged at step 1: body 0 moves at 2.000e5 m/s");
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// Step number, from 1.

@@ -191,6 +191,17 @@ impl World {
     /// Puts a body elsewhere: the origin of its frame to `position` (m), turned to `angle` (rad). It keeps its velocity.
     ///
     /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// world.set_pose(ball, [3.0, 1.0], 0.3)?;
+    /// world.set_velocity(ball, [0.0, 5.0], -1.0)?;
+    /// assert_eq!(world.bodies.origin(ball.index()), [3.0, 1.0]);
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
     pub fn set_pose(&mut self, body: BodyHandle, position: [f64; 2], angle: f64) -> Result<(), Error> {
         let i = self.index_of(body)?;
         finite_pair("position", position)?;
@@ -222,6 +233,19 @@ impl World {
     /// moved by it.
     ///
     /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// world.apply_force(ball, [500.0, 0.0])?;
+    /// world.step()?;
+    /// let speed = world.bodies.velocity_x[ball.index()];
+    /// world.step()?;
+    /// assert_eq!(world.bodies.velocity_x[ball.index()], speed);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn apply_force(&mut self, body: BodyHandle, force: [f32; 2]) -> Result<(), Error> {
         self.apply(body, force.into(), 0.0)
     }

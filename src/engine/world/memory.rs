@@ -18,7 +18,7 @@ pub struct Component {
 /// Memory of a [`World`] on the heap, by purpose. The struct itself is not in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// Bodies, shapes, broad phase, candidates, contacts, colouring, records, rows.
+    /// Bodies, shapes, broad phase, candidates, contacts, coloring, records, rows.
     pub components: Vec<Component>,
 }
 
@@ -72,7 +72,7 @@ impl World {
             component("broad phase", &[opaque(self.broadphase.held_bytes())]),
             component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
             component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
-            component("colouring", &[opaque(self.assignment.held_bytes())]),
+            component("coloring", &[opaque(self.assignment.held_bytes())]),
             component("records", &records),
             component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
         ];

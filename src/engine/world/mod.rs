@@ -61,6 +61,30 @@ struct Surface {
 /// Bodies, shapes, contacts and the settings that move them.
 ///
 /// A clone goes on with the same bits; a watch on iterations is not copied.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
+/// // One lane and the widest: the same bits.
+/// let mut hashes = Vec::new();
+/// for width in [LaneWidth::W1, LaneWidth::W16] {
+///     let mut world = World::new(Settings::new(solvers::find("soft_step")?).exactly(width));
+///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+///     for i in 0..8 {
+///         world.add_body(&BodyDef::dynamic([0.3 * i as f64, 1.1 * i as f64 + 0.6]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+///     }
+///     for _ in 0..30 {
+///         world.step()?;
+///     }
+///     let mut branch = world.clone();
+///     branch.step()?;
+///     world.step()?;
+///     assert_eq!(branch.state_hash(), world.state_hash());
+///     hashes.push(world.state_hash());
+/// }
+/// assert_eq!(hashes[0], hashes[1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct World {
     /// Body state.

@@ -19,6 +19,21 @@ pub enum Order {
 }
 
 /// Everything a run can choose.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::{params::Budget, solvers, world::Settings};
+///
+/// let mut settings = Settings {
+///     gravity: [0.0, -1.6],
+///     budget: Budget { substeps: 8, ..solvers::find("soft_step")?.budget },
+///     ..Settings::new(solvers::find("soft_step")?)
+/// };
+/// // A parameter of the solver's own, by name; its range is checked.
+/// settings.solver.set(&mut settings.parameters, "contact_hertz", 60.0)?;
+/// assert!(settings.solver.set(&mut settings.parameters, "contact_hertz", -1.0).is_err());
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Row of [`crate::engine::solvers::VARIANTS`].

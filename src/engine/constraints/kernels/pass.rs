@@ -15,7 +15,7 @@ use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 pub struct PassInput<'a> {
     /// One row per body, and an inert one at the end.
     pub rows: &'a mut [BodyRow],
-    /// Coloured batches, or serial ones.
+    /// Colored batches, or serial ones.
     pub batches: &'a mut Batches,
     /// Which of both.
     pub part: Part,

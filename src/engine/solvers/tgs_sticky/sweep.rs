@@ -51,7 +51,7 @@ pub(crate) struct Sticky {
 /// One sweep.
 pub(crate) struct StickySweep<'a> {
     pub sticky: Sticky,
-    /// Of the coloured and of the serial batches.
+    /// Of the colored and of the serial batches.
     pub drifts: [&'a mut [Block]; 2],
 }
 
