@@ -70,7 +70,7 @@ fn a_steady_step_allocates_nothing() {
     }
 }
 
-/// What is asked for beyond a plain step has its room after the first ones.
+/// Events and applied forces allocate in the first steps only.
 #[test]
 fn a_steady_step_with_events_allocates_nothing() {
     let settings = Settings { contact_events: true, ..common::settings(find("soft_step").unwrap()) };

@@ -54,7 +54,7 @@ impl Coloring {
     }
 
     /// Colors `edges`, given by body index; an index of [`EXEMPT`], or any
-    /// other from `body_count` on, asks for no exclusivity.
+    /// other from `body_count` on, needs no exclusivity.
     ///
     /// Returns at once if the arguments are those of the last call, as they
     /// are while a pile rests.

@@ -113,7 +113,7 @@ impl Bodies {
         i
     }
 
-    /// Puts another body in the place of body `i`.
+    /// Replaces body `i` with another one.
     pub(crate) fn set(&mut self, i: usize, def: &BodyDef, mass: &MassProperties) {
         let [cx, cy] = mass.center;
         self.local_center[i] = Vec2::new(cx as f32, cy as f32);

@@ -75,7 +75,7 @@ impl FatBoxes {
         columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
     }
 
-    /// Takes in a body, or another one in the place of one that it knows. Its shapes begin with shape `first`.
+    /// Adds a body, or replaces one. Its shapes begin with shape `first`.
     pub fn set(&mut self, body: usize, first: usize, shapes: &[Shape]) {
         if body == self.first_shape.len() {
             self.first_shape.push(first as u32);

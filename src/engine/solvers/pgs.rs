@@ -20,7 +20,7 @@
 //!
 //! # The method
 //!
-//! A contact row with Jacobian J wants J v + b ≥ 0, λ ≥ 0, and one of the two zero. With
+//! A contact row with Jacobian J requires J v + b ≥ 0, λ ≥ 0, and one of the two zero. With
 //! every other impulse fixed, λ alone changes its velocity by k = J M⁻¹ Jᵀ, so the
 //! impulse that gives J v + b = 0 is Δλ = −(J v + b)/k. What must not become negative
 //! is the *accumulated* impulse, not the increment:

@@ -1,4 +1,4 @@
-//! Gauss–Seidel in an order that is drawn anew for every sweep.
+//! Gauss–Seidel in a new random order for every sweep.
 //!
 //! A fixed order pushes the same way sweep after sweep, so that its error has a direction: a stack leans
 //! towards the side that is solved first. A random one has none.

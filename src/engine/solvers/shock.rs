@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
     breaks: &[
         (Law::Momentum, "in the last sweep bodies below do not answer"),
         (Law::Converges, "the last sweep solves another problem"),
-        (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not feel that what it bears leans"),
+        (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not react when its load leans"),
     ],
     make: || Box::new(Shock::default()),
     ..Variant::BASE

@@ -214,7 +214,7 @@ impl HeldWorld<'_> {
         self.restore_types();
         self.world.put_back(&self.before);
         self.world.frozen_step();
-        // Contacts were colored anew, so records may have other places.
+        // Contacts were recolored, so records may have other places.
         self.save();
         probes
     }

@@ -6,8 +6,7 @@
 //! **Rays.** At a point p of the ray let d be the distance of the shape and n the direction to its nearest point. All of
 //! the shape lies behind the plane at distance d with normal n. So the ray may advance to that plane, by d / (n·u) along
 //! its direction u, and if n·u ≤ 0 it misses. For a polygon this ends after a few faces; for round shapes it is Newton's
-//! method on a convex function, from the side where it converges. Source: van den Bergen 2004, "Ray casting against
-//! general convex objects".
+//! method on a convex function, from the side where it converges. Source: `vandenbergen2004`.
 
 use super::World;
 use crate::engine::bodies::BodyHandle;
@@ -18,7 +17,7 @@ use crate::engine::narrowphase::gjk::distance;
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use glam::{DVec2, Vec2};
 
-/// Where a ray meets a shape first.
+/// Where a ray meets a shape first. Distances are good to 10⁻⁷ of themselves, to which places relative to a ray are rounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// The body.

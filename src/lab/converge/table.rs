@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Where a tolerance is not reached.
 const NEVER: &str = "—";
 
-/// Tables for people: iterations to each tolerance, and times where they were measured.
+/// Human-readable tables: iterations to each tolerance, and times where they were measured.
 pub fn text(report: &Report) -> String {
     let mut out = format!(
         "{}: {} bodies, {} contact points; residuals in units of {:.4e} N·s\n{}\n",

@@ -86,7 +86,7 @@ impl Motion {
                 self.round.push((i as u32, 0.0));
             }
             let inv_mass = bodies.inv_mass[i];
-            // Where nothing can turn a body, it is to be seen that nothing does.
+            // Without rotation, infinite inertia shows that nothing turns a body.
             let inv_inertia = if features.rotation { bodies.inv_inertia[i] } else { 0.0 };
             rows.push(BodyRow {
                 velocity: [bodies.velocity_x[i], bodies.velocity_y[i], bodies.angular_velocity[i], inv_mass],

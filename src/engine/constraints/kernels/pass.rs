@@ -91,7 +91,7 @@ pub(crate) use at_width;
 ///
 /// To add one, implement this; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is the example.
 pub trait Pass {
-    /// What it asks for per contact with records of this layout.
+    /// What it requests per contact with records of this layout.
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
     /// How constraints of other types take part.

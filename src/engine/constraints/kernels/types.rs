@@ -4,7 +4,7 @@
 //! colored together with the contacts, so that the lanes of a color push different bodies
 //! whatever they are of, and every pass of a solver runs over both: within a color the other types
 //! come first, then the contacts. No solver knows which types there are, nor a type which solver runs:
-//! [`TypeRows`] reads and writes bodies as the pass wants it, so that one kernel serves Gauss–Seidel and
+//! [`TypeRows`] reads and writes bodies as the pass requires, so that one kernel serves Gauss–Seidel and
 //! Jacobi sweeps.
 //!
 //! What is no pass knows contacts alone: vectors over contact points ([`crate::engine::constraints::records::point_vector`]) and block descent
@@ -24,7 +24,7 @@ pub struct TypeInput<'a> {
     /// What the pass is for: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
     /// feedback), [`Phase::Relax`] (without), [`Phase::Position`] or [`Phase::Store`].
     pub phase: Phase,
-    /// Whether only effective masses are asked for, and the factor on increments in a Jacobi sweep.
+    /// Whether only effective masses are computed, and the factor on increments in a Jacobi sweep.
     pub mode: PassMode,
     /// Substep (s).
     pub h: f32,
