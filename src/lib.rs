@@ -1,6 +1,9 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory: which contact solver, how many
 //! iterations, how fast, and how wrong?
 //!
+//! **As a library:** start with [`engine`], which says how to build for your CPU, which bits are promised, and how bodies are
+//! added, moved, queried and removed. [`changelog`] lists changes.
+//!
 //! # Three storeys
 //!
 //! ```text
@@ -58,4 +61,13 @@ pub use simpulse_engine::engine;
 pub mod lab;
 
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
+
+#[doc = include_str!("CHANGELOG.md")]
+pub mod changelog {}
+
+/// The README's program runs.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -3,7 +3,8 @@
 #[path = "lab/common.rs"]
 mod common;
 
-use simpulse::engine::solvers::{Law, VARIANTS};
+use simpulse::engine::solvers::{Law, VARIANTS, find};
+use simpulse::engine::world::Settings;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -67,4 +68,22 @@ fn a_steady_step_allocates_nothing() {
             assert_eq!(count, 0, "{name} {}", variant.name);
         }
     }
+}
+
+/// Events and applied forces allocate in the first steps only.
+#[test]
+fn a_steady_step_with_events_allocates_nothing() {
+    let settings = Settings { contact_events: true, ..common::settings(find("soft_step").unwrap()) };
+    let mut world = common::run(&common::scene("pyramid:10"), settings, 120);
+    let body = world.handle(3).unwrap();
+    world.apply_force(body, [1.0, 0.0]).unwrap();
+    world.step().unwrap();
+    let count = allocations(|| {
+        for _ in 0..10 {
+            world.apply_force(body, [1.0, 0.0]).unwrap();
+            world.step().unwrap();
+            assert!(world.contact_events().is_empty() && world.contacts_of(body).unwrap().count() > 0);
+        }
+    });
+    assert_eq!(count, 0);
 }

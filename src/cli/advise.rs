@@ -20,9 +20,9 @@ use std::process::ExitCode;
 /// Find the cheapest setting within given tolerances on a scene
 ///
 /// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
-/// of doublings first, then values in between. What should only cost more than something known is
-/// left out. The best few are timed again in turns, and the fastest of those that keep every
-/// limit is printed with all its errors, with those that come next, and with the command that runs it.
+/// of doublings first, then values in between. Settings that can only be slower than one already found are
+/// skipped. The best few are timed again in turn, and the fastest of those that meet every
+/// limit is printed with all its errors, the runners-up, and the command that runs it.
 ///
 /// Exit code 0: there is one; 1: there is none, and the nearest is printed; 2: a request that
 /// cannot be met.
@@ -95,7 +95,7 @@ impl AdviseArgs {
             },
         };
         if (limits.penetration, limits.residual, limits.truth) == (None, None, None) {
-            let message = "no error is limited: give --max-penetration, --max-residual or --max-reference";
+            let message = "set at least one limit: --max-penetration, --max-residual or --max-reference";
             return Err(Error::invalid("advise", message));
         }
         if !(self.seconds > 0.0 && self.seconds.is_finite()) {

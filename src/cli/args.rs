@@ -6,6 +6,7 @@ use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
 use super::merge::MergeArgs;
+use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
 use super::replay::ReplayArgs;
 use super::report::ReportArgs;
@@ -71,6 +72,7 @@ pub enum Command {
     Profile(ProfileArgs),
     Growth(GrowthArgs),
     Savings(SavingsArgs),
+    Papers(PapersArgs),
     /// List the scenes
     Scenes(ListArgs),
     /// List the solvers

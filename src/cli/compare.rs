@@ -10,8 +10,8 @@ use std::process::ExitCode;
 
 /// Compare two studies: two commits, two machines, two settings
 ///
-/// Pairs the settings that both studies have and says which scenes hold no more, which errors and which
-/// times changed beyond the noise. Ends with code 1 if anything became worse by more than the threshold.
+/// Pairs the settings that both studies have and lists scenes that no longer hold, and errors and
+/// times that changed beyond the noise. Exit code 1 if anything became worse by more than the threshold.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +27,7 @@ pub struct CompareArgs {
     /// Folder of the second study, or its study.json
     #[arg(value_name = "AFTER")]
     pub after: PathBuf,
-    /// Growth of a time or an error from which it is a regression, as 0.1 or 10%
+    /// Smallest increase that counts as a regression, as 0.1 or 10%
     #[arg(long, default_value = "10%", value_name = "SHARE", value_parser = share)]
     pub threshold: f64,
     /// Judge times relative to the median of all: for another machine, or a slower day

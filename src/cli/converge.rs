@@ -16,18 +16,18 @@ use std::process::ExitCode;
 /// Count the iterations every solver needs on one frozen problem
 ///
 /// Runs every solver on exactly the same contact problem, with 1, 2, 3, … iterations, in natural,
-/// coloured and shuffled order, from zero and warm. Warm starts are the impulses of the step before, if
-/// the problem has them; else those of its certified reference, each off by up to a tenth, which is what the
-/// step before ends with if its loads differ by as much. Solvers that keep numbers of their own have made 60
-/// steps on the step before. The output says which solver has no warm curve, and why.
+/// colored and shuffled order, from zero and warm. Warm starts are the impulses of the step before, if
+/// the problem has them; otherwise those of its certified reference, each changed by up to 10 %, as if the loads of
+/// the step before differed by as much. Solvers with internal state first run 60 steps on the previous step's
+/// problem. The output says which solver has no warm curve, and why.
 ///
 /// Prints the iterations, sweeps and times to residuals 1e-1 to 1e-6, the asymptotic rate, and the
 /// distance of the velocities from the certified reference. A dash means that a tolerance was not
-/// reached. Ends with sentences: which solver needs how many sweeps, beside the rate of Gauss-Seidel in f64.
+/// reached. Ends with a summary: sweeps per solver, next to the f64 Gauss–Seidel rate.
 ///
 /// The residual is measured against two laws: the rigid contact law, which is the same for all, and
 /// the law that the solver itself set out to solve (soft contacts, position feedback, no friction).
-/// Where the two differ, a solver has two rows. Methods in f64 stand below for comparison.
+/// Where the two differ, a solver has two rows. Methods in f64 follow for comparison.
 ///
 /// Writes converge.csv (every point), converge.json (everything) and converge.svg (curves).
 #[derive(Args, Clone, Debug)]
@@ -52,7 +52,7 @@ pub struct ConvergeArgs {
     /// Most iterations
     #[arg(long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub max_iterations: u32,
-    /// Lanes of coloured order
+    /// Lanes of colored order
     #[command(flatten)]
     pub lanes: Lanes,
     /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)

@@ -32,7 +32,7 @@ use std::process::ExitCode;
 ///
 /// From one size to the next, the cost per contact may grow by as much as memory of the phase's
 /// working set is read more slowly (measured), and by ln n₂/ln n₁; 15 % and twice the spread are
-/// allowed on top. What grows more is said to.
+/// allowed on top. Phases that grow faster are named.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

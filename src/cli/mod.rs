@@ -12,6 +12,7 @@ pub mod growth;
 pub mod interrupt;
 pub mod merge;
 pub mod output;
+pub mod papers;
 pub mod profile;
 pub mod progress;
 pub mod replay;
@@ -24,6 +25,7 @@ pub mod torture;
 pub mod values;
 pub mod verify;
 
+use crate::engine::lanes::unused_cpu_features;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::World;
 use crate::lab::error::Error;
@@ -71,8 +73,8 @@ pub fn main() -> ExitCode {
 
 fn execute(cli: Cli) -> Result<ExitCode, Error> {
     match cli.command {
-        None => study::run(&cli.study),
-        Some(Command::Study(args)) => study::run(&args),
+        None => full_study(&cli.study),
+        Some(Command::Study(args)) => full_study(&args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
@@ -87,12 +89,22 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
+        Some(Command::Papers(args)) => papers::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),
         Some(Command::Solvers(args)) => solvers(&args),
         Some(Command::Scene(args)) => print(&scene(&args)?),
         Some(Command::Columns(args)) => columns(&args),
         Some(Command::Completions(args)) => completions(&args),
     }
+}
+
+/// A study; after it, what the CPU has and this build does not use.
+fn full_study(args: &study::StudyArgs) -> Result<ExitCode, Error> {
+    let code = study::run(args)?;
+    if let Some(line) = unused_cpu_features() {
+        note(&format!("{line}\n"));
+    }
+    Ok(code)
 }
 
 /// What to say about an option without a value: clap has several messages, and one of them is

@@ -22,15 +22,15 @@ use std::process::ExitCode;
 /// repeats, it measures with the same clock how fast memory can be read and updated in a
 /// working set of the same size, and how many multiply-adds a core does at this lane width.
 ///
-/// Bytes are those that the code names: 4 per float of a record read and again per impulse written,
+/// Bytes are those that the code requests: 4 per float of a record read and again per impulse written,
 /// 4 per index, 32 per body row gathered, 16 per body written back; for pairs, collide and color what
 /// goes in once and what comes out once. Operations are counted, by running the same
 /// kernel on a lane that counts: a multiply-add is two, a division or root one, minima, maxima and
-/// selections none. Counted is what the source does; the compiler leaves out what nobody reads, 2 % of a
-/// sweep. Of prepare and restitution only what is done in lanes is counted.
+/// selections none. Counts follow the source; the compiler removes about 2 % as dead code.
+/// Of prepare and restitution only what is done in lanes is counted.
 ///
 /// Velocities and impulses that repeats change are brought back every 100 repeats, outside of the
-/// times. In pairs and color every repeat searches all pairs and recomputes colours, which a step does only
+/// times. In pairs and color every repeat searches all pairs and recomputes colors, which a step does only
 /// where many shapes left their bounds and where a contact came or went.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\

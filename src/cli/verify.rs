@@ -15,10 +15,10 @@ use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-/// Run the hard cases whose truth is known on paper
+/// Run the hard test cases with known analytic answers
 ///
 /// Every case runs with every solver at its standard budget and compares one number with its
-/// reference value. What fails is shown as failing.
+/// reference value. Failures are shown as failures.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 A cell is 'pass' or 'FAIL', the measured value and, in brackets, the margin: error over tolerance,

@@ -10,7 +10,7 @@ pub enum Phase {
     Pairs,
     /// Narrow phase and impulse matching.
     Collide,
-    /// Colouring and lane assignment.
+    /// Coloring and lane assignment.
     Color,
     /// Constraint preparation.
     Prepare,
@@ -150,7 +150,7 @@ impl Clock {
         Clock { waited: waited(), ..Clock::start(true) }
     }
 
-    /// Books what a pass asks for on `contacts` contacts whose body a is of kind `opposite`.
+    /// Counts the bytes that a pass requests on `contacts` contacts whose body a is of kind `opposite`.
     pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
         for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
             *sum += contacts as f64 * each as f64;

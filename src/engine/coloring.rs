@@ -1,46 +1,46 @@
-//! Colours: groups of constraints that may be solved at the same time.
+//! Colors: groups of constraints that may be solved at the same time.
 //!
-//! Two constraints that push the same body must not share a colour, so that
-//! the lanes of a batch (and, one day, the threads of a colour) write to
-//! different bodies. In the terms of graph theory this colours the *edges* of
+//! Two constraints that push the same body must not share a color, so that
+//! the lanes of a batch (and, one day, the threads of a color) write to
+//! different bodies. In the terms of graph theory this colors the *edges* of
 //! the graph whose nodes are bodies. An edge is any constraint on two bodies:
 //! a contact, a joint.
 //!
-//! Edges are taken in order and get the lowest colour free at both ends (first
-//! fit). At its turn an edge shares ends with at most 2(Δ − 1) coloured edges,
+//! Edges are taken in order and get the lowest color free at both ends (first
+//! fit). At its turn an edge shares ends with at most 2(Δ − 1) colored edges,
 //! Δ being the most edges at one body, so first fit needs at most 2Δ − 1
-//! colours; Vizing's theorem says that no colouring does with fewer than Δ and
+//! colors; Vizing's theorem says that no coloring does with fewer than Δ and
 //! some with Δ + 1. Nothing depends on the lane width: all widths solve in the
 //! same order and reach the same bits.
 //!
-//! **Colours kept from step to step** were tried: edges that were there before keep their colour
+//! **Colors kept from step to step** were tried: edges that were there before keep their color
 //! and the others are fitted in. In a turning drum (25 000 edges, 180 of them new in a step) and
 //! on pyramids (54 000) that took 0.8 to 0.9 of the time of first fit (3.3 ns per edge), and half
-//! as much again to look the last colours up; in the drum it needed 1.3 colours more. What saves
+//! as much again to look the last colors up; in the drum it needed 1.3 colors more. What saves
 //! time is not to call [`Coloring::assign`] while no edge comes or goes.
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
 use crate::engine::lanes::held;
 
-/// Stands for a side that any number of edges of a colour may share: a static
+/// Stands for a side that any number of edges of a color may share: a static
 /// or kinematic body is read but never written.
 pub const EXEMPT: u32 = u32::MAX;
 
-/// Most colours: the bits of a mask. With a mask per body the lowest free
-/// colour of an edge is one OR and one bit count, where lists or a table of
-/// colour × body would search.
+/// Most colors: the bits of a mask. With a mask per body the lowest free
+/// color of an edge is one OR and one bit count, where lists or a table of
+/// color × body would search.
 pub const MAX_COLORS: usize = u64::BITS as usize;
 
-/// The colour of edges that got none.
+/// The color of edges that got none.
 pub const OVERFLOW: u8 = u8::MAX;
 
-/// A colouring of edges and the buffers to make the next one.
+/// A coloring of edges and the buffers to make the next one.
 #[derive(Clone, Debug, Default)]
 pub struct Coloring {
     edges: Vec<[u32; 2]>,
     body_count: usize,
-    /// Colours in use at each body, and a last mask for exempt sides that stays zero.
+    /// Colors in use at each body, and a last mask for exempt sides that stays zero.
     used: Vec<u64>,
     color_of: Vec<u8>,
     order: Vec<u32>,
@@ -48,13 +48,13 @@ pub struct Coloring {
 }
 
 impl Coloring {
-    /// A colouring of no edges.
+    /// A coloring of no edges.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Colours `edges`, given by body index; an index of [`EXEMPT`], or any
-    /// other from `body_count` on, asks for no exclusivity.
+    /// Colors `edges`, given by body index; an index of [`EXEMPT`], or any
+    /// other from `body_count` on, needs no exclusivity.
     ///
     /// Returns at once if the arguments are those of the last call, as they
     /// are while a pile rests.
@@ -76,7 +76,7 @@ impl Coloring {
             let (a, b) = ((a as usize).min(body_count), (b as usize).min(body_count));
             let color = (self.used[a] | self.used[b]).trailing_ones();
             count[color as usize] += 1;
-            // A shift by 64 leaves no bit: overflow takes no colour.
+            // A shift by 64 leaves no bit: overflow takes no color.
             let bit = 1u64.checked_shl(color).unwrap_or(0);
             self.used[a] |= bit;
             self.used[b] |= bit;
@@ -86,13 +86,13 @@ impl Coloring {
         self.sort_by_color(&count);
     }
 
-    /// Stable counting sort of the edges by colour, overflow last.
+    /// Stable counting sort of the edges by color, overflow last.
     fn sort_by_color(&mut self, count: &[u32; MAX_COLORS + 1]) {
         let mut next = [0u32; MAX_COLORS + 1];
         for color in 0..MAX_COLORS {
             next[color + 1] = next[color] + count[color];
         }
-        // First fit opens colour c + 1 only after c: those in use are a prefix.
+        // First fit opens color c + 1 only after c: those in use are a prefix.
         let colors = count[..MAX_COLORS].iter().take_while(|&&n| n > 0).count();
         self.starts.clear();
         self.starts.extend_from_slice(&next[..=colors]);
@@ -105,7 +105,7 @@ impl Coloring {
         }
     }
 
-    /// Makes the next call of [`Self::assign`] recompute the colours whatever its arguments.
+    /// Makes the next call of [`Self::assign`] recompute the colors whatever its arguments.
     pub fn forget(&mut self) {
         self.starts.clear();
     }
@@ -116,33 +116,33 @@ impl Coloring {
         small + held(&self.edges) + held(&self.used)
     }
 
-    /// Whether the colouring is that of these edges.
+    /// Whether the coloring is that of these edges.
     pub fn is_current(&self, edges: &[[u32; 2]], body_count: usize) -> bool {
         self.body_count == body_count && self.edges == edges && !self.starts.is_empty()
     }
 
-    /// Number of colours in use, not counting overflow.
+    /// Number of colors in use, not counting overflow.
     pub fn colors(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Colour of each edge, or [`OVERFLOW`]; `[edges]`.
+    /// Color of each edge, or [`OVERFLOW`]; `[edges]`.
     pub fn color_of(&self) -> &[u8] {
         &self.color_of
     }
 
-    /// Edges by colour, in edge order within a colour, overflow last; `[edges]`.
+    /// Edges by color, in edge order within a color, overflow last; `[edges]`.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
 
-    /// Where each colour starts in [`Self::order`], and where the last one ends;
+    /// Where each color starts in [`Self::order`], and where the last one ends;
     /// `[colors + 1]`, or empty before the first call of [`Self::assign`].
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// Edges of one colour, ascending; none if the colour is not in use.
+    /// Edges of one color, ascending; none if the color is not in use.
     pub fn color(&self, color: usize) -> &[u32] {
         match self.starts.get(color..color.saturating_add(2)) {
             Some(range) => &self.order[range[0] as usize..range[1] as usize],
@@ -150,15 +150,15 @@ impl Coloring {
         }
     }
 
-    /// Edges left without a colour, ascending. Solve them one by one.
+    /// Edges left without a color, ascending. Solve them one by one.
     pub fn overflow(&self) -> &[u32] {
         &self.order[self.starts.last().map_or(0, |&end| end as usize)..]
     }
 
-    /// Lanes in all batches when each colour is cut into batches of `width`
+    /// Lanes in all batches when each color is cut into batches of `width`
     /// and the last one filled up; zero for width zero.
     ///
-    /// Occupancy is the coloured edges over this.
+    /// Occupancy is the colored edges over this.
     pub fn lane_slots(&self, width: usize) -> usize {
         if width == 0 {
             return 0;

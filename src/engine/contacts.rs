@@ -6,6 +6,7 @@ use glam::Vec2;
 /// One point of a manifold: two quads of lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ManifoldPoint {
     /// From the centre of mass of body a to the contact point, world axes (m): midway between both surfaces, or
     /// on that of b if a is static or kinematic.
@@ -25,6 +26,7 @@ pub struct ManifoldPoint {
 /// Up to two contact points that share a normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Manifold {
     /// The first `count` are used.
     pub points: [ManifoldPoint; 2],
@@ -40,6 +42,7 @@ pub struct Manifold {
 /// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact {
     /// Geometry at the start of the step; impulses of its last substep.
     pub manifold: Manifold,
@@ -60,8 +63,10 @@ pub struct Contact {
     pub step_impulse: [[f32; 2]; 2],
     /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner, infinite on a
     /// face; both 0 where nothing is round. Only found for solvers that ask for them.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub radii: [f32; 2],
     /// Fills the second cache line.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub unused: f32,
 }
 

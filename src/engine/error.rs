@@ -15,6 +15,11 @@ pub enum Error {
         /// What is wrong with it, with the value itself.
         message: String,
     },
+    /// A handle whose body was removed.
+    Removed {
+        /// The index that the body had.
+        body: usize,
+    },
     /// A name that is not in its table.
     Unknown {
         /// `solver`, `parameter`, …
@@ -27,6 +32,16 @@ pub enum Error {
 }
 
 impl Error {
+    /// The same about a value inside `place`; other errors know where they are.
+    pub fn within(self, place: &str) -> Self {
+        match self {
+            Error::Invalid { place: inner, message } => {
+                Error::Invalid { place: format!("{place}.{inner}"), message }
+            }
+            other => other,
+        }
+    }
+
     /// An out-of-range value at `place`.
     pub fn invalid(place: impl Into<String>, message: impl Into<String>) -> Self {
         Error::Invalid { place: place.into(), message: message.into() }
@@ -37,6 +52,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Error::Invalid { place, message } => write!(f, "{place}: {message}"),
+            Error::Removed { body } => write!(f, "body {body} was removed"),
             Error::Unknown { kind, name, known } => {
                 write!(f, "unknown {kind} '{name}': one of {}", known.join(", "))
             }

@@ -1,37 +1,22 @@
-//! The engine: from bodies and shapes to the next state, one step at a time.
-//!
-//! Floors, each importing from those before it only:
-//!
-//! ```text
-//! error  params  lanes      what all others are made of
-//! shapes  bodies            what is simulated
-//! contacts                  manifolds with impulses
-//! broadphase  narrowphase   which shapes touch, and where
-//! coloring  clock           independent sets; times of phases
-//! constraints  continuous   batches, records, passes; fast bodies
-//! solvers                   schedules of passes, one file each
-//! world                     the step
-//! ```
-//!
+#![doc = include_str!("README.md")]
 //! # Example
 //!
 //! ```
 //! # use simpulse_engine as simpulse;
-//! use glam::Vec2;
-//! use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
-//! use simpulse::engine::shapes::Shape;
-//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse::engine::{lanes, solvers, world::{Settings, World}};
 //!
-//! let mut world = World::new(Settings::new(solvers::find("soft_step")?));
-//! let rectangle = |x, y| Shape::rectangle("box", Vec2::new(x, y), Vec2::ZERO, 0.0, 0.0);
-//! let (ground, solid) = (ShapeDef::new(rectangle(50.0, 1.0)?), ShapeDef::new(rectangle(0.5, 0.5)?));
-//! world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ground]));
-//! let top = world.add_body(&BodyDef::new(BodyKind::Dynamic, [0.0, 0.5], vec![solid]));
-//! for _ in 0..60 {
-//!     world.step().expect("a resting box does not diverge");
+//! if let Some(line) = lanes::unused_cpu_features() {
+//!     eprintln!("{line}");
 //! }
-//! assert!((world.bodies.position_y[top] - 0.5).abs() < 1e-3);
-//! # Ok::<(), simpulse::engine::error::Error>(())
+//! let mut world = World::new(Settings::new(solvers::find("soft_step")?));
+//! world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+//! let top = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+//! for _ in 0..60 {
+//!     world.step()?;
+//! }
+//! assert!((world.bodies.position_y[top.index()] - 0.5).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 pub mod bodies;

@@ -53,6 +53,9 @@ pub const DEFAULT_GRAVITY: [f64; 2] = [0.0, -10.0];
 /// Step where a scene gives none (s).
 pub const DEFAULT_DT: f64 = 1.0 / 60.0;
 
+/// Bodies that approach each other faster than this (m/s) hit each other.
+pub const HIT_SPEED: f32 = 1.0;
+
 /// Bodies faster than this (m/s) or, in rad/s, spinning faster than this, have diverged.
 pub const DIVERGED_SPEED: f32 = 1.0e5;
 

@@ -103,6 +103,7 @@ impl From<crate::engine::error::Error> for Error {
         use crate::engine::error::Error as Engine;
         match error {
             Engine::Invalid { place, message } => Error::Invalid { place, message },
+            Engine::Removed { body } => Error::invalid(format!("body {body}"), "was removed"),
             Engine::Unknown { kind, name, known } => Error::unknown(kind, &name, known.into_iter()),
         }
     }

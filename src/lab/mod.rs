@@ -1,11 +1,78 @@
-//! The laboratory: what is simulated, what is known about it, and how solvers compare.
+#![doc = include_str!("README.md")]
+//! # From code
 //!
-//! Floors, each importing from those before it only:
+//! A scene as JSON, run under a solver, its errors measured, and a metric of one's own:
+//!
+//! ```
+//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::lab::{metrics::Observation, scenes::Scene};
+//!
+//! let text = r#"{ "name": "drop", "steps": 60, "bodies": [
+//!     { "type": "static", "position": [0, -1], "shapes": [{ "box": { "half": [20, 1] } }] },
+//!     { "type": "dynamic", "position": [0, 0.6], "shapes": [{ "circle": { "radius": 0.5 } }] }
+//! ] }"#;
+//! let scene = Scene::from_json(text, "drop.json".as_ref())?;
+//! let mut settings = Settings::new(solvers::find("soft_step")?);
+//! settings.record_impulses = true;
+//! settings.budget.substeps = 8;
+//! let mut world = scene.build(settings)?;
+//! let mut observation = Observation::new(&world);
+//! let mut highest_load = 0.0_f32;
+//! for _ in 0..scene.steps {
+//!     world.step()?;
+//!     observation.observe(&world);
+//!     let impulses = world.contacts.iter().map(|c| c.step_impulse[0][0] + c.step_impulse[1][0]);
+//!     highest_load = highest_load.max(impulses.sum::<f32>() / world.settings.dt);
+//! }
+//! assert!(observation.errors().penetration_max < 0.02 && highest_load > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A study, and its CSV:
+//!
+//! ```
+//! use simpulse::engine::solvers::find;
+//! use simpulse::lab::report::export;
+//! use simpulse::lab::study::{self, StudyPlan};
+//!
+//! let plan = StudyPlan {
+//!     scenes: vec!["stack:3".into()],
+//!     solvers: vec![find("pgs")?, find("soft_step")?],
+//!     ..StudyPlan::quick()
+//! };
+//! let records = study::run(&plan, &|_| (), &|_| ())?;
+//! let text = String::from_utf8(export::csv(&records)?)?;
+//! let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+//! let head = rows.next().ok_or("no header")?;
+//! let solver = head.iter().position(|&name| name == "solver").ok_or("no solver")?;
+//! assert!(rows.all(|row| ["pgs", "soft_step"].contains(&row[solver])));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! One step's contact problem, its exact solution, and the sweeps that solvers need to come to it:
+//!
+//! ```
+//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::lab::{capture::capture, reference::certify, scenes};
+//!
+//! let mut world = scenes::load("pyramid:3")?.scene.build(Settings::new(solvers::find("pgs")?))?;
+//! for _ in 0..10 {
+//!     world.step()?;
+//! }
+//! let problem = capture(&mut world, "step 10 of a small pyramid");
+//! let exact = certify::reference(&problem).map_err(|_| "no method certifies it")?;
+//! assert!(exact.certificate.natural_map < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Floors
+//!
+//! Each imports from those before it only:
 //!
 //! ```text
 //! error                          what can go wrong
 //! files  overrides  interned     result files; parameters by name; names read from files
-//! units  estimate                numbers for people; what a run will take
+//! units  estimate                human-readable numbers; what a run will take
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! recording                      whole runs in a file, and the page that plays them
@@ -20,8 +87,11 @@ pub mod capture;
 pub mod compare;
 pub mod converge;
 pub mod error;
+#[doc(hidden)]
 pub mod estimate;
+#[doc(hidden)]
 pub mod files;
+#[doc(hidden)]
 pub mod interned;
 pub mod metrics;
 pub mod overrides;

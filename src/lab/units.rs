@@ -1,4 +1,4 @@
-//! Numbers for people, three digits with the prefix that fits, and numbers from people.
+//! Human-readable numbers, three digits with the prefix that fits; and reading them.
 
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;

@@ -1,4 +1,4 @@
-//! Laws of a colouring, for any graph of constraints.
+//! Laws of a coloring, for any graph of constraints.
 
 use proptest::prelude::*;
 use simpulse::engine::coloring::{Coloring, EXEMPT, MAX_COLORS, OVERFLOW};
@@ -64,7 +64,7 @@ proptest! {
     }
 
     /// At its turn an edge sees at most deg(a) − 1 + deg(b) − 1 others, which
-    /// bounds its colour, and overflow needs all 64 colours taken.
+    /// bounds its color, and overflow needs all 64 colors taken.
     #[test]
     fn colors_within_the_greedy_bound(edges in graph()) {
         let mut coloring = Coloring::new();
@@ -133,7 +133,7 @@ fn exempt_sides_share_a_color() {
     assert_eq!(coloring.color_of(), [0, 0], "a body past the end is exempt");
 }
 
-/// A path takes its colours in turn: by hand.
+/// A path takes its colors in turn: by hand.
 #[test]
 fn a_path() {
     let mut coloring = Coloring::new();

@@ -63,7 +63,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     )
 }
 
-/// Colours the contacts, dynamic ones first, as a world does.
+/// Colors the contacts, dynamic ones first, as a world does.
 fn batches(setup: &Setup, width: usize) -> Batches {
     let mut batches = Batches::default();
     batches.clear(width);

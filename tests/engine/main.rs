@@ -12,3 +12,4 @@ mod soundness;
 mod structure;
 mod tutorial;
 mod types;
+mod world;

@@ -26,7 +26,7 @@ fn body(kind: BodyKind, position: [f64; 2]) -> BodyDef {
 
 fn world(settings: Settings, body: &BodyDef) -> World {
     let mut world = World::new(settings);
-    world.add_body(body);
+    world.add_body(body).unwrap();
     world
 }
 
@@ -146,9 +146,9 @@ fn static_bodies_stay_and_kinematic_bodies_follow_their_velocity() {
     let mut moving = body(BodyKind::Kinematic, [10.0, 0.0]);
     moving.velocity = [0.5, 0.0];
     moving.angular_velocity = 0.5;
-    world.add_body(&fixed);
-    world.add_body(&moving);
-    world.add_body(&body(BodyKind::Dynamic, [10.0, 0.45]));
+    world.add_body(&fixed).unwrap();
+    world.add_body(&moving).unwrap();
+    world.add_body(&body(BodyKind::Dynamic, [10.0, 0.45])).unwrap();
     let pose = world.bodies.pose(0);
     for _ in 0..30 {
         world.step().unwrap();

@@ -71,9 +71,9 @@ fn stack(count: usize, width: LaneWidth) -> World {
     let mut world = World::new(Settings::new(&ADAPTIVE).exactly(width));
     let shape = |x, y| Shape::rectangle("box", glam::Vec2::new(x, y), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
     let solid = |x, y| vec![ShapeDef::new(shape(x, y))];
-    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], solid(20.0, 1.0)));
+    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], solid(20.0, 1.0))).unwrap();
     for i in 0..count {
-        world.add_body(&BodyDef::new(BodyKind::Dynamic, [0.0, i as f64 + 0.5], solid(0.5, 0.5)));
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, [0.0, i as f64 + 0.5], solid(0.5, 0.5))).unwrap();
     }
     world
 }

@@ -1,4 +1,4 @@
-//! A constraint type from outside: two points that keep a distance. It joins the colours, batches
+//! A constraint type from outside: two points that keep a distance. It joins the colors, batches
 //! and passes of every solver without a line in any of them.
 
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
@@ -119,12 +119,12 @@ type Seen = Arc<Mutex<Vec<(Phase, usize)>>>;
 fn chain(solver: &'static Variant, width: LaneWidth, order: Order) -> (World, Seen) {
     let mut world = World::new(Settings { order, ..Settings::new(solver).exactly(width) });
     let block = Shape::rectangle("box", glam::Vec2::new(20.0, 1.0), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
-    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ShapeDef::new(block)]));
+    world.add_body(&BodyDef::new(BodyKind::Static, [0.0, -1.0], vec![ShapeDef::new(block)])).unwrap();
     for i in 0..6 {
         let disc = Shape::circle("disc", glam::Vec2::ZERO, 0.4).unwrap();
         let mut body = BodyDef::new(BodyKind::Dynamic, [i as f64, 0.4], vec![ShapeDef::new(disc)]);
         body.velocity = [if i == 5 { 3.0 } else { 0.0 }, 0.0];
-        world.add_body(&body);
+        world.add_body(&body).unwrap();
     }
     let seen = Seen::default();
     let ends: Vec<[u32; 2]> = (1..6).map(|i| [i, i + 1]).collect();
@@ -239,10 +239,10 @@ fn split_masses_count_rods_and_come_back() {
 }
 
 #[test]
-fn rods_are_in_the_passes_and_colours_of_the_contacts() {
+fn rods_are_in_the_passes_and_colors_of_the_contacts() {
     let (mut world, seen) = chain(find("soft_step").unwrap(), LaneWidth::W8, Order::Colored);
     world.step().unwrap();
-    // Six discs on the ground, and five rods in two colours.
+    // Six discs on the ground, and five rods in two colors.
     assert_eq!((world.counts.contacts, world.counts.colors, world.counts.overflow), (6, 3, 0));
     let of = |phase: Phase| -> usize {
         seen.lock().unwrap().iter().filter(|(p, _)| *p == phase).map(|(_, rods)| rods).sum()

@@ -59,7 +59,7 @@ pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
     let c = &world.counts;
     let sizes = [shapes, c.pairs, c.contacts, c.points].map(|n| n.checked_ilog2().map_or(0, |n| n + 1));
     Ok(format!(
-        "accepted: {ending}, {sizes:?}, {} colours, overflow {}, {:?}, {solver}",
+        "accepted: {ending}, {sizes:?}, {} colors, overflow {}, {:?}, {solver}",
         c.colors,
         c.overflow > 0,
         world.features()

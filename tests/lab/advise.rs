@@ -122,8 +122,8 @@ fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let table: &[(&[&str], &[&str])] = &[
         (&["staack", "--max-penetration", "1mm"], &["'staack'", "'stack'"]),
-        (&["stack:3"], &["no error is limited"]),
-        (&["stack:3", "--max-time", "1ms"], &["no error is limited"]),
+        (&["stack:3"], &["set at least one limit"]),
+        (&["stack:3", "--max-time", "1ms"], &["set at least one limit"]),
         (&["stack:3", "--max-penetration", "1"], &["max-penetration", "'1'", "unit"]),
         (&["stack:3", "--max-penetration", "1furlong"], &["'1furlong'", "'furlong'", "mm"]),
         (&["stack:3", "--max-penetration", "1mm", "--max-time", "5mm"], &["max-time", "'5mm'", "us"]),

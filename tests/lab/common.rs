@@ -17,7 +17,7 @@ pub fn with_width(variant: &'static Variant, width: LaneWidth) -> Settings {
 }
 
 /// A scene of the catalogue, or `crowded_plate`: one dynamic plate under more bodies than
-/// there are colours, so that contacts overflow, on a kinematic plate that moves sideways.
+/// there are colors, so that contacts overflow, on a kinematic plate that moves sideways.
 pub fn scene(name: &str) -> Scene {
     if name != "crowded_plate" {
         return scenes::load(name).unwrap().scene;

@@ -97,7 +97,7 @@ fn kept_contacts_are_those_of_a_fresh_look() {
 }
 
 #[test]
-fn a_list_that_somebody_else_cut_is_found_anew() {
+fn a_list_that_the_caller_cut_is_found_again() {
     let settings = crate::common::with_width(find("soft_step").unwrap(), LaneWidth::W8);
     let mut world = crate::common::run(&crate::common::scene("pyramid:5"), settings, 30);
     let count = world.contacts.len();

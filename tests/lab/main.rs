@@ -18,6 +18,7 @@ mod profile;
 mod recycling;
 mod rest;
 mod rivals;
+mod saved;
 mod scenes;
 mod schema;
 mod solver2d;

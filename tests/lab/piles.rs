@@ -186,7 +186,7 @@ fn placed_overlap_goes_in_a_tenth_of_a_second() {
         World::new(Settings { gravity: [0.0; 2], ..common::settings(solvers::find("shim").unwrap()) });
     for x in [-0.4, 0.4] {
         let disc = Shape::circle("disc", Vec2::ZERO, 0.5).unwrap();
-        world.add_body(&BodyDef::new(BodyKind::Dynamic, [x, 0.0], vec![ShapeDef::new(disc)]));
+        world.add_body(&BodyDef::new(BodyKind::Dynamic, [x, 0.0], vec![ShapeDef::new(disc)])).unwrap();
     }
     let (dt, h) = (world.settings.dt, world.settings.h());
     let [stiffness, damping_ratio] = [0, 1].map(|i| world.settings.parameters[i]);

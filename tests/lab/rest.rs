@@ -54,7 +54,7 @@ fn not_every_solver_keeps_them() {
     assert!(!variant.promises(Law::Rest) && creep("stack:10", variant) > CREEP);
 }
 
-/// Forty smooth discs in a row along the ground, which a tenth of their weight presses against a wall: as long a
+/// Forty frictionless discs in a row along the ground, which a tenth of their weight presses against a wall: as long a
 /// chain as a column of forty, and no load that tells it.
 #[test]
 fn a_pressed_row_does_not_swing_on_its_preload() {

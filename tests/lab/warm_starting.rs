@@ -53,7 +53,7 @@ fn cold_sweeps_converge_at_the_exact_rate() {
 
 #[test]
 fn colored_sweeps_converge_at_the_same_rate() {
-    // Two colours: red–black Gauss–Seidel of a consistently ordered matrix has the same rate.
+    // Two colors: red–black Gauss–Seidel of a consistently ordered matrix has the same rate.
     let error_after = |sweeps| {
         let mut world = column(sweeps, Order::Colored);
         world.frozen_step();

@@ -7,7 +7,7 @@ use simpulse::engine::world::{Order, Settings};
 use simpulse::lab::scenes;
 
 /// Scenes that differ in what their kernels need: discs with and without friction, boxes,
-/// polygons, restitution, kinematic bodies, colours that run out.
+/// polygons, restitution, kinematic bodies, colors that run out.
 const SCENES: [&str; 8] = [
     "disc_column:10",
     "stack:12",
@@ -85,7 +85,7 @@ fn a_crowded_plate_runs_out_of_colors() {
 
 #[test]
 fn few_contacts_run_in_fewer_lanes_with_the_same_bits() {
-    // A stack of five has colours of one and two contacts, a pyramid of 40 rows colours of hundreds.
+    // A stack of five has colors of one and two contacts, a pyramid of 40 rows colors of hundreds.
     for (name, lanes) in [("stack:5", LaneWidth::W4), ("pyramid:40", LaneWidth::W16)] {
         let scene = crate::common::scene(name);
         let solver = find("soft_step").unwrap();

@@ -142,7 +142,7 @@ pub fn decode(file: &[u8]) -> ([usize; 2], Vec<[u8; 3]>) {
     ([width, height], pixels)
 }
 
-/// How many pixels have this colour, to within a step or two per channel.
+/// How many pixels have this color, to within a step or two per channel.
 pub fn count(pixels: &[[u8; 3]], color: [u8; 3]) -> usize {
     pixels.iter().filter(|p| (0..3).all(|k| p[k].abs_diff(color[k]) <= 2)).count()
 }

@@ -1,6 +1,7 @@
 //! Pictures, recordings and pages as a user meets them; pages in a real browser where there is one.
 
 mod browser;
+mod documents;
 mod files;
 mod replay;
 mod report;
@@ -8,7 +9,7 @@ mod report;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// The colour of a solver in every plot.
+/// The color of a solver in every plot.
 fn solver_color(name: &str) -> [u8; 3] {
     let simpulse::lab::picture::Color(r, g, b, _) = simpulse::lab::report::style::Style::of(name).rgb();
     [r, g, b]

@@ -103,7 +103,7 @@ fn a_screenshot_shows_bodies_impulses_and_curves() {
     let Some(browser) = or_skip("a_screenshot_shows_bodies_impulses_and_curves") else { return };
     let folder = tempfile::tempdir().unwrap();
     let pixels = screenshot(&browser, &page(folder.path()), "t=1.5", [1300, 760]);
-    // The ground, arrows, and the captions' colours of pgs and soft_step.
+    // The ground, arrows, and the captions' colors of pgs and soft_step.
     for (what, color, least) in [
         ("ground", [0xd3, 0xd8, 0xde], 5000),
         ("impulses", [0x00, 0x72, 0xb2], 300),

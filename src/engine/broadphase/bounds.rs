@@ -75,21 +75,36 @@ impl FatBoxes {
         columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
     }
 
-    /// Takes in the bodies after those it knows. Their shapes are in order of bodies.
-    pub fn add(&mut self, bodies: &Bodies, shape_body: &[u32], shapes: &[Shape]) {
-        for body in self.first_shape.len()..bodies.len() {
-            let first = shape_body.partition_point(|&b| (b as usize) < body);
-            let own = shape_body[first..].iter().take_while(|&&b| b as usize == body).count();
-            self.outlines.extend(shapes[first..first + own].iter().map(Outline::new));
-            let reach = self.outlines[first..].iter().map(Outline::reach).fold(0.0, f32::max);
+    /// Adds a body, or replaces one. Its shapes begin with shape `first`.
+    pub fn set(&mut self, body: usize, first: usize, shapes: &[Shape]) {
+        if body == self.first_shape.len() {
             self.first_shape.push(first as u32);
             for column in [&mut self.x, &mut self.y, &mut self.cos, &mut self.sin] {
                 column.push(0.0);
             }
-            self.reach.push(reach);
-            // Below any distance: the first update looks at the body.
-            self.slack.push(-1.0);
+            self.reach.push(0.0);
+            self.slack.push(0.0);
         }
+        for (i, shape) in (first..).zip(shapes) {
+            match self.outlines.get_mut(i) {
+                Some(outline) => *outline = Outline::new(shape),
+                None => self.outlines.push(Outline::new(shape)),
+            }
+        }
+        let outlines = &self.outlines[first..first + shapes.len()];
+        self.reach[body] = outlines.iter().map(Outline::reach).fold(0.0, f32::max);
+        self.forget(body);
+    }
+
+    /// Looks at the body in the next update, whether it moved or not.
+    pub fn forget(&mut self, body: usize) {
+        // Below any distance.
+        self.slack[body] = -1.0;
+    }
+
+    /// Never looks at the body again.
+    pub fn remove(&mut self, body: usize) {
+        self.slack[body] = f32::INFINITY;
     }
 
     /// Renews the boxes of shapes that left theirs; returns those shapes, ascending.

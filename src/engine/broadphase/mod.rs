@@ -24,12 +24,14 @@ mod bounds;
 mod curve;
 mod hash_grid;
 mod node;
+mod region;
 mod sort;
 mod tree;
 
 pub use all_pairs::all_pairs;
 pub use bounds::FatBoxes;
 pub use hash_grid::HashGrid;
+pub use region::Region;
 pub use tree::Tree;
 
 use crate::engine::shapes::Aabb;
@@ -75,6 +77,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
 
 /// How candidate pairs are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum BroadPhaseKind {
     /// [`HashGrid`]
     HashGrid,

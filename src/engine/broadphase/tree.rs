@@ -294,6 +294,31 @@ impl Tree {
         (self.fresh, self.stack) = (fresh, stack);
     }
 
+    /// Calls `visit` with every proxy that `hits` finds in a node, in no order. `region` is handed on to both.
+    pub(super) fn visit<R>(
+        &self,
+        region: &mut R,
+        hits: impl Fn(&R, &Node) -> u32,
+        mut visit: impl FnMut(&mut R, u32),
+    ) {
+        if self.place.is_empty() {
+            return;
+        }
+        let mut stack = vec![[self.levels.len() - 1, 0]];
+        while let Some([level, node]) = stack.pop() {
+            let mut found = hits(region, &self.levels[level][node]);
+            while found != 0 {
+                let child = node * FAN + found.trailing_zeros() as usize;
+                found &= found - 1;
+                if level > 0 {
+                    stack.push([level - 1, child]);
+                } else {
+                    visit(region, self.order[child]);
+                }
+            }
+        }
+    }
+
     /// Calls `visit` with the sixteen proxies of every leaf that is hit, and which of them are.
     #[inline]
     fn query(&self, proxy: &Proxy, stack: &mut Vec<[u32; 2]>, mut visit: impl FnMut(&[u32; FAN], u32)) {

@@ -8,7 +8,7 @@
 //! | [`records`] | where each number of each constraint is stored; no arithmetic on bodies |
 //! | [`kernels`] | passes over bodies and contacts, compiled per width and features |
 //! | [`vectors`] | a step's problem as λ, v and J |
-//! //! | [`impacts`] | what happens when bodies hit each other |
+//! | [`impacts`] | what happens when bodies hit each other |
 //! | [`step`] | [`Passes`]: all that a solver sees |
 
 pub mod impacts;

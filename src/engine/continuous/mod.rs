@@ -26,6 +26,7 @@ use crate::engine::lanes::BodyRow;
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
 use glam::Vec2;
+use std::ops::Range;
 
 /// What is known of the bodies of a world, and the fast ones of the last step.
 #[derive(Clone, Debug, Default)]
@@ -54,18 +55,19 @@ pub struct Moving<'w> {
 }
 
 impl Continuous {
-    /// Takes in a body with these shapes, the next of the world.
-    pub fn add(&mut self, is_dynamic: bool, shapes: &[Shape]) {
-        if self.first_shape.is_empty() {
-            self.first_shape.push(0);
-        }
-        let first = self.first_shape[self.first_shape.len() - 1];
-        let last = first + shapes.len() as u32;
-        self.first_shape.push(last);
-        let half = shapes.iter().map(Shape::min_half_extent).fold(f32::INFINITY, f32::min);
-        self.safe_squared.push(if is_dynamic { half * half } else { f32::INFINITY });
-        if !is_dynamic {
-            self.fixed.extend(first..last);
+    /// Takes in all bodies of a world, each by whether it is dynamic and the shapes that it has, none if it was removed. `shapes`:
+    /// those of all bodies, in their order.
+    pub fn build(&mut self, bodies: impl Iterator<Item = (bool, Range<u32>)>, shapes: &[Shape]) {
+        (self.safe_squared.clear(), self.first_shape.clear(), self.fixed.clear());
+        self.first_shape.push(0);
+        for (is_dynamic, own) in bodies {
+            let half = shapes[own.start as usize..own.end as usize].iter().map(Shape::min_half_extent);
+            let half = half.fold(f32::INFINITY, f32::min);
+            self.safe_squared.push(if is_dynamic { half * half } else { f32::INFINITY });
+            self.first_shape.push(own.end);
+            if !is_dynamic {
+                self.fixed.extend(own);
+            }
         }
     }
 

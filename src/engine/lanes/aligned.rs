@@ -65,6 +65,22 @@ pub fn held<T>(array: &Vec<T>) -> usize {
     array.capacity() * size_of::<T>()
 }
 
+#[cfg(feature = "serde")]
+impl serde::Serialize for LaneVec {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self[..].serialize(to)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for LaneVec {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let mut array = LaneVec::default();
+        Vec::deserialize(from)?.into_iter().for_each(|value| array.push(value));
+        Ok(array)
+    }
+}
+
 impl Deref for LaneVec {
     type Target = [f32];
     fn deref(&self) -> &[f32] {

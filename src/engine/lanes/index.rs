@@ -196,7 +196,7 @@ impl<'a, const W: usize> LaneIndex<'a, [u32; W]> {
     }
 }
 
-/// Whether records of `stride` parts each, `parts` in all, are as many as `bound` asks for.
+/// Whether records of `stride` parts each, `parts` in all, are as many as `bound` requires.
 ///
 /// # Panics
 /// If not.

@@ -190,6 +190,7 @@ pub use halves::{gather_8, scatter_8, scatter_halves_8};
 pub use halves::{gather_16, scatter_16, scatter_halves_16};
 
 /// The module of one register width. `$lanes` 128-bit lanes a register.
+#[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
 macro_rules! registers {
     ($module:ident, $register:ident, $float:ident, $class:ident, $lanes:literal, $unpacklo:ident, $unpackhi:ident,
      $shuffle:ident, $gather:ident, $scatter:ident, $halves:ident, |$quads:ident| $join:expr, |$row:ident| $split:expr) => {

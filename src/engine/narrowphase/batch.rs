@@ -48,7 +48,7 @@ impl Kind {
 }
 
 /// Shapes as the kernels read them, by number.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Shapes {
     rows: Vec<ShapeRow>,
     hulls: Vec<HullRow>,
@@ -78,7 +78,7 @@ impl Shapes {
 }
 
 /// Pairs of one kind, one entry each in every list.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Jobs {
     /// What the caller calls the pair.
     pub name: Vec<u32>,

@@ -76,7 +76,7 @@ impl Rolling {
 }
 
 /// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad), and
-/// their radii of curvature, where `rolling` asks for them; see [`Rolling`].
+/// their radii of curvature, where `rolling` requests them; see [`Rolling`].
 #[inline(always)]
 pub fn in_step<L: Lanes>(
     pair: &ShapePair<L>,

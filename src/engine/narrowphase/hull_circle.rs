@@ -44,7 +44,7 @@ impl<L: Lanes> HullCircle<L> {
 
     /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
     /// than `speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
-    /// And their radii of curvature, where `rolling` asks for them, of the hull and of the circle.
+    /// And their radii of curvature, where `rolling` requests them, of the hull and of the circle.
     #[inline(always)]
     pub fn in_step(
         &self,

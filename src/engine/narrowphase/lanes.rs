@@ -25,9 +25,10 @@ impl PoseRow {
 }
 
 /// What kernels tell apart in a shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Class {
     /// A polygon with four right angles.
+    #[default]
     Rectangle,
     /// A circle.
     Circle,

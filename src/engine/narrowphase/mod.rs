@@ -15,16 +15,26 @@
 //! [`gjk`] and [`epa`] answer the same questions independently, in `f64`,
 //! to check this one.
 
+#[doc(hidden)]
 pub mod batch;
+#[doc(hidden)]
 pub mod candidate;
+#[doc(hidden)]
 pub mod circles;
+#[doc(hidden)]
 pub mod clip;
+#[doc(hidden)]
 pub mod epa;
 pub mod gjk;
+#[doc(hidden)]
 pub mod hull;
+#[doc(hidden)]
 pub mod hull_circle;
+#[doc(hidden)]
 pub mod hulls;
+#[doc(hidden)]
 pub mod lanes;
+#[doc(hidden)]
 pub mod rectangles;
 
 use crate::engine::contacts::Manifold;

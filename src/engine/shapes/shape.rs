@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 
 /// A convex polygon of 3 to 8 vertices, counter-clockwise, grown by `radius`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Polygon {
     /// The first `count` are used (m); the others repeat the last of them, so
     /// that code of fixed width may read all eight.
@@ -40,6 +41,7 @@ impl Polygon {
 
 /// A convex shape, in its body's frame (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Shape {
     /// All points within `radius` of `center`.
     Circle {
@@ -179,6 +181,23 @@ impl Shape {
         let ordered: Vec<Vec2> = (0..n).map(|i| at(i).as_vec2()).collect();
         let normals: Vec<Vec2> = (0..n).map(|i| outward(at(i), at(i + 1)).as_vec2()).collect();
         Ok(Shape::Polygon(Polygon::padded(&ordered, &normals, radius)))
+    }
+
+    /// Whether its coordinates and radius are in range: the fields are public, and a shape may have been moved.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let mut result = Ok(());
+        self.for_each_vertex(|v| {
+            if result.is_ok() {
+                result = check_point("shape", "vertex", v);
+            }
+        });
+        result?;
+        match self {
+            Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => {
+                check_length("shape", "radius", *radius)
+            }
+            _ => check_rounding("shape", self.radius()),
+        }
     }
 
     /// Rounding radius (m); 0 for a segment.

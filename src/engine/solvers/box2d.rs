@@ -4,7 +4,7 @@
 //!
 //! **Departures.** Bounces are this crate's ([`crate::engine::constraints::impacts::restitution`]), which
 //! keep energy; Box2D gives back e times the speed of approach. Manifolds of bodies that hardly moved are kept as in
-//! Box2D, but a disc's never (`box2d/recycle.rs`). The order is that of this crate's colours.
+//! Box2D, but a disc's never (`box2d/recycle.rs`). The order is that of this crate's colors.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
 //! without friction and `relax_iterations` rigid ones with it. Sweeps of a step request 1638 B per contact.

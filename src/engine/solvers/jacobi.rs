@@ -1,10 +1,10 @@
 //! Jacobi: every contact solves against the velocities from before the sweep, and what all of
-//! them add to a body is summed up. No contact waits for another, so no colouring is needed.
+//! them add to a body is summed up. No contact waits for another, so no coloring is needed.
 //!
 //! **Source.** `catto2024solver2d`, `solve_jacobi`; soft contacts as in [`super::soft_step`].
 //!
 //! **Departures.** Contacts between two dynamic bodies are softer than those with others by a
-//! factor of two in frequency, as in the source; sums are formed colour by colour, so that
+//! factor of two in frequency, as in the source; sums are formed color by color, so that
 //! every width gives the same bits. A factor `relaxation` on all increments is added: 1 is the
 //! source's solver.
 //!

@@ -7,7 +7,7 @@
 //!
 //! **Source.** `acary2018` (block Gauss–Seidel with a local solver); otherwise [`super::pgs`].
 //!
-//! **Departures.** A colour is swept several times in a row, which is the same, as its contacts share
+//! **Departures.** A color is swept several times in a row, which is the same, as its contacts share
 //! no body that moves.
 //!
 //! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps. Sweeps of a step

@@ -1,14 +1,28 @@
-//! Solvers, one file each; [`VARIANTS`] is the table that everything iterates.
+#![doc = include_str!("README.md")]
 //!
-//! A solver is a schedule: passes over bodies and contacts in its own order, called on
-//! [`Passes`], and a [`Variant`] that says what it is. Solvers never import one another; what two
-//! of them share is in [`crate::engine::constraints`]. `pgs.rs` is the tutorial: it explains the whole
-//! method, the others only what differs. Each file states its source, its departures from it, its cost in passes and
-//! in bytes, and when it fails. Bytes are those that all sweeps of a step at the standard budget request, warm start
-//! included, per contact of two points with friction; a test measures them.
+//! # Example
 //!
-//! To add one, write a file with a `pub static SOLVER: Variant` and add its row to [`VARIANTS`].
-//! Everything else (command line, study, tests, benches, records) follows from the row.
+//! Two solvers on the same stack:
+//!
+//! ```
+//! # use simpulse_engine as simpulse;
+//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse::engine::{solvers, world::{Settings, World}};
+//!
+//! let sag = |solver: &str| -> Result<f32, Box<dyn std::error::Error>> {
+//!     let mut world = World::new(Settings::new(solvers::find(solver)?));
+//!     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+//!     for i in 0..5 {
+//!         world.add_body(&BodyDef::dynamic([0.0, i as f64 + 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+//!     }
+//!     for _ in 0..120 {
+//!         world.step()?;
+//!     }
+//!     Ok(world.contacts.iter().map(|c| -c.manifold.points[0].separation).fold(0.0, f32::max))
+//! };
+//! assert!(sag("shim")? < 0.1 * sag("soft_step")?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::engine::clock::Clock;
 use crate::engine::constraints::records::kept::KeptSize;
@@ -114,6 +128,35 @@ pub enum Law {
 }
 
 /// A row of [`VARIANTS`].
+///
+/// A solver from outside needs no row in the table to run:
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::clock::Phase;
+/// use simpulse::engine::constraints::kernels::velocity::rules::Baumgarte;
+/// use simpulse::engine::constraints::{Passes, Schedule};
+/// use simpulse::engine::solvers::Variant;
+/// use simpulse::engine::world::{Settings, World};
+///
+/// static MINE: Variant = Variant { name: "mine", make: || Schedule::boxed(step), ..Variant::BASE };
+///
+/// fn step(passes: &mut Passes<'_>) {
+///     let rule = Baumgarte::rule(0.2, 0.005, 3.0, passes.h());
+///     passes.integrate_velocities();
+///     passes.warm_start();
+///     for _ in 0..passes.budget().velocity_iterations {
+///         passes.sweep(Phase::Solve, &rule);
+///         passes.iteration_done();
+///     }
+///     passes.integrate_positions();
+///     passes.end_substep(0);
+/// }
+///
+/// let mut world = World::new(Settings::new(&MINE));
+/// world.step()?;
+/// # Ok::<(), simpulse::engine::world::Divergence>(())
+/// ```
 #[derive(Debug)]
 pub struct Variant {
     /// Name on the command line; also the name of its file.
@@ -126,8 +169,7 @@ pub struct Variant {
     pub budget: Budget,
     /// The budget fields it reads, besides `substeps`.
     pub uses: Uses,
-    /// `k` of what the solver itself calls iterations, without substeps, in the place of those of its standard budget: how
-    /// convergence is counted.
+    /// The budget of `k` of what the solver itself calls iterations, without substeps: how convergence is counted.
     pub iterations: fn(standard: Budget, k: u32) -> Budget,
     /// Its own parameters, [`MAX_PARAMETERS`] at most.
     pub parameters: &'static [Parameter],

@@ -8,8 +8,7 @@
 //!
 //! **Departures.** A slop is left uncorrected, so that resting contacts stay contacts;
 //! points that do not touch yet may close their gap but no more (speculative contacts);
-//! the push is capped. The article has none of the three. Restitution is a pass at the
-//! end of the step instead of a term of b.
+//! the push is capped. The article has none of the three.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
 //! 1750 B per contact.
@@ -21,7 +20,7 @@
 //!
 //! # The method
 //!
-//! A contact row with Jacobian J wants J v + b ≥ 0, λ ≥ 0, and one of the two zero. With
+//! A contact row with Jacobian J requires J v + b ≥ 0, λ ≥ 0, and one of the two zero. With
 //! every other impulse fixed, λ alone changes its velocity by k = J M⁻¹ Jᵀ, so the
 //! impulse that gives J v + b = 0 is Δλ = −(J v + b)/k. What must not become negative
 //! is the *accumulated* impulse, not the increment:

@@ -1,15 +1,15 @@
-//! Gauss–Seidel in an order that is drawn anew for every sweep.
+//! Gauss–Seidel in a new random order for every sweep.
 //!
 //! A fixed order pushes the same way sweep after sweep, so that its error has a direction: a stack leans
 //! towards the side that is solved first. A random one has none.
 //!
 //! **Source.** `cottle1992` (the splitting); otherwise [`super::pgs`].
 //!
-//! **Departures.** Colours are taken in random order, and contacts only where they are solved one by
+//! **Departures.** Colors are taken in random order, and contacts only where they are solved one by
 //! one. The seed is the same in every step, so that a step is a function of its state and all widths
 //! give the same bits.
 //!
-//! **Cost.** That of [`super::pgs`], and a sort of colours (in natural order: of contacts) per sweep;
+//! **Cost.** That of [`super::pgs`], and a sort of colors (in natural order: of contacts) per sweep;
 //! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
 //! contact.
 //!

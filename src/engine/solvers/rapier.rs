@@ -8,7 +8,7 @@
 //! **Departures.** A stiffness clamp of an eighth of the substep rate is kept, which rapier leaves to
 //! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a
 //! thousandth of the product of their diagonal go row by row; rapier takes a hundredth. Bounces are
-//! this crate's. The order is that of this crate's colours.
+//! this crate's. The order is that of this crate's colors.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft block sweeps
 //! without friction and `relax_iterations` rigid block sweeps with it. Sweeps of a step request 1638 B per

@@ -13,7 +13,7 @@
 //!
 //! **Cost.** That of [`super::pgs`], then per level one pass over bodies and, over its contacts,
 //! three passes: effective masses, a sweep, effective masses. Contacts are grouped by level and
-//! colour, so that low levels fill few lanes. Sweeps of a step request 1920 B per contact.
+//! color, so that low levels fill few lanes. Sweeps of a step request 1920 B per contact.
 //!
 //! **Fails when** loads on the ground matter: the impulse of the last sweep takes no weight off the
 //! bodies above, and the bodies below do not feel it. Momentum is lost to them. Everything seems lighter
@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
     breaks: &[
         (Law::Momentum, "in the last sweep bodies below do not answer"),
         (Law::Converges, "the last sweep solves another problem"),
-        (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not feel that what it bears leans"),
+        (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not react when its load leans"),
     ],
     make: || Box::new(Shock::default()),
     ..Variant::BASE

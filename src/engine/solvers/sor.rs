@@ -1,4 +1,4 @@
-//! Successive over-relaxation: each row goes further than its own equation asks for.
+//! Successive over-relaxation: each row overshoots its own equation.
 //!
 //! **Source.** `cottle1992` (projected SOR); otherwise [`super::pgs`].
 //!
@@ -31,7 +31,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 1.3,
             range: [0.1, 2.0],
-            meaning: "factor on what a row asks for; 1 is plain Gauss–Seidel",
+            meaning: "factor on the increment of a row; 1 is plain Gauss–Seidel",
             trials: &[1.0, 1.2, 1.4, 1.6],
         },
     ],

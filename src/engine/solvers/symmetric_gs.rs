@@ -5,13 +5,13 @@
 //!
 //! **Source.** `cottle1992` (splittings of a linear complementarity problem); otherwise [`super::pgs`].
 //!
-//! **Departures.** Colours are taken in reverse, and within a contact rows keep their order: the
+//! **Departures.** Colors are taken in reverse, and within a contact rows keep their order: the
 //! splitting is symmetric by contacts, not by rows.
 //!
 //! **Cost.** That of [`super::pgs`]; an iteration is two sweeps. Sweeps of a step request 1750 B per contact.
 //!
 //! **Fails when** [`super::pgs`] does. In natural order a column of discs converges by 0.957
-//! per iteration and by 0.976 per plain sweep, which is no gain per sweep; colours carry news by one contact a sweep either way.
+//! per iteration and by 0.976 per plain sweep, which is no gain per sweep; colors carry news by one contact a sweep either way.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

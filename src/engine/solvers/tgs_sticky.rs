@@ -2,7 +2,7 @@
 //!
 //! **Source.** `catto2024solver2d`, `solve_tgs_sticky`.
 //!
-//! **Departures.** A point keeps how far it has drifted, not two anchors. It sticks anew in the sweep in
+//! **Departures.** A point keeps how far it has drifted, not two anchors. It sticks again in the sweep in
 //! which it slides; the source's waits for the next step. A cone is that of the mean normal
 //! impulse of the points that are there; the source takes half of the sum, also where there is one.
 //!

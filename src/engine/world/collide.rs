@@ -13,7 +13,7 @@ use crate::engine::params::SPECULATIVE_DISTANCE;
 use glam::Vec2;
 
 /// What the narrow phase keeps from step to step.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Narrow {
     /// Sorted by shape pair.
     pub candidates: Vec<Candidate>,
@@ -53,12 +53,12 @@ impl World {
         self.scale_impulses();
         let narrow = &mut self.narrow;
         if narrow.count != self.contacts.len() {
-            // Somebody else changed the list: what candidates remember of it means nothing.
+            // The caller changed the list: places that candidates remember are invalid.
             self.contacts.clear();
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
             (narrow.is_changed, narrow.jobs_are_current) = (true, false);
         }
-        if self.settings.record_impulses {
+        if self.settings.record_impulses || self.settings.contact_events {
             self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
         }
         let bodies = &self.bodies;
@@ -179,7 +179,7 @@ impl Narrow {
         held(&self.fresh) + held(&self.last_contacts)
     }
 
-    /// Lets candidates find their contacts in a list that was put in the place of the last one;
+    /// Lets candidates find their contacts in a list that replaced the last one;
     /// both are sorted by shape pair. Contacts without a candidate are forgotten.
     pub fn relink(&mut self, contacts: &mut Vec<Contact>) {
         self.last_contacts.clone_from(contacts);

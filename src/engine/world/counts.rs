@@ -29,7 +29,7 @@ pub struct StepCounts {
     pub constraint_bytes: usize,
 }
 
-/// What of a body left all bounds.
+/// Which quantity of a body is out of bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
@@ -58,19 +58,32 @@ pub enum Criterion {
 }
 
 /// Where and when a simulation left all bounds.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let mut world = World::new(Settings::new(solvers::find("pgs")?));
+/// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
+/// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
+/// let divergence = world.step().unwrap_err();
+/// assert_eq!(divergence.to_string(), "diverged at step 1: body 0 moves at 2.000e5 m/s");
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// Step number, from 1.
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// What of it is out of bounds.
+    /// Which quantity is out of bounds.
     pub quantity: Quantity,
     /// How large that is (m/s or rad/s); NaN if it is not finite.
     pub speed: f32,
     /// What was broken.
     pub criterion: Criterion,
 }
+
+impl std::error::Error for Divergence {}
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -9,7 +9,7 @@
 //!
 //! What repeats do to the state:
 //!
-//! * *pairs* searches all pairs again each time and *color* for all colours, as a step does in which
+//! * *pairs* searches all pairs again each time and *color* for all colors, as a step does in which
 //!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
 //! * *prepare* reads bodies and contacts and writes rows and records: always the same.
 //! * Sweeps go on from each other's velocities and impulses and converge; *warm start* and
@@ -35,7 +35,7 @@ pub struct HeldWorld<'w> {
     /// Contacts of the step that is held still, with the impulses it ended with.
     contacts: Vec<Contact>,
     rows: Vec<BodyRow>,
-    /// Records of contacts, coloured and serial, and of each other type.
+    /// Records of contacts, colored and serial, and of each other type.
     buffers: Vec<Vec<Block>>,
 }
 
@@ -64,7 +64,7 @@ pub struct Probe {
     pub rows: usize,
     /// Operations of all passes; none where the phase does not work on lanes.
     pub operations: Option<Operations>,
-    /// Contacts on which they were counted: those that have a colour.
+    /// Contacts on which they were counted: those that have a color.
     pub counted_contacts: usize,
     /// Per pass and contact, by kind of body a: floats of records read and written, rows gathered, half
     /// rows written.
@@ -83,10 +83,10 @@ impl World {
             fat_boxes: self.fat_boxes.clone(),
             counts: self.counts,
             kept: self.work.kept.clone(),
-            solver: self.solver.boxed(),
+            solver: self.solver.clone(),
             impulses_of: self.impulses_of,
             is_changed: self.narrow.is_changed,
-            types: self.work.types.iter().map(|joined| joined.kind.boxed()).collect(),
+            types: self.work.types.iter().map(|joined| joined.kind.clone()).collect(),
         };
         let timings = self.timings;
         self.frozen_step();
@@ -102,7 +102,7 @@ impl World {
         self.contacts.extend_from_slice(contacts);
         self.narrow.relink(&mut self.contacts);
         self.work.kept.clone_from(kept);
-        self.solver = solver.boxed();
+        self.solver = solver.clone();
         self.impulses_of = *impulses_of;
         // The list is another, but no contact has come or gone.
         (self.narrow.is_changed, self.lanes_are_for) = (*is_changed, None);
@@ -203,7 +203,7 @@ impl HeldWorld<'_> {
     /// # Panics
     /// If a phase runs a pass of another, whatever the filter says.
     pub fn probes(&mut self) -> Vec<Probe> {
-        // The same contacts in the same colours, one to a batch.
+        // The same contacts in the same colors, one to a batch.
         let settings = self.world.settings.clone();
         self.world.settings = settings.clone().exactly(LaneWidth::W1);
         self.world.settings.order = Order::Colored;
@@ -214,7 +214,7 @@ impl HeldWorld<'_> {
         self.restore_types();
         self.world.put_back(&self.before);
         self.world.frozen_step();
-        // Contacts were coloured anew, so records may have other places.
+        // Contacts were recolored, so records may have other places.
         self.save();
         probes
     }
@@ -266,7 +266,7 @@ impl HeldWorld<'_> {
     /// Brings back what constraints of other types keep.
     fn restore_types(&mut self) {
         for (joined, before) in self.world.work.types.iter_mut().zip(&self.before.types) {
-            joined.kind = before.boxed();
+            joined.kind = before.clone();
         }
     }
 
@@ -304,7 +304,7 @@ impl Drop for HeldWorld<'_> {
     }
 }
 
-/// Batches of contacts, coloured and serial, then those of each other type.
+/// Batches of contacts, colored and serial, then those of each other type.
 fn all_batches(work: &mut Workspace) -> impl Iterator<Item = &mut Batches> {
     let Workspace { lanes, serial, types, .. } = work;
     [lanes, serial].into_iter().chain(types.iter_mut().flat_map(|joined| joined.batches_mut()))

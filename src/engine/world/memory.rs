@@ -18,7 +18,7 @@ pub struct Component {
 /// Memory of a [`World`] on the heap, by purpose. The struct itself is not in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// Bodies, shapes, broad phase, candidates, contacts, colouring, records, rows.
+    /// Bodies, shapes, broad phase, candidates, contacts, coloring, records, rows.
     pub components: Vec<Component>,
 }
 
@@ -57,26 +57,7 @@ impl World {
         };
         let opaque = |bytes: usize| (bytes, bytes);
         let b = &self.bodies;
-        let lanes = [
-            &b.position_x,
-            &b.position_y,
-            &b.position_x_lo,
-            &b.position_y_lo,
-            &b.rotation_cos,
-            &b.rotation_sin,
-            &b.velocity_x,
-            &b.velocity_y,
-            &b.angular_velocity,
-            &b.inv_mass,
-            &b.inv_inertia,
-            &b.force_x,
-            &b.force_y,
-            &b.torque,
-            &b.gravity_scale,
-            &b.linear_damping,
-            &b.angular_damping,
-        ];
-        let mut bodies: Vec<_> = lanes.iter().map(|a| (a.bytes(), 4 * a.len())).collect();
+        let mut bodies: Vec<_> = b.arrays().iter().map(|a| (a.bytes(), 4 * a.len())).collect();
         bodies.extend(arrays![b.local_center, b.kind, b.group, b.round]);
         let w = &self.work;
         let mut records = Vec::new();
@@ -92,7 +73,7 @@ impl World {
             component("continuous collision", &[opaque(self.continuous.held_bytes())]),
             component("candidates", &[arrays![self.pairs][0], opaque(self.narrow.candidate_bytes())]),
             component("contacts", &[arrays![self.contacts][0], opaque(self.narrow.contact_bytes())]),
-            component("colouring", &[opaque(self.assignment.held_bytes())]),
+            component("coloring", &[opaque(self.assignment.held_bytes())]),
             component("records", &records),
             component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
         ];

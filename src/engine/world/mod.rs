@@ -4,12 +4,11 @@
 //! bounds → pairs → manifolds → colours → records → solver stages → impulses, poses
 //! ```
 
-use crate::engine::bodies::{Bodies, BodyDef, BodyKind};
+use crate::engine::bodies::Bodies;
 use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kernels::motion::{self, MotionInput};
 use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
 use crate::engine::constraints::records::assign::Assignment;
 use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
@@ -17,30 +16,39 @@ use crate::engine::continuous::{Continuous, Moving};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::lanes::Class;
 use crate::engine::params::DIVERGED_SPEED;
-use crate::engine::shapes::{Shape, combine};
+use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
-use glam::Vec2;
+use edit::{Slots, Standing};
+use events::Events;
+use std::fmt;
 use traits::Traits;
 
 mod answers;
 mod candidates;
 mod collide;
 mod counts;
+mod edit;
+mod events;
 mod held;
 mod lanes;
 mod memory;
 mod pairs;
+mod queries;
+#[cfg(feature = "serde")]
+mod saved;
 mod settings;
 mod traits;
 
 pub use counts::{Criterion, Divergence, Quantity, StepCounts};
+pub use events::{ContactEvent, ContactPoint};
 pub use held::{HeldWorld, Probe};
 pub use memory::{Component, Memory};
+pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
 /// What is known of a shape for its contacts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     friction: f32,
     restitution: f32,
@@ -53,6 +61,33 @@ struct Surface {
 }
 
 /// Bodies, shapes, contacts and the settings that move them.
+///
+/// A clone goes on with the same bits; a watch on iterations is not copied.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
+/// // One lane and the widest: the same bits.
+/// let mut hashes = Vec::new();
+/// for width in [LaneWidth::W1, LaneWidth::W16] {
+///     let mut world = World::new(Settings::new(solvers::find("soft_step")?).exactly(width));
+///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+///     for i in 0..8 {
+///         world.add_body(&BodyDef::dynamic([0.3 * i as f64, 1.1 * i as f64 + 0.6]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+///     }
+///     for _ in 0..30 {
+///         world.step()?;
+///     }
+///     let mut branch = world.clone();
+///     branch.step()?;
+///     world.step()?;
+///     assert_eq!(branch.state_hash(), world.state_hash());
+///     hashes.push(world.state_hash());
+/// }
+/// assert_eq!(hashes[0], hashes[1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
 pub struct World {
     /// Body state.
     pub bodies: Bodies,
@@ -81,6 +116,8 @@ pub struct World {
     narrow: Narrow,
     assignment: Assignment,
     continuous: Continuous,
+    /// Bodies came or went since `continuous` took them in.
+    continuous_is_stale: bool,
     /// What the present lanes were assigned for.
     lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
     /// Substep that the impulses of `contacts` belong to (s); none before there are any.
@@ -89,6 +126,22 @@ pub struct World {
     solver: Box<dyn Solver>,
     solver_is: &'static Variant,
     work: Workspace,
+    slots: Slots,
+    /// What is to be as it was before the next step.
+    applied: Vec<Standing>,
+    events: Events,
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World")
+            .field("solver", &self.settings.solver.name)
+            .field("step_index", &self.step_index)
+            .field("bodies", &self.handles().count())
+            .field("shapes", &self.shapes.len())
+            .field("contacts", &self.contacts.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl World {
@@ -113,56 +166,17 @@ impl World {
             narrow: Narrow::default(),
             assignment: Assignment::default(),
             continuous: Continuous::default(),
+            continuous_is_stale: true,
             lanes_are_for: None,
             impulses_of: None,
             solver: (settings.solver.make)(),
             solver_is: settings.solver,
             work: Workspace::default(),
+            slots: Slots::default(),
+            applied: Vec::new(),
+            events: Events::default(),
             settings,
         }
-    }
-
-    /// Adds a body whose shapes are valid; returns its index.
-    pub fn add_body(&mut self, body: &BodyDef) -> usize {
-        let parts: Vec<_> = body.shapes.iter().map(|s| s.shape.mass(s.density)).collect();
-        let mass = combine(&parts);
-        let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
-        let index = self.bodies.push(body, &mass);
-        self.bodies.round[index] = body.shapes.iter().all(|part| {
-            matches!(part.shape.translated(-center), Shape::Circle { center, .. } if center == Vec2::ZERO)
-        });
-        for part in &body.shapes {
-            let shape = part.shape.translated(-center);
-            // Fat boxes are made at the first step.
-            let aabb = shape.aabb(&self.bodies.pose(index));
-            let mut reach = 0.0_f32;
-            shape.for_each_vertex(|v| reach = reach.max(v.length()));
-            let (class, number) = self.narrow.shapes.push(&shape);
-            self.shapes.push(shape);
-            self.shape_body.push(index as u32);
-            self.surfaces.push(Surface {
-                friction: part.friction as f32,
-                restitution: part.restitution as f32,
-                reach: reach + shape.radius(),
-                class,
-                number,
-            });
-            let dynamic = body.kind == BodyKind::Dynamic;
-            self.proxies.push(Proxy { aabb, body: index as u32, group: body.group, dynamic });
-        }
-        let first = self.shapes.len() - body.shapes.len();
-        self.continuous.add(body.kind == BodyKind::Dynamic, &self.shapes[first..]);
-        self.fat_boxes.add(&self.bodies, &self.shape_body, &self.shapes);
-        self.traits.add(body, self.bodies.round[index]);
-        self.features = self.traits.features();
-        self.pairs_are_stale = true;
-        index
-    }
-
-    /// Adds constraints of another type than contacts. They take part in every pass of the solver.
-    pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
-        self.work.types.push(Joined::new(kind));
-        self.lanes_are_for = None;
     }
 
     /// What the scene needs of its constraints.
@@ -178,6 +192,10 @@ impl World {
         clock.lap(Phase::Store);
         self.step_index += 1;
         self.timings = clock.stop();
+        self.end_edits();
+        if self.settings.contact_events {
+            self.find_events();
+        }
         self.check()
     }
 
@@ -185,7 +203,14 @@ impl World {
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
-            let World { bodies, shapes, proxies, contacts, .. } = self;
+            let World { bodies, shapes, proxies, contacts, slots, .. } = self;
+            if std::mem::take(&mut self.continuous_is_stale) {
+                let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes).enumerate();
+                let each = lives.map(|(i, ((&lives, &first), &count))| {
+                    (lives && bodies.is_dynamic(i), first..first + if lives { count } else { 0 })
+                });
+                self.continuous.build(each, shapes);
+            }
             let moving = Moving { bodies, shapes, proxies, contacts };
             self.counts.fast = self.continuous.shorten(moving, &mut self.work.rows);
         }
@@ -224,6 +249,9 @@ impl World {
         self.update_pairs();
         clock.lap(Phase::Pairs);
         self.update_contacts();
+        if self.settings.contact_events {
+            self.note_approach();
+        }
         clock.lap(Phase::Collide);
         self.assign_lanes(&self.kernel_features());
         clock.lap(Phase::Color);
@@ -255,7 +283,7 @@ impl World {
             h: s.h(),
             parameters: s.parameters,
             phases,
-            record_impulses: s.record_impulses,
+            record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),
             points: self.counts.points,
         };

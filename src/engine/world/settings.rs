@@ -19,14 +19,29 @@ pub enum Order {
 }
 
 /// Everything a run can choose.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::{params::Budget, solvers, world::Settings};
+///
+/// let mut settings = Settings {
+///     gravity: [0.0, -1.6],
+///     budget: Budget { substeps: 8, ..solvers::find("soft_step")?.budget },
+///     ..Settings::new(solvers::find("soft_step")?)
+/// };
+/// // A parameter of the solver's own, by name; its range is checked.
+/// settings.solver.set(&mut settings.parameters, "contact_hertz", 60.0)?;
+/// assert!(settings.solver.set(&mut settings.parameters, "contact_hertz", -1.0).is_err());
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Row of [`crate::engine::solvers::VARIANTS`].
     pub solver: &'static Variant,
     /// Lanes per instruction, at most.
     pub width: LaneWidth,
-    /// Scenes with few contacts per colour run with fewer lanes, but not with fewer than these; see
-    /// [`Self::exactly`]. The results are the same bits.
+    /// Fewest lanes that a step may fall back to where colours are small; see [`Self::exactly`]. Every width gives the
+    /// same bits.
     pub narrowest: LaneWidth,
     /// Constraint order.
     pub order: Order,
@@ -42,6 +57,8 @@ pub struct Settings {
     pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
+    /// Find [`World::contact_events`](crate::engine::world::World::contact_events) after each step.
+    pub contact_events: bool,
     /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
     pub observe_rule: bool,
     /// Read the clock around every phase.
@@ -54,7 +71,7 @@ pub struct Settings {
     pub rotation: RotationUpdate,
     /// Whether fast bodies are stopped by what they would pass, see [`crate::engine::continuous`].
     pub continuous: bool,
-    /// Needs modelled on top of those that the scene has, to measure what they cost.
+    /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
 }
 
@@ -73,6 +90,7 @@ impl Settings {
             parameters: solver.defaults(),
             impacts: Impacts::Own,
             record_impulses: false,
+            contact_events: false,
             observe_rule: false,
             timed: false,
             broadphase: BroadPhaseKind::default(),

@@ -6,6 +6,7 @@ use crate::engine::shapes::Shape;
 
 /// Bodies that have a property, and whether a dynamic one is among them.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Having {
     bodies: usize,
     dynamic: bool,
@@ -25,6 +26,7 @@ impl Having {
 
 /// What decides the needs of a scene.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Traits {
     friction: Having,
     corner: Having,
@@ -45,6 +47,11 @@ impl Traits {
         self.has_other_than_discs |= dynamic && !round;
         self.bounces |= any(|s| s.restitution as f32 > 0.0);
         self.damped |= body.linear_damping as f32 > 0.0 || body.angular_damping as f32 > 0.0;
+    }
+
+    /// Something may spin that did not at the start.
+    pub fn spins(&mut self) {
+        self.spins = true;
     }
 
     /// What constraints between such bodies need.

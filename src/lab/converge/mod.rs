@@ -57,7 +57,7 @@ pub struct Options {
     pub max_iterations: u32,
     /// Seed of the shuffled order.
     pub seed: u64,
-    /// Lanes in coloured order; the other orders are serial.
+    /// Lanes in colored order; the other orders are serial.
     pub width: LaneWidth,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
@@ -83,7 +83,7 @@ impl Default for Options {
 
 /// State after some iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct CurvePoint {
     /// Budget k.
     pub iterations: u32,
     /// Constraint sweeps made.
@@ -122,7 +122,7 @@ pub struct Curve {
     /// Impulses at the start.
     pub start: Start,
     /// States, by iterations.
-    pub points: Vec<Point>,
+    pub points: Vec<CurvePoint>,
     /// Under the rigid law.
     pub rigid: Reached,
     /// Under the solver's own law.
@@ -150,7 +150,7 @@ pub struct Report {
     pub warm_start: WarmStart,
     /// Solvers that begin every step from zero, if there are warm starts: they have no warm curves.
     pub forgetful: Vec<String>,
-    /// Lanes in coloured order.
+    /// Lanes in colored order.
     pub lanes: usize,
     /// Factor per sweep of Gauss–Seidel in `f64` ([`gauss_seidel_rate`]); none where it comes to no solution, or
     /// too fast.
@@ -271,7 +271,7 @@ fn measure(
     reference: Option<&Reference>,
     iterations: u32,
     outcome: &Outcome,
-) -> (Point, bool) {
+) -> (CurvePoint, bool) {
     let Outcome { velocities, impulses, .. } = outcome;
     let unit = problem.impulse_unit();
     let rigid = natural_map(problem, Target::Rigid, velocities, impulses) / unit;
@@ -293,7 +293,7 @@ fn measure(
         Summary::of(&parts).max / unit
     });
     let velocity_error = reference.map(|r| r.compare(problem, velocities, impulses).velocity);
-    (Point { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
+    (CurvePoint { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
 }
 
 /// A curve that stands still within this many times the rounding floor has reached it.
@@ -313,7 +313,7 @@ fn curve(
     // Changes below half a unit in the last place of the largest impulse are lost.
     let unit = problem.impulse_unit();
     let floor = Cell::new(0.0_f64);
-    let mut visit = |k: u32, points: &mut BTreeMap<u32, Point>| {
+    let mut visit = |k: u32, points: &mut BTreeMap<u32, CurvePoint>| {
         let outcome = replay.run(schedule.variant, schedule.budget(k), start);
         let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
         floor.set(floor.get().max(0.5 * f64::from(f32::EPSILON) * largest / unit));
@@ -337,7 +337,7 @@ fn curve(
     }
     for law in LAWS {
         for tolerance in TOLERANCES {
-            let within = |p: &&Point| law(p).is_some_and(|r| r <= tolerance);
+            let within = |p: &&CurvePoint| law(p).is_some_and(|r| r <= tolerance);
             let Some(reached) = points.values().find(within).map(|p| p.iterations) else { break };
             let before = points.range(..reached).next_back().map_or(reached, |(&k, _)| k);
             for k in before + 1..reached {
@@ -347,7 +347,7 @@ fn curve(
             }
         }
     }
-    let points: Vec<Point> = points.into_values().collect();
+    let points: Vec<CurvePoint> = points.into_values().collect();
     let [rigid, own] = LAWS.map(|law| reached(&points, law, floor.get()));
     Curve {
         solver: schedule.name.clone(),
@@ -363,13 +363,13 @@ fn curve(
     }
 }
 
-const LAWS: [fn(&Point) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
+const LAWS: [fn(&CurvePoint) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
 
 /// Fits end this many times above the rounding floor: a residual there is off by 1 %.
 const ABOVE_FLOOR: f64 = 100.0;
 
 /// What `points` came to under `law`, with residuals rounded to about `floor`.
-fn reached(points: &[Point], law: fn(&Point) -> Option<f64>, floor: f64) -> Reached {
+fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f64) -> Reached {
     let first =
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));
     let residuals: Vec<[f64; 2]> =

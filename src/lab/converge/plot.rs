@@ -1,12 +1,12 @@
 //! `converge.svg`: residual against sweeps and against time, a row of two panels per law and start.
 //!
-//! Both axes are logarithmic. One colour per solver, one line style and marker per order; a marker
+//! Both axes are logarithmic. One color per solver, one line style and marker per order; a marker
 //! stands where a curve first reaches a tolerance. Thin curves are the `f64` methods, which have no
 //! time.
 
 use super::replay::{Sequence, Start};
 use super::warm::WarmStart;
-use super::{Curve, Point, Reached, Report};
+use super::{Curve, CurvePoint, Reached, Report};
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
 use plotters::coord::Shift;
@@ -26,7 +26,7 @@ const BOTTOM: i32 = 44;
 const RIGHT: i32 = 16;
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
-/// Distinct with any colour vision (Okabe and Ito), and a grey.
+/// Distinct with any color vision (Okabe and Ito), and a grey.
 const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -41,12 +41,12 @@ const COLORS: [RGBColor; 8] = [
 const DECADES: (i32, i32) = (-8, 1);
 
 /// Value of a curve's point on the horizontal axis.
-type Across = fn(&Curve, &Point) -> Option<f64>;
+type Across = fn(&Curve, &CurvePoint) -> Option<f64>;
 
 struct Row {
     title: String,
     start: Start,
-    residual: fn(&Point) -> Option<f64>,
+    residual: fn(&CurvePoint) -> Option<f64>,
     reached: fn(&Curve) -> &Reached,
 }
 
@@ -205,7 +205,7 @@ fn panel(
     for curve in curves {
         let id = (curve.solver.as_str(), curve.arithmetic);
         let color = COLORS[solvers.iter().position(|s| *s == id).unwrap_or(0) % COLORS.len()];
-        let at = |p: &Point| {
+        let at = |p: &CurvePoint| {
             let residual = (row.residual)(p).filter(|r| r.is_finite())?;
             let x = along(across(curve, p)?, range, left, right);
             Some((x, along(residual.max(1e-300), DECADES, bottom, top)))

@@ -30,7 +30,7 @@ use std::time::{Duration, Instant};
 pub enum Sequence {
     /// One after the other, as the problem lists them.
     Natural,
-    /// Colour by colour, in lanes.
+    /// Color by color, in lanes.
     Colored,
     /// One after the other, in an order drawn from this seed.
     Shuffled(u64),
@@ -47,7 +47,7 @@ impl fmt::Display for Sequence {
 }
 
 impl Sequence {
-    /// `0..count` in this order; colours keep the natural one.
+    /// `0..count` in this order; colors keep the natural one.
     pub fn order(self, count: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..count as u32).collect();
         if let Sequence::Shuffled(seed) = self {

@@ -1,7 +1,7 @@
 //! Methods in `f64` that share no code with the solvers, as curves to compare with.
 
 use super::replay::{Sequence, Start};
-use super::{Curve, LAWS, Options, Point, reached};
+use super::{Curve, CurvePoint, LAWS, Options, reached};
 use crate::lab::reference::certify::Reference;
 use crate::lab::reference::nncg::nncg;
 use crate::lab::reference::residual::Target;
@@ -47,8 +47,8 @@ pub(super) fn curves(
             let run = method(problem, &problem.contacts.iter().map(warm).collect::<Vec<_>>(), stop);
             let last = run.history.len() - 1;
             let error = reference.map(|r| problem.velocity_error(&run.velocities, &r.velocities));
-            let points: Vec<Point> = (0..=last)
-                .map(|k| Point {
+            let points: Vec<CurvePoint> = (0..=last)
+                .map(|k| CurvePoint {
                     iterations: k as u32,
                     sweeps: k * sweeps,
                     rigid: run.history[k],

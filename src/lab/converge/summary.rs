@@ -8,7 +8,7 @@ use crate::engine::lanes::native_width;
 const TOLD: [usize; 2] = [1, 3];
 
 /// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of
-/// Gauss–Seidel. Whole schedules in coloured order.
+/// Gauss–Seidel. Whole schedules in colored order.
 pub fn text(report: &Report) -> String {
     let own: Vec<&Curve> = report
         .curves
@@ -17,7 +17,7 @@ pub fn text(report: &Report) -> String {
         .collect();
     let emulated = if report.lanes > native_width().lanes() { ", emulated" } else { "" };
     let mut text =
-        format!("In coloured order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
+        format!("In colored order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
     for at in TOLD {
         for start in [Start::Cold, Start::Warm] {
             text += &sentence(&own, at, start);

@@ -1,7 +1,7 @@
 //! A [`Report`] as tables, CSV and JSON.
 
 use super::warm::{OFF, WarmStart};
-use super::{Curve, Point, Reached, Report, TOLERANCES};
+use super::{Curve, CurvePoint, Reached, Report, TOLERANCES};
 use crate::lab::error::Error;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Where a tolerance is not reached.
 const NEVER: &str = "—";
 
-/// Tables for people: iterations to each tolerance, and times where they were measured.
+/// Human-readable tables: iterations to each tolerance, and times where they were measured.
 pub fn text(report: &Report) -> String {
     let mut out = format!(
         "{}: {} bodies, {} contact points; residuals in units of {:.4e} N·s\n{}\n",
@@ -135,7 +135,7 @@ fn head(curve: &Curve, law: &str) -> Vec<String> {
     vec![solver, curve.order.to_string(), curve.start.to_string(), law.into()]
 }
 
-fn count(point: &Point) -> String {
+fn count(point: &CurvePoint) -> String {
     if point.iterations as usize == point.sweeps {
         point.sweeps.to_string()
     } else {

@@ -34,7 +34,7 @@ impl PointStep {
         let un = vn + law.bias + law.compliance * self.impulse[0];
         let rho = [mass_n / (1.0 + mass_n * law.compliance), mass_t];
         let [normal, tangent] = natural_map(self.impulse, [un, vt], rho, self.friction);
-        // A sweep without friction rows wants nothing along the tangent.
+        // A sweep without friction rows has no target along the tangent.
         [normal, if friction { tangent } else { 0.0 }]
     }
 }
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn the_own_law_is_obeyed_where_the_rigid_one_is_not() {
-        // Pushed apart with 0.5 m/s, as its bias wants.
+        // Pushed apart with 0.5 m/s, the target of its bias.
         assert_eq!(own([3.0, 0.0], 0.5 * DVec2::Y, -0.5, 0.0), [0.0; 2]);
         // A spring that takes 3 N·s has 1/4 kg⁻¹ × 3 N·s = 0.75 m/s to give.
         assert_eq!(own([3.0, 0.0], 0.25 * DVec2::Y, -1.0, 0.25), [0.0; 2]);

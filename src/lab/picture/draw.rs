@@ -1,5 +1,5 @@
 //! A frame as a picture: shapes, contact points, normals, impulses as arrows, penetration as
-//! colour, with a scale bar and a legend.
+//! color, with a scale bar and a legend.
 
 use super::frame::{Frame, Stage, TouchPoint};
 use super::outline::{outline, placed};
@@ -13,7 +13,7 @@ const FAINT: Color = Color::rgb(0x616e7c);
 const BORDER: Color = Color::rgb(0x52606d);
 const FIXED: Color = Color::rgb(0xd3d8de);
 const MOVED: Color = Color::rgb(0xd9d2e9);
-/// Blue and green of Okabe and Ito: distinct with any colour vision, and from the ramp.
+/// Blue and green of Okabe and Ito: distinct with any color vision, and from the ramp.
 const IMPULSE: Color = Color::rgb(0x0072b2);
 const NORMAL: Color = Color::rgb(0x009e73);
 /// No overlap to the deepest: lightness falls steadily, so that it reads in grey, too.
@@ -33,7 +33,7 @@ const LEGEND: f64 = 84.0;
 /// Height over width of the part with the scene, at least and at most.
 const ASPECT: [f64; 2] = [0.3, 0.95];
 
-/// The colour of an overlap, in shares of the deepest of the legend.
+/// The color of an overlap, in shares of the deepest of the legend.
 fn ramp(share: f64) -> Color {
     let place = share.clamp(0.0, 1.0) * (RAMP.len() - 1) as f64;
     let i = (place as usize).min(RAMP.len() - 2);
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn the_deepest_overlap_has_the_darkest_colour() {
+    fn the_deepest_overlap_has_the_darkest_color() {
         let lightness = |c: Color| 0.2 * f64::from(c.0) + 0.7 * f64::from(c.1) + 0.1 * f64::from(c.2);
         let shades: Vec<f64> = (0..=20).map(|k| lightness(ramp(f64::from(k) / 20.0))).collect();
         assert!(shades.windows(2).all(|w| w[1] < w[0]), "{shades:?}");

@@ -23,7 +23,7 @@ impl Color {
         Color((value >> 16) as u8, (value >> 8) as u8, value as u8, 255)
     }
 
-    /// The colour at `share` of the way to another, in [0, 1].
+    /// The color at `share` of the way to another, in [0, 1].
     pub fn towards(self, other: Color, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
         let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
@@ -62,7 +62,7 @@ pub enum Item {
         from: [f64; 2],
         /// To.
         to: [f64; 2],
-        /// Its colour.
+        /// Its color.
         color: Color,
         /// Its width.
         width: f64,
@@ -73,7 +73,7 @@ pub enum Item {
         at: [f64; 2],
         /// Its radius.
         radius: f64,
-        /// Its colour.
+        /// Its color.
         color: Color,
         /// Shown while the pointer is over it; empty for none.
         title: String,
@@ -86,7 +86,7 @@ pub enum Item {
         size: f64,
         /// Which end is at the anchor.
         anchor: Anchor,
-        /// Its colour.
+        /// Its color.
         color: Color,
         /// The letters.
         text: String,

@@ -60,7 +60,7 @@ impl Canvas {
         }
     }
 
-    /// Segments with round ends; all of one colour, drawn as one coverage so that joints do not
+    /// Segments with round ends; all of one color, drawn as one coverage so that joints do not
     /// show where it is transparent.
     fn stroke(&mut self, points: &[[f64; 2]], closed: bool, color: Color, width: f64) {
         let half = 0.5 * width;

@@ -263,7 +263,7 @@ fn working_set(memory: &Memory, phase: Option<Phase>) -> usize {
         None => return memory.used(),
         Some(Phase::Pairs) => &["shapes", "proxies", "broad phase", "candidates"],
         Some(Phase::Collide) => &["candidates", "contacts", "shapes"],
-        Some(Phase::Color) => &["contacts", "colouring"],
+        Some(Phase::Color) => &["contacts", "coloring"],
         Some(Phase::Prepare) => &["bodies", "contacts", "records", "rows"],
         Some(Phase::Integrate) => &["rows"],
         Some(Phase::Store) => &["bodies", "contacts", "records", "rows"],

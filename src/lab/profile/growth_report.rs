@@ -34,7 +34,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         times.add_row(cells);
     }
     let mut text = format!(
-        "Time per contact (ns), of a step and of its phases; a step searches all pairs and recomputes colours; pauses in\n\
+        "Time per contact (ns), of a step and of its phases; a step searches all pairs and recomputes colors; pauses in\n\
          which the thread waited for a processor are left out.  ±: median deviation of a step.  penetration: greatest.\n\
          residual: rms of the contact law in weights of the scene, and of a body, × step\n{}\n",
         finish(times, 1)
@@ -90,7 +90,7 @@ pub(super) fn sentence(verdict: &Verdict) -> String {
     );
     let of = |change: Change| verdict.steps.iter().filter(move |s| s.change == change);
     if of(Change::Flat).count() == verdict.steps.len() {
-        return text + "; no single step\n";
+        return text + "; no jump between sizes\n";
     }
     let place = |s: &super::growth::Growth| {
         format!("× {} from {} to {} contacts", digits(s.ratio), s.contacts[0], s.contacts[1])
@@ -236,7 +236,7 @@ fn panel(
         if let Some(&end) = points.last() {
             ends.push((end, name, color));
         }
-        // Colours come again after eight.
+        // Colors come again after eight.
         match i {
             0..=8 => area.draw(&PathElement::new(points, color.stroke_width(width)))?,
             _ => area.draw(&DashedPathElement::new(points, 6, 4, color.stroke_width(width)))?,

@@ -1,8 +1,9 @@
-//! How fast one phase of a step is, and how fast this machine would let it be.
+#![doc = include_str!("README.md")]
+//! # How it measures
 //!
 //! A phase is repeated on a state that is held still ([`crate::engine::world::HeldWorld`]), in turn with loops
-//! that measure what memory and arithmetic units can do ([`ceilings`]), so that whatever the machine
-//! does, it does to all of them. Its operations are counted by running the same kernel source on a
+//! that measure what memory and arithmetic units can do ([`ceilings`]), so a slow spell of the machine
+//! affects all of them alike. Its operations are counted by running the same kernel source on a
 //! lane that counts ([`crate::engine::lanes::Counted`]), its bytes follow from the layout ([`traffic`]).
 //!
 //! # The roofline

@@ -24,7 +24,7 @@ pub fn svg(report: &Report) -> Result<String, Error> {
 }
 
 /// A point: intensity and rate.
-struct Point<'a> {
+struct RooflinePoint<'a> {
     phase: &'a PhaseReport,
     intensity: f64,
     rate: f64,
@@ -33,10 +33,10 @@ struct Point<'a> {
 fn draw(report: &Report, text: &mut String) -> Drawn {
     let peak = report.multiply_adds.ok_or("without ceilings there is no roofline")?;
     let point = |phase: &'_ PhaseReport| Some((phase.intensity()?, phase.flops_rate()?));
-    let points: Vec<Point> = report
+    let points: Vec<RooflinePoint> = report
         .phases
         .iter()
-        .filter_map(|phase| point(phase).map(|(intensity, rate)| Point { phase, intensity, rate }))
+        .filter_map(|phase| point(phase).map(|(intensity, rate)| RooflinePoint { phase, intensity, rate }))
         .filter(|p| p.intensity > 0.0 && p.rate > 0.0)
         .collect();
     let root = SVGBackend::with_string(text, (SIZE.0 as u32, SIZE.1 as u32)).into_drawing_area();
@@ -102,7 +102,12 @@ fn roof(
 }
 
 /// Points, the roof over each, and their names beside the panel, joined by thin lines.
-fn labels(area: &Area, report: &Report, points: &[Point], at: &impl Fn(f64, f64) -> (i32, i32)) -> Drawn {
+fn labels(
+    area: &Area,
+    report: &Report,
+    points: &[RooflinePoint],
+    at: &impl Fn(f64, f64) -> (i32, i32),
+) -> Drawn {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| at(points[i].intensity, points[i].rate).1);
     let mut free = TOP + 8;

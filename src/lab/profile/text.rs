@@ -41,7 +41,7 @@ pub fn text(report: &Report) -> String {
 pub fn head(report: &Report) -> String {
     let c = &report.counts;
     format!(
-        "{} · {}, {} substeps, {} · {} bodies, {} contacts, {} points, {} colours, {:.0} % of lanes filled\n",
+        "{} · {}, {} substeps, {} · {} bodies, {} contacts, {} points, {} colors, {:.0} % of lanes filled\n",
         report.scene,
         report.solver,
         report.substeps,
@@ -61,8 +61,8 @@ fn per(total: f64, count: usize) -> String {
 fn single(report: &Report, phase: &PhaseReport) -> String {
     let probe = &phase.probe;
     let mut text = format!(
-        "{}: {} µs a pass, ± {}; {} in a step; median of {} timed passes; {:.1} % of the time went into \
-         bringing the state back\n",
+        "{}: {} µs a pass, ± {}; {} in a step; median of {} timed passes; {:.1} % of the time was spent \
+         restoring the state\n",
         probe.phase.name(),
         digits(1e-3 * phase.pass_ns),
         digits(1e-3 * phase.spread_ns),
@@ -167,7 +167,7 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
     }
     let mut text = format!("{LEGEND}\n{}", finish(rows, 1));
     text += &format!(
-        "  all phases: {} µs a step, pairs searched again; {:.1} % of the time went into bringing the state back\n",
+        "  all phases: {} µs a step, pairs searched again; {:.1} % of the time was spent restoring the state\n",
         digits(1e-3 * sum),
         100.0 * report.reset_share
     );

@@ -1,6 +1,6 @@
 //! Bytes that a pass requests.
 //!
-//! Counted is what the code names, each time it names it, in the layout that it is stored in:
+//! Bytes are counted each time the code requests them, in the layout that they are stored in:
 //!
 //! * *records*: 4 B per float of a record that the pass reads, and again per float that it writes
 //!   (accumulated impulses); lanes without a contact are read like the others;
@@ -8,7 +8,7 @@
 //! * *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
 //! * *body passes*: what is read and written of each row and of the arrays beside it;
 //! * *pairs, collide, color*: what goes in once and what comes out once; what they look up in
-//!   between (nodes of the tree, shapes, colours of a body) is not in it, so theirs is a lower bound.
+//!   between (nodes of the tree, shapes, colors of a body) is not in it, so theirs is a lower bound.
 //!
 //! It is not counted in cache lines, and a row that is gathered four times in a sweep counts four
 //! times though it mostly comes from a nearer cache than the records. The *working set* is what

@@ -19,7 +19,7 @@ pub struct Panel {
     pub bytes: Vec<u8>,
     /// What it is of.
     pub header: Header,
-    /// CSS colour of its curves.
+    /// CSS color of its curves.
     pub color: String,
 }
 

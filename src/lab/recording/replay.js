@@ -179,7 +179,7 @@
         const at = corners.map(([u, v]) => [px(x + cos * u - sin * v), py(y + sin * u + cos * v)]);
         const r = radius * scale;
         const kind = recording.kinds[body];
-        // What is too thin for an inside shows its colour on its border.
+        // What is too thin for an inside shows its color on its border.
         const bare = kind === "d" && state.depths && deepest > 0;
         c.strokeStyle = bare && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * depth[body] / deepest) : "#52606d";
         c.fillStyle = kind === "s" ? "#d3d8de" : kind === "k" ? "#d9d2e9" : state.depths && deepest > 0 ? ramp(depth[body] / deepest) : "#e3ebf5";

@@ -84,7 +84,7 @@ impl Frozen {
     pub fn from_text(text: &str, path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Format { path: path.into(), message };
         let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
-        // Format and version come first: what else stands in the header depends on them.
+        // Format and version come first: the rest of the header depends on them.
         let header: serde_json::Value = serde_json::from_str(first)
             .map_err(|e| refuse(format!("not a frozen problem: the first line is no JSON header ({e})")))?;
         if header["format"] != FORMAT {

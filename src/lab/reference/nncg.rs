@@ -10,11 +10,11 @@
 
 use super::problem::{ContactProblem, Pair};
 use super::residual::Target;
-use super::sweeps::{Rows, Run, Stop, gauss_seidel, iterate};
+use super::sweeps::{Run, ScalarRows, Stop, gauss_seidel, iterate};
 
 /// NNCG from `start`; one iteration is a sweep and an extrapolation.
 pub fn nncg(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop) -> Run {
-    let rows = Rows::new(problem, target);
+    let rows = ScalarRows::new(problem, target);
     let n = problem.contacts.len();
     let mut direction = vec![[0.0; 2]; n];
     let mut previous = f64::INFINITY;

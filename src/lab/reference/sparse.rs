@@ -22,7 +22,7 @@ pub type Entry = (usize, usize, f64);
 pub fn solve(entries: Vec<Entry>, right: &[f64]) -> Option<Vec<f64>> {
     let n = right.len();
     let matrix = compressed(entries, n);
-    // The library's ordering (0: of A + Aᵀ; −1: none) wants at least two columns.
+    // The library's ordering (0: of A + Aᵀ; −1: none) needs at least two columns.
     let mut symbolic = rsparse::sqr(&matrix, if n < 2 { -1 } else { 0 }, false);
     let factors = rsparse::lu(&matrix, &mut symbolic, DIAGONAL).ok()?;
     let place = factors.pinv.as_ref()?;

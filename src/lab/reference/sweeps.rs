@@ -53,13 +53,13 @@ pub struct Run {
 }
 
 /// Constants of all rows.
-pub(super) struct Rows {
+pub(super) struct ScalarRows {
     /// 1/(G_ii + compliance), normal and tangential (kg).
     inverse: Vec<Pair>,
     law: Vec<OwnRow>,
 }
 
-impl Rows {
+impl ScalarRows {
     pub(super) fn new(problem: &ContactProblem, target: Target) -> Self {
         Self::with_diagonal(problem, target, &problem.delassus_diagonal())
     }
@@ -67,7 +67,7 @@ impl Rows {
     fn with_diagonal(problem: &ContactProblem, target: Target, diagonal: &[Pair]) -> Self {
         let law: Vec<OwnRow> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
         let invert = |(g, row): (&Pair, &OwnRow)| [1.0 / (g[0] + row.compliance), 1.0 / g[1]];
-        Rows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
+        ScalarRows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
     }
 
     /// Normal impulse that would satisfy row `i` alone; NaN stays NaN, so that divergence shows.
@@ -85,7 +85,7 @@ impl Rows {
 /// One Gauss–Seidel pass in the given order.
 pub(super) fn gauss_seidel(
     problem: &ContactProblem,
-    rows: &Rows,
+    rows: &ScalarRows,
     order: impl Iterator<Item = usize>,
     impulses: &mut [Pair],
     velocities: &mut [Velocity],
@@ -145,7 +145,7 @@ pub(super) fn iterate(
 
 /// Projected Gauss–Seidel from `start`.
 pub fn pgs(problem: &ContactProblem, target: Target, start: &[Pair], sweep: Sweep, stop: Stop) -> Run {
-    let rows = Rows::new(problem, target);
+    let rows = ScalarRows::new(problem, target);
     let n = problem.contacts.len();
     iterate(problem, target, start, stop, |impulses, velocities| {
         gauss_seidel(problem, &rows, 0..n, impulses, velocities);
@@ -170,7 +170,7 @@ pub fn jacobi(problem: &ContactProblem, target: Target, start: &[Pair], split: S
         Splitting::Whole => problem.delassus_diagonal(),
         Splitting::Mass => split_diagonal(problem),
     };
-    let rows = Rows::with_diagonal(problem, target, &diagonal);
+    let rows = ScalarRows::with_diagonal(problem, target, &diagonal);
     iterate(problem, target, start, stop, |impulses, velocities| {
         for (i, c) in problem.contacts.iter().enumerate() {
             let [un, ut] = c.velocity(velocities);

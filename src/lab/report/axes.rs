@@ -1,4 +1,4 @@
-//! What the pictures share: logarithmic scales, panels with ticks, text, markers, colours.
+//! What the pictures share: logarithmic scales, panels with ticks, text, markers, colors.
 //!
 //! Axes are drawn here and not by the chart builder, so that a panel of any range has
 //! readable ticks within tight limits.
@@ -13,7 +13,7 @@ pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 pub const INK: RGBColor = RGBColor(40, 40, 40);
 pub const GRID: RGBColor = RGBColor(222, 222, 222);
-/// Distinct with any colour vision (Okabe and Ito).
+/// Distinct with any color vision (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -25,12 +25,12 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(160, 160, 40),
 ];
 
-/// The colour of the curve at this index, where curves are no solvers.
+/// The color of the curve at this index, where curves are no solvers.
 pub fn color(curve: usize) -> RGBColor {
     COLORS[curve % COLORS.len()]
 }
 
-/// The colour of a solver, the same in every plot.
+/// The color of a solver, the same in every plot.
 pub fn solver_color(solver: &str) -> RGBColor {
     let crate::lab::picture::Color(r, g, b, _) = Style::of(solver).rgb();
     RGBColor(r, g, b)

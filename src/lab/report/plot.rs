@@ -1,6 +1,6 @@
 //! `speed_vs_error.svg`: time against error, a row of panels per scene.
 //!
-//! Both axes are logarithmic. One colour per solver, one marker shape per budget, a white dot on
+//! Both axes are logarithmic. One color per solver, one marker shape per budget, a white dot on
 //! those in natural order; every marker is the fastest lane width of its setting. A line of steps
 //! shows the least time in which the solver has at most that error: settings are different runs,
 //! and between them there is nothing.

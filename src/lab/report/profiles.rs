@@ -71,7 +71,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
     }
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write_upwards(area, &format!("share of {} scenes", profile.scenes), (x + 14, (top + bottom) / 2), 12)?;
-    write(area, "time, in times that of the fastest", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
+    write(area, "time relative to the fastest solver", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
     for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
         // Steps that coincide stay visible beside each other.

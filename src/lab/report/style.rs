@@ -1,8 +1,8 @@
-//! A colour and a marker per solver, the same in every plot, whatever else is in it.
+//! A color and a marker per solver, the same in every plot, whatever else is in it.
 //!
-//! Eight colours that differ with any colour vision (Okabe and Ito, yellow darkened for lines on
+//! Eight colors that differ with any color vision (Okabe and Ito, yellow darkened for lines on
 //! white) times eight markers. A solver's place decides: first those of [`DEFAULT_SOLVERS`], which
-//! therefore differ in colour, then the others of [`VARIANTS`]. Neighbours differ in both, and
+//! therefore differ in color, then the others of [`VARIANTS`]. Neighbours differ in both, and
 //! sixty-four solvers differ in one of them.
 
 use crate::engine::solvers::VARIANTS;
@@ -15,7 +15,7 @@ const COLORS: [&str; 8] =
 /// How a solver is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Style {
-    /// CSS colour.
+    /// CSS color.
     pub color: &'static str,
     /// Shape of its marker.
     pub marker: Marker,
@@ -62,7 +62,7 @@ impl Style {
         Style::at(place)
     }
 
-    /// The colour as numbers.
+    /// The color as numbers.
     pub fn rgb(self) -> Color {
         Color::rgb(u32::from_str_radix(&self.color[1..], 16).unwrap_or_default())
     }

@@ -1,8 +1,9 @@
 //! From a scene to a world: every value checked, geometry rounded to `f32`.
 
 use super::format::{Geometry, Scene, SceneBody, SceneShape};
-use crate::engine::bodies::{BodyDef, BodyKind, ShapeDef};
-use crate::engine::shapes::{MassProperties, Shape, combine};
+pub use crate::engine::bodies::MAX_FRICTION;
+use crate::engine::bodies::{BodyDef, ShapeDef};
+use crate::engine::shapes::Shape;
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use glam::Vec2;
@@ -19,9 +20,6 @@ pub const MAX_DT: f64 = 1e3;
 
 /// Most steps of a run: 46 hours at 60 steps a second.
 pub const MAX_STEPS: u32 = 10_000_000;
-
-/// Greatest friction coefficient (1), so that the product of two is finite in `f32`.
-pub const MAX_FRICTION: f64 = 1e9;
 
 impl Scene {
     /// Whether a world can be made of this scene.
@@ -81,7 +79,7 @@ impl Scene {
         let gravity = self.gravity.map(|g| g as f32);
         let mut world = World::new(Settings { gravity, dt: self.dt as f32, ..settings });
         for body in &bodies {
-            world.add_body(body);
+            world.add_body(body)?;
         }
         Ok(world)
     }
@@ -89,13 +87,6 @@ impl Scene {
 
 /// Errors name places within the body.
 fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
-    finite_pair("position", body.position)?;
-    finite("angle", body.angle)?;
-    finite_pair("velocity", body.velocity)?;
-    finite("angular_velocity", body.angular_velocity)?;
-    finite("gravity_scale", body.gravity_scale)?;
-    not_negative("linear_damping", body.linear_damping)?;
-    not_negative("angular_damping", body.angular_damping)?;
     let shape = |(k, shape)| shape_def(shape).map_err(|e| e.within(&format!("shapes[{k}]")));
     let shapes = body.shapes.iter().enumerate().map(shape);
     let def = BodyDef {
@@ -111,39 +102,12 @@ fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
         bullet: body.bullet,
         shapes: shapes.collect::<Result<_, _>>()?,
     };
-    if def.kind == BodyKind::Dynamic {
-        if def.shapes.is_empty() {
-            return Err(Error::invalid("shapes", "a dynamic body needs at least one shape, has 0"));
-        }
-        let MassProperties { mass, inertia, .. } = mass_properties(&def);
-        for (name, value) in [("mass", mass as f32), ("inertia", inertia as f32)] {
-            // The reciprocal is what the solver holds, so it must be a number too.
-            if !(value.is_normal() && value.recip().is_normal()) {
-                let message = format!("the {name} of a dynamic body must be positive and finite, is {value}");
-                return Err(Error::invalid("shapes", message));
-            }
-        }
-    }
+    def.check()?;
     Ok(def)
-}
-
-/// Mass (kg), centre (m, in the body's frame) and inertia (kg·m²) of all shapes of a body.
-pub(super) fn mass_properties(body: &BodyDef) -> MassProperties {
-    combine(&body.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
 }
 
 /// Errors name places within the shape.
 fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
-    positive("density", shape.density)?;
-    not_negative("friction", shape.friction)?;
-    if shape.friction > MAX_FRICTION {
-        let message = format!("must be at most {MAX_FRICTION:e}, is {:?}", shape.friction);
-        return Err(Error::invalid("friction", message));
-    }
-    finite("restitution", shape.restitution)?;
-    if !(0.0..=1.0).contains(&shape.restitution) {
-        return Err(Error::invalid("restitution", format!("must be in [0, 1], is {}", shape.restitution)));
-    }
     Ok(ShapeDef {
         shape: geometry(&shape.geometry)?,
         density: shape.density,
@@ -208,12 +172,4 @@ fn positive(place: &str, value: f64) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::invalid(place, format!("must be positive, is {value:?}")))
-}
-
-fn not_negative(place: &str, value: f64) -> Result<(), Error> {
-    finite(place, value)?;
-    if value >= 0.0 {
-        return Ok(());
-    }
-    Err(Error::invalid(place, format!("must not be negative, is {value:?}")))
 }

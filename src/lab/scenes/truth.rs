@@ -6,7 +6,6 @@
 //! exactly, the observer compares with that, so that a correct solver's error is
 //! rounding, not discretisation.
 
-use super::check::mass_properties;
 use super::format::Scene;
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::Contact;
@@ -182,14 +181,14 @@ pub(super) fn ground_load(view: &View) -> Option<f64> {
 pub(super) fn weight(scene: &Scene) -> f64 {
     let defs = scene.body_defs().unwrap_or_default();
     let dynamic = defs.iter().filter(|b| b.kind == BodyKind::Dynamic);
-    let masses = dynamic.map(|b| mass_properties(b).mass * b.gravity_scale);
+    let masses = dynamic.map(|b| b.mass().mass * b.gravity_scale);
     -scene.gravity[1] * masses.sum::<f64>()
 }
 
 /// Centres of mass at the start (m), by body.
 pub(super) fn start_centers(scene: &Scene) -> Vec<[f64; 2]> {
     let center = |b: &crate::engine::bodies::BodyDef| {
-        let [x, y] = mass_properties(b).center;
+        let [x, y] = b.mass().center;
         let (sin, cos) = b.angle.sin_cos();
         [b.position[0] + cos * x - sin * y, b.position[1] + sin * x + cos * y]
     };

@@ -1,4 +1,4 @@
-//! A25: where balance ends, and what bears what before it does.
+//! A25: where balance ends, and which contact carries which load before.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -32,7 +32,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A25.groove",
-        "loads of a smooth disc in a groove of 30° and 50°, worse of two",
+        "loads of a frictionless disc in a groove of 30° and 50°, worse of two",
         "N",
         "what the jitter limit of B5 does to momentum in a step",
         groove,

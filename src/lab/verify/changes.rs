@@ -143,7 +143,8 @@ fn set(lab: &Lab) -> Result<Finding, Failure> {
     let shape = Shape::rectangle("B25.set", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0)
         .map_err(|error| Failure::Unmeasured(error.to_string()))?;
     let heavy = ShapeDef { density: 100.0, ..ShapeDef::new(shape) };
-    world.add_body(&BodyDef::new(BodyKind::Dynamic, [0.0, highest + 1.0], vec![heavy]));
+    let body = BodyDef::new(BodyKind::Dynamic, [0.0, highest + 1.0], vec![heavy]);
+    world.add_body(&body).map_err(|error| Failure::Unmeasured(error.to_string()))?;
     moves(&mut world, 10.0)
 }
 

@@ -57,7 +57,7 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "list: 1e-3 m",
         drift,
-        Yes("the list asks for it; what it asks for is more than 30 Hz contacts hold: see the promises"),
+        Yes("required by the list of cases; it exceeds what 30 Hz contacts hold: see the promises"),
     ),
     Case::new(
         "B5.jitter",
@@ -65,7 +65,7 @@ pub(super) static CASES: &[Case] = &[
         "m/s",
         "list: 1e-4 m/s",
         jitter,
-        Yes("the list asks for it; what it asks for is more than 30 Hz contacts hold: see the promises"),
+        Yes("required by the list of cases; it exceeds what 30 Hz contacts hold: see the promises"),
     ),
     Case::new(
         "B5.height",
@@ -144,7 +144,7 @@ fn soft_depths(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(off), 0.0, 2.0 * 2f64.powi(-20)))
 }
 
-/// B2. A unit box bears half its weight at each of two corners: 1/m = 1 + 6/4, so 1.25 g/ω².
+/// B2. A unit box rests with half its weight on each of two corners: 1/m = 1 + 6/4, so 1.25 g/ω².
 fn soft_box(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("stack:1")?, 0.0, |_| ())?;
     let deepest = depths(&world).into_iter().map(|(_, depth, _)| depth).fold(f64::NAN, f64::max);

@@ -35,7 +35,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "B24.shaft",
-        "loads of two smooth discs in a shaft, on floor, walls and each other, worst",
+        "loads of two frictionless discs in a shaft, on floor, walls and each other, worst",
         "N",
         "what the jitter limit of B5 does to momentum in a step",
         shaft,

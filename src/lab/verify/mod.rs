@@ -1,4 +1,4 @@
-//! Hard cases: set-ups whose truth is known on paper, run against every solver.
+//! Hard test cases with known analytic answers, run against every solver.
 //!
 //! A case runs a scene, reads one number from the state in `f64` and compares it with the
 //! truth. It does not know which solver ran. A new case is one function and one row in the file of

@@ -1,6 +1,6 @@
 //! A20–A22: two bodies that both move.
 
-use super::Required::Yes;
+use super::Required::{No, Yes};
 use super::lab::*;
 use super::{Case, Failure, Finding, Lab};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};

@@ -9,7 +9,7 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A20.pair",
-        "velocities after a smooth disc has hit two that touch, with e = 1, 1/2 and 0, worst of its way",
+        "velocities after a frictionless disc has hit two that touch, with e = 1, 1/2 and 0, worst of its way",
         "m/s",
         "1e-3 of 4 m/s: where impulses stop to spread",
         pair,
@@ -17,7 +17,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A20.wedge",
-        "velocities after a smooth disc has fallen on a smooth wedge that glides on ice, worst of its way",
+        "velocities after a frictionless disc has fallen on a frictionless wedge that glides on ice, worst of its way",
         "m/s",
         "1e-3 of 4 m/s, as A20.pair",
         wedge,

@@ -109,7 +109,7 @@ impl ImpactLaw {
 }
 
 /// Side records of what bounces.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct ImpactRecords {
     /// Of the coloured batches, and of the serial ones.
     pub bounces: [Bounces; 2],

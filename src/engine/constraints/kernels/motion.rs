@@ -18,7 +18,7 @@ use wide::{f32x4, f32x8};
 
 /// How velocities and positions follow each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
     /// Velocity first, then position with the new velocity.
     #[default]
@@ -29,7 +29,7 @@ pub enum Integrator {
 
 /// How a spin turns a body within a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RotationUpdate {
     /// By h ω.
     #[default]
@@ -54,7 +54,7 @@ pub struct MotionInput {
 }
 
 /// What a step needs to move bodies, one entry per row.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// What forces add to a velocity in one substep: `[h aₓ, h a_y, h α, 0]`.
     velocity_increment: Vec<[f32; 4]>,
@@ -86,7 +86,7 @@ impl Motion {
                 self.round.push((i as u32, 0.0));
             }
             let inv_mass = bodies.inv_mass[i];
-            // Where nothing can turn a body, it is to be seen that nothing does.
+            // Without rotation, infinite inertia shows that nothing turns a body.
             let inv_inertia = if features.rotation { bodies.inv_inertia[i] } else { 0.0 };
             rows.push(BodyRow {
                 velocity: [bodies.velocity_x[i], bodies.velocity_y[i], bodies.angular_velocity[i], inv_mass],

@@ -19,6 +19,12 @@ pub struct ObservedRule {
     pub deltas: Vec<[f32; 4]>,
 }
 
+impl Clone for ObservedRule {
+    fn clone(&self) -> Self {
+        ObservedRule { sweep: self.sweep.boxed(), friction: self.friction, deltas: self.deltas.clone() }
+    }
+}
+
 impl fmt::Debug for ObservedRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ObservedRule").field("friction", &self.friction).finish_non_exhaustive()

@@ -15,7 +15,7 @@ use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 pub struct PassInput<'a> {
     /// One row per body, and an inert one at the end.
     pub rows: &'a mut [BodyRow],
-    /// Coloured batches, or serial ones.
+    /// Colored batches, or serial ones.
     pub batches: &'a mut Batches,
     /// Which of both.
     pub part: Part,
@@ -91,7 +91,7 @@ pub(crate) use at_width;
 ///
 /// To add one, implement this; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is the example.
 pub trait Pass {
-    /// What it asks for per contact with records of this layout.
+    /// What it requests per contact with records of this layout.
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
     /// How constraints of other types take part.

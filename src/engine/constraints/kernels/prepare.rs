@@ -36,7 +36,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     let records = records.chunks_exact_mut(layout.stride);
     let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
     for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
-        // Contacts of a colour lie far apart in memory, where the hardware does not look ahead.
+        // Contacts of a color lie far apart in memory, where the hardware does not look ahead.
         let coming = contact.entries_of(batch + AHEAD, L::WIDTH);
         prefetch_records::<STRIDE>(quads, coming.iter().copied());
         // Only a segment's last batch has empty lanes. They read a contact and ignore it.

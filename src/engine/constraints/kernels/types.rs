@@ -1,10 +1,10 @@
-//! Constraints of other types than contacts, which join passes, colours and batches.
+//! Constraints of other types than contacts, which join passes, colors and batches.
 //!
 //! A type says which bodies its constraints are on and brings its own kernel. Its constraints are
-//! coloured together with the contacts, so that the lanes of a colour push different bodies
-//! whatever they are of, and every pass of a solver runs over both: within a colour the other types
+//! colored together with the contacts, so that the lanes of a color push different bodies
+//! whatever they are of, and every pass of a solver runs over both: within a color the other types
 //! come first, then the contacts. No solver knows which types there are, nor a type which solver runs:
-//! [`TypeRows`] reads and writes bodies as the pass wants it, so that one kernel serves Gauss–Seidel and
+//! [`TypeRows`] reads and writes bodies as the pass requires, so that one kernel serves Gauss–Seidel and
 //! Jacobi sweeps.
 //!
 //! What is no pass knows contacts alone: vectors over contact points ([`crate::engine::constraints::records::point_vector`]) and block descent
@@ -24,7 +24,7 @@ pub struct TypeInput<'a> {
     /// What the pass is for: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
     /// feedback), [`Phase::Relax`] (without), [`Phase::Position`] or [`Phase::Store`].
     pub phase: Phase,
-    /// Whether only effective masses are asked for, and the factor on increments in a Jacobi sweep.
+    /// Whether only effective masses are computed, and the factor on increments in a Jacobi sweep.
     pub mode: PassMode,
     /// Substep (s).
     pub h: f32,
@@ -80,7 +80,40 @@ impl RowStore for TypeRows<'_> {
     }
 }
 
-/// A type of constraint between two bodies.
+/// A type of constraint between two bodies. `tests/engine/types.rs` is a complete one, a rod; this one leaves bodies alone:
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::bodies::{BodyDef, ShapeDef};
+/// use simpulse::engine::constraints::kernels::types::{ConstraintType, TypeInput};
+/// use simpulse::engine::{solvers, world::{Settings, World}};
+///
+/// #[derive(Clone, Debug)]
+/// struct Idle(Vec<[u32; 2]>);
+///
+/// impl ConstraintType for Idle {
+///     fn ends(&self) -> &[[u32; 2]] {
+///         &self.0
+///     }
+///     fn stride(&self) -> usize {
+///         1
+///     }
+///     /// Called once per pass, whatever it is for (`on.phase`), with the rows of all bodies (`on.rows`).
+///     fn run(&mut self, _on: TypeInput<'_>) {}
+///     fn boxed(&self) -> Box<dyn ConstraintType> {
+///         Box::new(self.clone())
+///     }
+/// }
+///
+/// let mut world = World::new(Settings::new(solvers::find("pgs")?));
+/// let [a, b] = [0.0, 3.0].map(|x| BodyDef::dynamic([x, 0.0]).with(ShapeDef::circle(0.5).unwrap()));
+/// let [a, b] = [world.add_body(&a)?, world.add_body(&b)?];
+/// world.add_constraints(Box::new(Idle(vec![[a.index() as u32, b.index() as u32]])));
+/// world.step()?;
+/// // Bodies of other constraints than contacts stay.
+/// assert!(world.remove_body(a).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait ConstraintType: fmt::Debug + Send {
     /// Bodies a and b of each constraint; b is dynamic.
     fn ends(&self) -> &[[u32; 2]];
@@ -98,12 +131,18 @@ pub trait ConstraintType: fmt::Debug + Send {
     fn boxed(&self) -> Box<dyn ConstraintType>;
 }
 
+impl Clone for Box<dyn ConstraintType> {
+    fn clone(&self) -> Self {
+        (**self).boxed()
+    }
+}
+
 /// A type and the lanes of its constraints.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Joined {
     /// The type.
     pub kind: Box<dyn ConstraintType>,
-    /// Coloured batches at the width of the step.
+    /// Colored batches at the width of the step.
     pub(crate) lanes: Batches,
     /// What is solved one after the other.
     pub(crate) serial: Batches,
@@ -115,7 +154,7 @@ impl Joined {
         Joined { kind, lanes: Batches::default(), serial: Batches::default() }
     }
 
-    /// Its batches, coloured and serial.
+    /// Its batches, colored and serial.
     pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
         [&mut self.lanes, &mut self.serial]
     }

@@ -1,4 +1,4 @@
-//! Which constraint goes to which lane: by colours, or one after the other.
+//! Which constraint goes to which lane: by colors, or one after the other.
 
 use crate::engine::coloring::{Coloring, EXEMPT};
 use crate::engine::constraints::records::batches::Place;
@@ -28,8 +28,8 @@ impl Entry {
     }
 }
 
-/// Constraints against one kind of body, and their colours.
-#[derive(Debug, Default)]
+/// Constraints against one kind of body, and their colors.
+#[derive(Clone, Debug, Default)]
 struct Group {
     entries: Vec<Entry>,
     /// Their rows, with a exempt unless it is dynamic.
@@ -38,15 +38,15 @@ struct Group {
 }
 
 /// Gives constraints their lanes; keeps its memory from call to call.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Assignment {
     /// By [`OppositeKind`].
     groups: [Group; 3],
-    /// Entries of one colour.
+    /// Entries of one color.
     color: Vec<Entry>,
-    /// Colours in use.
+    /// Colors in use.
     pub colors: usize,
-    /// Constraints that got no colour and are solved one by one.
+    /// Constraints that got no color and are solved one by one.
     pub overflow: usize,
 }
 
@@ -73,7 +73,7 @@ impl<F> Sides<'_, F> {
 /// Cost of a batch's arithmetic, if that of gathering one of its lanes is 1.
 const BATCH_COST: usize = 12;
 
-/// Colours of all groups are fewer than this.
+/// Colors of all groups are fewer than this.
 const STAGES_PER_LEVEL: u32 = 256;
 
 impl Assignment {
@@ -83,12 +83,12 @@ impl Assignment {
         self.groups.iter().map(one).sum::<usize>() + held(&self.color)
     }
 
-    /// Forgets all colours, so that the next call recomputes them even for the same contacts.
+    /// Forgets all colors, so that the next call recomputes them even for the same contacts.
     pub fn forget(&mut self) {
         self.groups.iter_mut().for_each(|group| group.coloring.forget());
     }
 
-    /// Lanes colour by colour, as many as pay and the two `widths` allow; what gets no colour goes one after
+    /// Lanes color by color, as many as pay and the two `widths` allow; what gets no color goes one after
     /// the other.
     pub fn colored(
         &mut self,

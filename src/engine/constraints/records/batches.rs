@@ -54,7 +54,7 @@ pub struct SegmentRecords<'a, L> {
 /// The two sets of batches of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Coloured, at the width of the step.
+    /// Colored, at the width of the step.
     Lanes,
     /// One after the other.
     Serial,
@@ -184,7 +184,7 @@ impl Batches {
     }
 
     /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
-    /// batches with lanes that point at the `inert` row: a colour of a stage of its own, or with one
+    /// batches with lanes that point at the `inert` row: a color of a stage of its own, or with one
     /// lane to a batch contacts that follow each other.
     ///
     /// # Panics

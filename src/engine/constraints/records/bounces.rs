@@ -6,7 +6,7 @@ use crate::engine::lanes::{Block, Lanes, held};
 use std::slice::ChunksExactMut;
 
 /// Side records; what they hold, each law of impacts says ([`crate::engine::constraints::impacts`]).
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Bounces {
     /// Lane vectors per record.
     stride: usize,

@@ -2,7 +2,7 @@
 
 /// What the contacts of a scene can need, found once when the scene is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Features {
     /// Some contact can turn a body. Not so when every dynamic body is a disc about
     /// its own centre, nothing spins at the start and there is no friction.

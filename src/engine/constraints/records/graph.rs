@@ -1,7 +1,7 @@
 //! The contact graph: bodies are nodes, contacts are edges.
 //!
 //! For solvers that go from body to body (block descent on bodies) or from the ground upwards
-//! (shock propagation). Built only for a solver that asks for it, in time linear in contacts.
+//! (shock propagation). Built only for a solver that requests it, in time linear in contacts.
 //! Edges are numbered as contacts are; nothing here knows what an edge is.
 
 use crate::engine::lanes::held;

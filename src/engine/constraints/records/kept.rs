@@ -9,6 +9,7 @@ use crate::engine::lanes::{LaneVec, held};
 
 /// How many numbers a solver keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KeptSize {
     /// Floats per contact, a multiple of four.
     pub per_contact: usize,
@@ -25,6 +26,7 @@ impl KeptSize {
 
 /// The numbers; see the [module](self).
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Kept {
     size: KeptSize,
     /// Shape pair and feature ids of each contact that the numbers belong to.
@@ -35,8 +37,11 @@ pub struct Kept {
     points: LaneVec,
     /// `[bodies × per_body]`
     bodies: Vec<f32>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     last_names: Vec<(u64, [u32; 2])>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     last_contacts: LaneVec,
+    #[cfg_attr(feature = "serde", serde(skip))]
     last_points: LaneVec,
 }
 
@@ -80,6 +85,20 @@ impl Kept {
     pub fn body(&mut self, body: usize) -> &mut [f32] {
         let size = self.size.per_body;
         &mut self.bodies[body * size..][..size]
+    }
+
+    /// Whether the numbers are as many as their names say, as they may not be after they were read from a file.
+    pub fn is_consistent(&self) -> bool {
+        let (KeptSize { per_contact, per_point, .. }, contacts) = (self.size, self.names.len());
+        self.points.len() == 2 * contacts * per_point && self.contacts.len() == contacts * per_contact
+    }
+
+    /// Sets what is kept of body `body` to zero: another one has taken its place.
+    pub fn forget_body(&mut self, body: usize) {
+        let size = self.size.per_body;
+        if let Some(own) = self.bodies.get_mut(body * size..(body + 1) * size) {
+            own.fill(0.0);
+        }
     }
 
     /// All numbers of contact points, `[2 × contacts × per_point]`, first points of all contacts before second ones.

@@ -1,7 +1,7 @@
 //! In which order a sweep visits contacts.
 //!
-//! Within a colour no two contacts share a body that they push, so only the order of colours
-//! matters, and a colour that is visited k times in a row is k local iterations of each of its
+//! Within a color no two contacts share a body that they push, so only the order of colors
+//! matters, and a color that is visited k times in a row is k local iterations of each of its
 //! contacts. What is solved one after the other is visited contact by contact. Nothing here depends
 //! on the width, and kernels know nothing of it: they run over the segments that they are given.
 
@@ -10,7 +10,7 @@ use crate::engine::constraints::records::segment::Segment;
 /// In which order a sweep visits contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SweepOrder {
-    /// As they were assigned: colour by colour, then the serial ones.
+    /// As they were assigned: color by color, then the serial ones.
     #[default]
     Forward,
     /// The other way round.
@@ -108,12 +108,12 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_visited_whole_and_serial_contacts_one_by_one() {
-        let colours = [segment(0, 0, 3, true), segment(1, 3, 2, true), segment(2, 5, 1, true)];
-        assert_eq!(visited(SweepOrder::Forward, &colours), [(0, 3), (3, 2), (5, 1)]);
-        assert_eq!(visited(SweepOrder::Reverse, &colours), [(5, 1), (3, 2), (0, 3)]);
-        assert_eq!(visited(SweepOrder::Local(2), &colours), [(0, 3), (0, 3), (3, 2), (3, 2), (5, 1), (5, 1)]);
-        assert_eq!(visited(SweepOrder::Level(0), &colours), [(0, 3), (3, 2)]);
+    fn colors_are_visited_whole_and_serial_contacts_one_by_one() {
+        let colors = [segment(0, 0, 3, true), segment(1, 3, 2, true), segment(2, 5, 1, true)];
+        assert_eq!(visited(SweepOrder::Forward, &colors), [(0, 3), (3, 2), (5, 1)]);
+        assert_eq!(visited(SweepOrder::Reverse, &colors), [(5, 1), (3, 2), (0, 3)]);
+        assert_eq!(visited(SweepOrder::Local(2), &colors), [(0, 3), (0, 3), (3, 2), (3, 2), (5, 1), (5, 1)]);
+        assert_eq!(visited(SweepOrder::Level(0), &colors), [(0, 3), (3, 2)]);
         let serial = [segment(0, 0, 3, false)];
         assert_eq!(visited(SweepOrder::Reverse, &serial), [(2, 1), (1, 1), (0, 1)]);
         assert_eq!(visited(SweepOrder::Local(2), &serial)[..3], [(0, 1), (0, 1), (1, 1)]);

@@ -1,7 +1,7 @@
 //! Vectors over contact points in the order of the lanes: what is done entry by entry is done in lanes.
 //!
 //! Sixteen contacts that follow each other in a segment share four blocks: λn of their first points, λt of
-//! those, then the same of their second points. A segment of coloured batches begins with blocks of its own,
+//! those, then the same of their second points. A segment of colored batches begins with blocks of its own,
 //! whatever the width, and so a contact has one place at every width; contacts in natural order follow each
 //! other without gaps. Places without a point are zero. Sums are kept in sixteen parts, one for each place
 //! within a block, in `f64` and in the order of the blocks, and the parts are added in order: the

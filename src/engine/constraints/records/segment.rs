@@ -2,7 +2,7 @@
 
 use crate::engine::constraints::records::features::OppositeKind;
 
-/// Batches of one colour and one kind of body a: one kernel runs over them.
+/// Batches of one color and one kind of body a: one kernel runs over them.
 ///
 /// No dynamic body occurs twice in a segment, unless the segment is serial (width 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub struct Segment {
     /// Lane vectors of a record ([`crate::engine::constraints::records::features::Layout::stride`]).
     pub stride: usize,
     /// When it is solved: stages follow each other, and constraints of other types with the same
-    /// stage share its colour.
+    /// stage share its color.
     pub stage: u32,
     /// Which level of the contact graph it is of; 0 unless contacts are grouped by level.
     pub level: u32,

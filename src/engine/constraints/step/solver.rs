@@ -44,6 +44,12 @@ pub trait Solver: fmt::Debug + Send {
     }
 }
 
+impl Clone for Box<dyn Solver> {
+    fn clone(&self) -> Self {
+        (**self).boxed()
+    }
+}
+
 /// What a solver sees of a world around a collision.
 pub struct Scene<'a> {
     /// At the beginning of the step.
@@ -78,7 +84,7 @@ impl Scene<'_> {
 }
 
 /// What a solver asks of the collision that comes.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Collision {
     /// By candidate, whether its manifold is left as it is; empty if all are found again.
     pub keep: Vec<bool>,

@@ -27,7 +27,7 @@ impl Passes<'_> {
         vector
     }
 
-    /// What of a vector belongs to the coloured and to the serial batches; empty if it is.
+    /// What of a vector belongs to the colored and to the serial batches; empty if it is.
     pub(crate) fn parts_of<'v>(&self, vector: &'v mut PointVector) -> [&'v mut [Block]; 2] {
         if vector.is_empty() {
             [&mut [], &mut []]

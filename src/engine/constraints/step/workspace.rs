@@ -53,6 +53,25 @@ impl fmt::Debug for Watch {
     }
 }
 
+/// A copy is not watched: a closure cannot be copied.
+impl Clone for Workspace {
+    fn clone(&self) -> Self {
+        Workspace {
+            rows: self.rows.clone(),
+            motion: self.motion.clone(),
+            lanes: self.lanes.clone(),
+            serial: self.serial.clone(),
+            types: self.types.clone(),
+            kept: self.kept.clone(),
+            impacts: self.impacts.clone(),
+            vectors: self.vectors.clone(),
+            watch: None,
+            observe: self.observe,
+            last_rule: self.last_rule.clone(),
+        }
+    }
+}
+
 impl Workspace {
     /// Bytes held by what only some solvers have.
     pub fn own_bytes(&self) -> usize {

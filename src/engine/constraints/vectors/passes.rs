@@ -1,7 +1,7 @@
 //! Passes between the records of contacts and [`PointVector`]s: impulses in and out, J v, and M⁻¹ Jᵀ.
 //!
 //! A pass is compiled per width alone: which quantities a record has is asked per batch, as what it
-//! waits for is memory. Contacts are pushed colour by colour, in the order of a warm start.
+//! waits for is memory. Contacts are pushed color by color, in the order of a warm start.
 
 use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
 use crate::engine::constraints::records::batches::{Batches, SegmentRecords};

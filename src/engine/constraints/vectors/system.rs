@@ -80,7 +80,7 @@ impl<'a> System<'a> {
         self.over_lanes(delta, |width, on| at_width!(width, passes::push(on)));
     }
 
-    /// Coloured batches at their width, then serial ones at one lane.
+    /// Colored batches at their width, then serial ones at one lane.
     ///
     /// # Panics
     /// If the vector is of other contacts.

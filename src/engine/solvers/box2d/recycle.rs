@@ -27,7 +27,7 @@ const KINDS: [Kind; 2] = [Kind::Rectangles, Kind::Hulls];
 
 /// A manifold as it was found, on its bodies.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct KeptManifold {
     /// [`Candidates`] are sorted by it.
     pair: u64,
     /// d, in the frame of a (m).
@@ -46,8 +46,8 @@ struct Found {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Recycled {
     /// By kind, sorted by pair.
-    found: [Vec<Found>; KINDS.len()],
-    last_found: [Vec<Found>; KINDS.len()],
+    found: [Vec<KeptManifold>; KINDS.len()],
+    last_found: [Vec<KeptManifold>; KINDS.len()],
     /// By candidate, whether its manifold is kept in this step.
     kept: Vec<bool>,
     /// Manifolds may be kept in this step.
@@ -66,10 +66,10 @@ fn unrotate(frame: Vec2, vector: Vec2) -> Vec2 {
     Vec2::new(frame.x, -frame.y).rotate(vector)
 }
 
-impl Found {
+impl KeptManifold {
     fn new(pair: u64, contact: &Contact, bodies: [&PoseRow; 2]) -> Self {
         let (d, [a, b]) = poses(bodies);
-        let mut found = Found {
+        let mut found = KeptManifold {
             pair,
             offset: unrotate(a, d),
             turn: unrotate(a, b),
@@ -165,7 +165,7 @@ impl Recycled {
                 let old = last.next_if(|f| f.pair == pair).filter(|_| self.kept[place as usize]);
                 found.push(old.copied().unwrap_or_else(|| {
                     let contact = &mut contacts[candidate.contact as usize];
-                    let new = Found::new(pair, contact, bodies);
+                    let new = KeptManifold::new(pair, contact, bodies);
                     new.write(contact, bodies);
                     new
                 }));

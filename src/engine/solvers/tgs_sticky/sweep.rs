@@ -1,8 +1,8 @@
 //! The sticky sweep: friction holds points at a place, not at a velocity.
 //!
 //! Each point remembers how far it has drifted along the surface since it began to stick, d (m). Its
-//! friction row asks for v_t = −β_t d/h, so that what creeps is brought back; where that takes more than
-//! the cone allows the point slides, and begins to stick anew where it is. Normal rows are those
+//! friction row aims at v_t = −β_t d/h, so that what creeps is brought back; where that takes more than
+//! the cone allows the point slides, and begins to stick again where it is. Normal rows are those
 //! of [`crate::engine::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point is that of its share of the
 //! manifold's normal impulse, Σ λn/points: a load that shifts from point to point unsticks neither.
 //!
@@ -33,7 +33,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::point_vector::places;
 use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
 
-/// What a sweep asks for; see the [module](self). The solver keeps one float per contact point.
+/// What a sweep aims at; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sticky {
     /// Substep (s).
@@ -51,7 +51,7 @@ pub(crate) struct Sticky {
 /// One sweep.
 pub(crate) struct StickySweep<'a> {
     pub sticky: Sticky,
-    /// Of the coloured and of the serial batches.
+    /// Of the colored and of the serial batches.
     pub drifts: [&'a mut [Block]; 2],
 }
 
@@ -212,7 +212,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let wanted = mass.neg_mul_add(vt, old);
                 let new = wanted.min(bound).max(-bound);
                 record[at] = new;
-                // A point that slides begins to stick anew where it is now.
+                // A point that slides begins to stick again where it is now.
                 let over = wanted.max(-wanted) - bound;
                 drifts[before] = over.select_positive(-drift, drifted - drift);
                 let delta = new - old;

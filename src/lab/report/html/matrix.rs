@@ -1,4 +1,4 @@
-//! The matrix of `simpulse verify`, coloured by margin.
+//! The matrix of `simpulse verify`, colored by margin.
 
 use super::scale::number;
 use crate::lab::picture::Color;
@@ -38,11 +38,11 @@ struct Outcome {
     tolerance: Value,
 }
 
-/// Blue within the tolerance, red beyond it, pale at its edge: distinct with any colour vision.
+/// Blue within the tolerance, red beyond it, pale at its edge: distinct with any color vision.
 const WITHIN: [Color; 2] = [Color::rgb(0x4393c3), Color::rgb(0xe3eff6)];
 const BEYOND: [Color; 2] = [Color::rgb(0xfde0d0), Color::rgb(0xb2182b)];
 
-/// The colour of a margin, and whether white letters are read better on it.
+/// The color of a margin, and whether white letters are read better on it.
 fn shade(margin: f64, passed: bool) -> (String, bool) {
     let ([from, to], share) = match passed {
         true => (WITHIN, margin.clamp(0.0, 1.0)),

@@ -11,7 +11,7 @@ use crate::lab::study::curve::solvers_of;
 /// A setting on a scene.
 struct Dot<'a> {
     entry: &'a Record,
-    /// Time in times that of the fastest that holds there.
+    /// Time relative to the fastest that holds there.
     slower: f64,
     /// Which of the solver's budgets.
     budget: usize,
@@ -58,8 +58,8 @@ pub fn overview(records: &[Record]) -> String {
         size: [980.0, 560.0],
         title: "",
         names: [
-            "largest error, in the tolerance of its scene (1 = just within)",
-            "time of a step, in times that of the fastest setting that holds",
+            "largest error ÷ scene tolerance (≤ 1 passes)",
+            "time of a step, relative to the fastest setting that holds",
         ],
         band: Band::Right,
     };

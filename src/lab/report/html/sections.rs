@@ -18,7 +18,7 @@ pub fn profiles(records: &[Record]) -> String {
         let most = profile.ratios.iter().flat_map(|(_, r)| r.iter().copied()).fold(2.0, f64::max);
         let title = format!("{} within tolerance", profile.axis.name());
         let share = format!("share of {} scenes", profile.scenes);
-        let names = ["time, in times that of the fastest", share.as_str()];
+        let names = ["time relative to the fastest solver", share.as_str()];
         let frame = Frame { size: [420.0, 310.0], title: &title, names, band: Band::None };
         let mut x = Scale::log([1.0, most], "×");
         x.low = 0.95;
@@ -74,9 +74,9 @@ pub fn lanes(records: &[Record]) -> String {
         let colors = all.iter().filter_map(|e| e.sample.as_ref()).map(|l| l.load.colors);
         let colors = (colors.clone().min().unwrap_or(0), colors.max().unwrap_or(0));
         let colors = match colors {
-            (1, 1) => "1 colour".to_string(),
-            (a, b) if a == b => format!("{a} colours"),
-            (a, b) => format!("{a} to {b} colours"),
+            (1, 1) => "1 color".to_string(),
+            (a, b) if a == b => format!("{a} colors"),
+            (a, b) => format!("{a} to {b} colors"),
         };
         let title = format!("{} · {colors}", scene[0].scene);
         let panel = |size, title: &str, names, y| {
@@ -106,7 +106,7 @@ pub fn lanes(records: &[Record]) -> String {
     text + "</div>\n"
 }
 
-/// Colours of phases: muted, and unlike those of solvers by being areas in a fixed order.
+/// Colors of phases: muted, and unlike those of solvers by being areas in a fixed order.
 const PHASES: [&str; Phase::ALL.len()] = [
     "#332288", "#88ccee", "#bbbbbb", "#44aa99", "#999933", "#cc6677", "#ddcc77", "#aa4499", "#661100",
     "#117733", "#777777",

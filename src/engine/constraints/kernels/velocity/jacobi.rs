@@ -2,7 +2,7 @@
 //! to a body is summed up and applied afterwards.
 //!
 //! Within a contact the rows are still solved one after the other (`catto2024solver2d`,
-//! `solve_jacobi`). Sums have an order: colour by colour, so that they have the same bits at every
+//! `solve_jacobi`). Sums have an order: color by color, so that they have the same bits at every
 //! width; in exact arithmetic no order matters. The kernel is that of [`crate::engine::constraints::kernels::velocity::sweep`], given a store
 //! of rows that reads from one place and adds up in another.
 

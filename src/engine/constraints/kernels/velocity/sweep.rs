@@ -48,7 +48,7 @@
 //! instructions less, relaxing −3 %, soft 0 %; left to itself the compiler then forms addresses
 //! in vectors, +20 %).
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
-//! (gather, solve, scatter by colour); the contact frame is this crate's own.
+//! (gather, solve, scatter by color); the contact frame is this crate's own.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,

@@ -41,7 +41,7 @@ impl Baumgarte {
         -self.line(false, separation, L::splat(1.0), L::zero())[0]
     }
 
-    /// As [`Self::rule`], with the factor `relaxation` on what each row asks for.
+    /// As [`Self::rule`], with the factor `relaxation` on the increment of each row.
     pub fn relaxed(fraction: f32, slop: f32, push_speed: f32, h: f32, relaxation: f32) -> Rule {
         let rule = Self::new(fraction, slop, push_speed, h);
         Rule::BaumgarteRelaxed(Sweep(Relaxed { rule, factor: relaxation }))

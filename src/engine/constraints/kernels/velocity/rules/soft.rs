@@ -104,10 +104,10 @@ impl NormalRule for Soft {
     }
 }
 
-/// As [`Soft`], but only the speed of the push is bounded, not the load that a spring bears.
+/// As [`Soft`], but only the speed of the push is bounded, not the load that a spring carries.
 ///
-/// A row at rest bears the λ that leaks as much as the bias adds, γ_i λ = −m γ_m β s. A bias that is cut off
-/// at the push speed u bears m u/γ_i and no more, however deep s. Let the leak fall with what is cut off:
+/// A row at rest carries the λ that leaks as much as the bias adds, γ_i λ = −m γ_m β s. A bias that is cut off
+/// at the push speed u carries m u/γ_i and no more, however deep s. Let the leak fall with what is cut off:
 ///
 /// ```text
 /// f = min(1, u/(γ_m β |s|))      λ ← max(0, λ − m_eff (γ_m v_n + γ_m β s f) − γ_i f λ)
@@ -145,7 +145,7 @@ mod tests {
         let springs = Soft::new([900.0, 1800.0], 10.0, 3.0, 1.0 / 960.0);
         let mass = 2.0;
         let bears = |depth: f32| mass * 900.0f32.powi(2) * depth / 960.0;
-        // What remains of an impulse at rest, after the soft row and after the one that bears.
+        // What remains of an impulse at rest, after the soft row and after the one that carries.
         let kept = |depth: f32| {
             let after = |rule: [f32; 2]| rule[0] / bears(depth) - 1.0;
             let row = [-depth, mass, bears(depth)];

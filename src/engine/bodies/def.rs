@@ -1,0 +1,258 @@
+//! What a body is made of, and which values it may have.
+
+use super::BodyKind;
+use crate::engine::error::Error;
+use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_FRICTION};
+use crate::engine::shapes::{MassProperties, Shape, combine};
+use glam::Vec2;
+
+/// Greatest friction coefficient (1), so that the product of two is finite in `f32`.
+pub const MAX_FRICTION: f64 = 1e9;
+
+/// A shape with its surface.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::bodies::ShapeDef;
+///
+/// let ice = ShapeDef::rectangle(0.5, 0.25)?.with_friction(0.02).with_density(917.0);
+/// let wheel = ShapeDef::circle(0.3)?.at([0.6, -0.25]).with_restitution(0.4);
+/// let error = ShapeDef::circle(-1.0).unwrap_err();
+/// assert_eq!(error.to_string(), "circle: radius = -1 is not within 1e-9 to 1e9 m");
+/// # let _ = (ice, wheel);
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeDef {
+    /// Geometry in the frame of the body's origin (m).
+    pub shape: Shape,
+    /// kg/m², > 0
+    pub density: f64,
+    /// Coulomb coefficient, ≥ 0; two surfaces mix as √(µa µb).
+    pub friction: f64,
+    /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
+    pub restitution: f64,
+}
+
+/// What a body is made of, and how it starts.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::bodies::{BodyDef, ShapeDef};
+///
+/// let crate_ = BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?).with_velocity([2.0, 0.0]);
+/// // Or as a plain struct:
+/// let same = BodyDef { velocity: [2.0, 0.0], shapes: crate_.shapes.clone(), ..BodyDef::dynamic([0.0, 0.5]) };
+/// assert_eq!(crate_, same);
+/// # Ok::<(), simpulse::engine::error::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyDef {
+    /// How it moves.
+    pub kind: BodyKind,
+    /// Origin of the body's frame (m).
+    pub position: [f64; 2],
+    /// rad
+    pub angle: f64,
+    /// Velocity of the centre of mass (m/s).
+    pub velocity: [f64; 2],
+    /// rad/s
+    pub angular_velocity: f64,
+    /// Factor on gravity (1).
+    pub gravity_scale: f64,
+    /// 1/s
+    pub linear_damping: f64,
+    /// 1/s
+    pub angular_damping: f64,
+    /// Bodies of the same non-zero group do not collide.
+    pub group: i32,
+    /// Where it is fast, dynamic bodies stop it, too, see [`crate::engine::continuous`].
+    pub bullet: bool,
+    /// Shapes that move as one.
+    pub shapes: Vec<ShapeDef>,
+}
+
+impl ShapeDef {
+    /// A shape of standard density and friction that does not bounce.
+    pub fn new(shape: Shape) -> Self {
+        ShapeDef { shape, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
+    }
+
+    /// A rectangle about the origin of the body. Half extents in m; errors: as [`Shape::rectangle`].
+    pub fn rectangle(half_width: f32, half_height: f32) -> Result<Self, Error> {
+        Shape::rectangle("rectangle", Vec2::new(half_width, half_height), Vec2::ZERO, 0.0, 0.0).map(Self::new)
+    }
+
+    /// A disc about the origin of the body. Radius in m; errors: as [`Shape::circle`].
+    pub fn circle(radius: f32) -> Result<Self, Error> {
+        Shape::circle("circle", Vec2::ZERO, radius).map(Self::new)
+    }
+
+    /// All points within `radius` of the segment a–b (m). Errors: as [`Shape::capsule`].
+    pub fn capsule(a: [f32; 2], b: [f32; 2], radius: f32) -> Result<Self, Error> {
+        Shape::capsule("capsule", a.into(), b.into(), radius).map(Self::new)
+    }
+
+    /// A line from a to b (m) without mass, for static bodies. Errors: as [`Shape::segment`].
+    pub fn segment(a: [f32; 2], b: [f32; 2]) -> Result<Self, Error> {
+        Shape::segment("segment", a.into(), b.into()).map(Self::new)
+    }
+
+    /// A convex polygon of 3 to 8 vertices (m), in either winding. Errors: as [`Shape::polygon`].
+    pub fn polygon(vertices: &[[f32; 2]]) -> Result<Self, Error> {
+        let vertices: Vec<Vec2> = vertices.iter().map(|&v| v.into()).collect();
+        Shape::polygon("polygon", &vertices, 0.0).map(Self::new)
+    }
+
+    /// Moved by `offset` (m) in the frame of the body.
+    pub fn at(self, offset: [f32; 2]) -> Self {
+        ShapeDef { shape: self.shape.translated(offset.into()), ..self }
+    }
+
+    /// With this density (kg/m²).
+    pub fn with_density(self, density: f64) -> Self {
+        ShapeDef { density, ..self }
+    }
+
+    /// With this Coulomb coefficient.
+    pub fn with_friction(self, friction: f64) -> Self {
+        ShapeDef { friction, ..self }
+    }
+
+    /// With this restitution.
+    pub fn with_restitution(self, restitution: f64) -> Self {
+        ShapeDef { restitution, ..self }
+    }
+
+    /// Errors: a density ≤ 0, a negative friction or one above [`MAX_FRICTION`], a restitution outside [0, 1], anything
+    /// that is not finite in `f32`.
+    pub fn check(&self) -> Result<(), Error> {
+        finite("density", self.density)?;
+        // Too small for 32 bits is zero.
+        if self.density as f32 <= 0.0 {
+            return Err(Error::invalid("density", format!("must be positive, is {:?}", self.density)));
+        }
+        not_negative("friction", self.friction)?;
+        if self.friction > MAX_FRICTION {
+            let message = format!("must be at most {MAX_FRICTION:e}, is {:?}", self.friction);
+            return Err(Error::invalid("friction", message));
+        }
+        finite("restitution", self.restitution)?;
+        if !(0.0..=1.0).contains(&self.restitution) {
+            let message = format!("must be in [0, 1], is {}", self.restitution);
+            return Err(Error::invalid("restitution", message));
+        }
+        self.shape.check()
+    }
+}
+
+impl BodyDef {
+    /// A body at rest at `position` (m), neither turned nor damped.
+    pub fn new(kind: BodyKind, position: [f64; 2], shapes: Vec<ShapeDef>) -> Self {
+        BodyDef {
+            kind,
+            position,
+            angle: 0.0,
+            velocity: [0.0; 2],
+            angular_velocity: 0.0,
+            gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            group: 0,
+            bullet: false,
+            shapes,
+        }
+    }
+
+    /// A body that forces and contacts move, at rest at `position` (m), without shapes.
+    pub fn dynamic(position: [f64; 2]) -> Self {
+        BodyDef::new(BodyKind::Dynamic, position, Vec::new())
+    }
+
+    /// A body that never moves, at `position` (m), without shapes.
+    pub fn fixed(position: [f64; 2]) -> Self {
+        BodyDef::new(BodyKind::Static, position, Vec::new())
+    }
+
+    /// A body that moves with its given velocity, whatever it meets, at `position` (m), without shapes.
+    pub fn kinematic(position: [f64; 2]) -> Self {
+        BodyDef::new(BodyKind::Kinematic, position, Vec::new())
+    }
+
+    /// With one shape more.
+    pub fn with(mut self, shape: ShapeDef) -> Self {
+        self.shapes.push(shape);
+        self
+    }
+
+    /// Turned to this angle (rad).
+    pub fn with_angle(self, angle: f64) -> Self {
+        BodyDef { angle, ..self }
+    }
+
+    /// With this velocity of the centre of mass (m/s).
+    pub fn with_velocity(self, velocity: [f64; 2]) -> Self {
+        BodyDef { velocity, ..self }
+    }
+
+    /// With this spin (rad/s).
+    pub fn with_angular_velocity(self, angular_velocity: f64) -> Self {
+        BodyDef { angular_velocity, ..self }
+    }
+
+    /// Mass (kg), centre (m, in the body's frame) and inertia (kg·m²) of all shapes.
+    pub fn mass(&self) -> MassProperties {
+        combine(&self.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
+    }
+
+    /// Whether a world takes this body; returns its mass properties.
+    ///
+    /// Errors, naming place and value: a number that is not finite in `f32`; negative damping; what [`ShapeDef::check`]
+    /// refuses; a dynamic body without shapes, or whose mass or inertia is zero or not finite.
+    pub fn check(&self) -> Result<MassProperties, Error> {
+        finite_pair("position", self.position)?;
+        finite("angle", self.angle)?;
+        finite_pair("velocity", self.velocity)?;
+        finite("angular_velocity", self.angular_velocity)?;
+        finite("gravity_scale", self.gravity_scale)?;
+        not_negative("linear_damping", self.linear_damping)?;
+        not_negative("angular_damping", self.angular_damping)?;
+        for (k, shape) in self.shapes.iter().enumerate() {
+            shape.check().map_err(|e| e.within(&format!("shapes[{k}]")))?;
+        }
+        let mass = self.mass();
+        if self.kind == BodyKind::Dynamic {
+            if self.shapes.is_empty() {
+                return Err(Error::invalid("shapes", "a dynamic body needs at least one shape, has 0"));
+            }
+            for (name, value) in [("mass", mass.mass as f32), ("inertia", mass.inertia as f32)] {
+                // The reciprocal is what the solver holds, so it must be a number too.
+                if !(value.is_normal() && value.recip().is_normal()) {
+                    let message =
+                        format!("the {name} of a dynamic body must be positive and finite, is {value}");
+                    return Err(Error::invalid("shapes", message));
+                }
+            }
+        }
+        Ok(mass)
+    }
+}
+
+pub(crate) fn finite(place: &str, value: f64) -> Result<(), Error> {
+    if (value as f32).is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(place, format!("must be finite in 32 bits, is {value:?}")))
+}
+
+pub(crate) fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
+    (0..2).try_for_each(|k| finite(&format!("{place}[{k}]"), value[k]))
+}
+
+fn not_negative(place: &str, value: f64) -> Result<(), Error> {
+    finite(place, value)?;
+    if value >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::invalid(place, format!("must not be negative, is {value:?}")))
+}

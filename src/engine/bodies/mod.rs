@@ -1,0 +1,270 @@
+//! Bodies: how they are defined ([`BodyDef`], [`ShapeDef`]), how a caller names them ([`BodyHandle`]), and their
+//! state as structure-of-arrays, castable to lanes ([`Bodies`]).
+
+use crate::engine::lanes::LaneVec;
+use crate::engine::shapes::{MassProperties, Pose};
+use glam::Vec2;
+
+pub(in crate::engine) mod def;
+
+pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
+
+/// How a body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum BodyKind {
+    /// Never moves.
+    Static,
+    /// Moves with its given velocity, whatever it meets.
+    Kinematic,
+    /// Moved by forces and contacts.
+    Dynamic,
+}
+
+/// The name of a body of a [`World`](crate::engine::world::World).
+///
+/// It stays valid while the body exists, whatever else is added or removed. After the body is removed its index may go to
+/// a new one; the generation tells the two apart, so that an old handle is an error and never another body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BodyHandle {
+    pub(crate) index: u32,
+    pub(crate) generation: u32,
+}
+
+impl BodyHandle {
+    /// Place of the body in the arrays of [`Bodies`].
+    pub fn index(self) -> usize {
+        self.index as usize
+    }
+}
+
+/// State of all bodies, one array per quantity, `[len]` each.
+#[derive(Clone, Debug, Default)]
+pub struct Bodies {
+    /// Centre of mass (m).
+    pub position_x: LaneVec,
+    /// Centre of mass (m).
+    pub position_y: LaneVec,
+    /// Low part of the position (m): x is `position_x + position_x_lo`. See [`Bodies::advance`].
+    pub position_x_lo: LaneVec,
+    /// Low part of the position (m).
+    pub position_y_lo: LaneVec,
+    /// cos θ
+    pub rotation_cos: LaneVec,
+    /// sin θ
+    pub rotation_sin: LaneVec,
+    /// m/s
+    pub velocity_x: LaneVec,
+    /// m/s
+    pub velocity_y: LaneVec,
+    /// rad/s
+    pub angular_velocity: LaneVec,
+    /// 1/kg, zero for static and kinematic bodies
+    pub inv_mass: LaneVec,
+    /// 1/(kg·m²), zero for static and kinematic bodies
+    pub inv_inertia: LaneVec,
+    /// Force applied in every step until it is changed (N). For one step alone:
+    /// [`World::apply_force`](crate::engine::world::World::apply_force).
+    pub force_x: LaneVec,
+    /// Force applied in every step until it is changed (N).
+    pub force_y: LaneVec,
+    /// Torque applied in every step until it is changed (N·m).
+    pub torque: LaneVec,
+    /// Factor on gravity (1).
+    pub gravity_scale: LaneVec,
+    /// 1/s
+    pub linear_damping: LaneVec,
+    /// 1/s
+    pub angular_damping: LaneVec,
+    /// From the body's origin to its centre of mass, body axes (m).
+    pub local_center: Vec<Vec2>,
+    /// How each body moves.
+    pub kind: Vec<BodyKind>,
+    /// Collision group of each body; 0 is none.
+    pub group: Vec<i32>,
+    /// Whether dynamic bodies stop it, where it is fast.
+    pub bullet: Vec<bool>,
+    /// Whether a body is made of discs about its centre of mass: turning it moves no contact.
+    pub round: Vec<bool>,
+}
+
+impl Bodies {
+    /// Number of bodies.
+    pub fn len(&self) -> usize {
+        self.kind.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.kind.is_empty()
+    }
+
+    /// Adds a body with the mass properties of its shapes about its origin; returns its index.
+    pub fn push(&mut self, def: &BodyDef, mass: &MassProperties) -> usize {
+        for array in self.arrays_mut() {
+            array.push(0.0);
+        }
+        self.local_center.push(Vec2::ZERO);
+        self.kind.push(def.kind);
+        self.group.push(def.group);
+        self.bullet.push(def.bullet);
+        self.round.push(false);
+        let i = self.len() - 1;
+        self.set(i, def, mass);
+        i
+    }
+
+    /// Replaces body `i` with another one.
+    pub(crate) fn set(&mut self, i: usize, def: &BodyDef, mass: &MassProperties) {
+        let [cx, cy] = mass.center;
+        self.local_center[i] = Vec2::new(cx as f32, cy as f32);
+        self.place(i, def.position, def.angle, mass.center);
+        // A static body has no velocity, whatever its definition says.
+        let moves = if def.kind == BodyKind::Static { 0.0 } else { 1.0 };
+        self.velocity_x[i] = (moves * def.velocity[0]) as f32;
+        self.velocity_y[i] = (moves * def.velocity[1]) as f32;
+        self.angular_velocity[i] = (moves * def.angular_velocity) as f32;
+        let inverse = |x: f64| if def.kind == BodyKind::Dynamic && x > 0.0 { (1.0 / x) as f32 } else { 0.0 };
+        self.inv_mass[i] = inverse(mass.mass);
+        self.inv_inertia[i] = inverse(mass.inertia);
+        (self.force_x[i], self.force_y[i], self.torque[i]) = (0.0, 0.0, 0.0);
+        self.gravity_scale[i] = def.gravity_scale as f32;
+        self.linear_damping[i] = def.linear_damping as f32;
+        self.angular_damping[i] = def.angular_damping as f32;
+        (self.kind[i], self.group[i], self.round[i]) = (def.kind, def.group, false);
+        self.bullet[i] = def.bullet;
+    }
+
+    /// Moves body `i`: the origin of its frame to `origin` (m), its angle to `angle` (rad). `center` is its centre of mass
+    /// in its frame (m).
+    pub(crate) fn place(&mut self, i: usize, origin: [f64; 2], angle: f64, center: [f64; 2]) {
+        let ((sin, cos), [cx, cy]) = (angle.sin_cos(), center);
+        let x = origin[0] + cos * cx - sin * cy;
+        let y = origin[1] + sin * cx + cos * cy;
+        (self.position_x[i], self.position_y[i]) = (x as f32, y as f32);
+        self.position_x_lo[i] = (x - x as f32 as f64) as f32;
+        self.position_y_lo[i] = (y - y as f32 as f64) as f32;
+        (self.rotation_cos[i], self.rotation_sin[i]) = (cos as f32, sin as f32);
+    }
+
+    /// Every array of floats, in the order of their declaration.
+    pub(crate) fn arrays(&self) -> [&LaneVec; 17] {
+        let Bodies { position_x, position_y, position_x_lo, position_y_lo, .. } = self;
+        let Bodies { rotation_cos, rotation_sin, velocity_x, velocity_y, angular_velocity, .. } = self;
+        let Bodies { inv_mass, inv_inertia, force_x, force_y, torque, .. } = self;
+        let Bodies { gravity_scale, linear_damping, angular_damping, .. } = self;
+        [
+            position_x,
+            position_y,
+            position_x_lo,
+            position_y_lo,
+            rotation_cos,
+            rotation_sin,
+            velocity_x,
+            velocity_y,
+            angular_velocity,
+            inv_mass,
+            inv_inertia,
+            force_x,
+            force_y,
+            torque,
+            gravity_scale,
+            linear_damping,
+            angular_damping,
+        ]
+    }
+
+    /// The same, to be written.
+    pub(crate) fn arrays_mut(&mut self) -> [&mut LaneVec; 17] {
+        [
+            &mut self.position_x,
+            &mut self.position_y,
+            &mut self.position_x_lo,
+            &mut self.position_y_lo,
+            &mut self.rotation_cos,
+            &mut self.rotation_sin,
+            &mut self.velocity_x,
+            &mut self.velocity_y,
+            &mut self.angular_velocity,
+            &mut self.inv_mass,
+            &mut self.inv_inertia,
+            &mut self.force_x,
+            &mut self.force_y,
+            &mut self.torque,
+            &mut self.gravity_scale,
+            &mut self.linear_damping,
+            &mut self.angular_damping,
+        ]
+    }
+
+    /// Pose of the centre of mass of body `i`.
+    pub fn pose(&self, i: usize) -> Pose {
+        Pose {
+            position: Vec2::new(self.position_x[i], self.position_y[i]),
+            rotation: Vec2::new(self.rotation_cos[i], self.rotation_sin[i]),
+        }
+    }
+
+    /// Poses of the centres of mass of bodies `a` and `b`, from a's position: the difference of
+    /// the positions includes their low parts, so that it is as good far out as at the origin.
+    #[inline]
+    pub fn relative_poses(&self, a: usize, b: usize) -> [Pose; 2] {
+        let x = (self.position_x[b] - self.position_x[a]) + (self.position_x_lo[b] - self.position_x_lo[a]);
+        let y = (self.position_y[b] - self.position_y[a]) + (self.position_y_lo[b] - self.position_y_lo[a]);
+        let rotation = |i: usize| Vec2::new(self.rotation_cos[i], self.rotation_sin[i]);
+        [
+            Pose { position: Vec2::ZERO, rotation: rotation(a) },
+            Pose { position: Vec2::new(x, y), rotation: rotation(b) },
+        ]
+    }
+
+    /// Moves body `i` by `delta` (m).
+    ///
+    /// A position of f32 alone stands still once a step's motion is below half its last
+    /// digit: 30 nm at 1 m, 4 mm at 100 km. So what the sum rounds away is kept in the low part,
+    /// by Knuth's two-sum, which is exact whatever the two magnitudes are.
+    #[inline]
+    pub fn advance(&mut self, i: usize, delta: Vec2) {
+        let add = |sum: &mut f32, lo: &mut f32, delta: f32| {
+            let term = delta + *lo;
+            let new = *sum + term;
+            let virtual_term = new - *sum;
+            *lo = (*sum - (new - virtual_term)) + (term - virtual_term);
+            *sum = new;
+        };
+        add(&mut self.position_x[i], &mut self.position_x_lo[i], delta.x);
+        add(&mut self.position_y[i], &mut self.position_y_lo[i], delta.y);
+    }
+
+    /// Velocity of the centre of mass of body `i` (m/s).
+    pub fn velocity(&self, i: usize) -> Vec2 {
+        Vec2::new(self.velocity_x[i], self.velocity_y[i])
+    }
+
+    /// Centre of mass of body `i` (m), with all the digits there are.
+    pub fn center(&self, i: usize) -> [f64; 2] {
+        [
+            f64::from(self.position_x[i]) + f64::from(self.position_x_lo[i]),
+            f64::from(self.position_y[i]) + f64::from(self.position_y_lo[i]),
+        ]
+    }
+
+    /// Position of the origin of body `i`'s frame (m), as scenes give it.
+    pub fn origin(&self, i: usize) -> [f64; 2] {
+        let [x, y] = self.center(i);
+        let offset = self.pose(i).rotation.rotate(self.local_center[i]).as_dvec2();
+        [x - offset.x, y - offset.y]
+    }
+
+    /// Angle of body `i` in (−π, π] (rad).
+    pub fn angle(&self, i: usize) -> f32 {
+        self.rotation_sin[i].atan2(self.rotation_cos[i])
+    }
+
+    /// Whether body `i` is moved by impulses.
+    pub fn is_dynamic(&self, i: usize) -> bool {
+        self.kind[i] == BodyKind::Dynamic
+    }
+}

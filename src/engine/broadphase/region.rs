@@ -1,0 +1,87 @@
+//! Where a query looks: a box or a ray, tested against sixteen boxes at once.
+
+use super::node::{FAN, Node};
+use super::{BroadPhase, Proxy};
+use crate::engine::shapes::Aabb;
+use glam::Vec2;
+use wide::f32x16;
+
+/// Where a query looks.
+#[derive(Clone, Copy, Debug)]
+pub enum Region {
+    /// A box: min x, min y, max x, max y (m).
+    Area([f32; 4]),
+    /// A ray.
+    Ray {
+        /// Where it begins (m).
+        origin: [f32; 2],
+        /// Reciprocals of its direction.
+        inverse: [f32; 2],
+        /// How far it looks (m).
+        reach: f32,
+    },
+}
+
+impl Region {
+    /// All boxes that meet this one.
+    pub fn area(area: Aabb) -> Self {
+        Region::Area([area.min.x, area.min.y, area.max.x, area.max.y])
+    }
+
+    /// All boxes that meet a ray with a unit direction.
+    pub fn ray(origin: Vec2, along: Vec2, reach: f32) -> Self {
+        // Finite, so that 0 · ∞ never appears: a ray along an axis leaves it by 10⁻²⁰ of its length.
+        let inverse = |x: f32| if x.abs() < 1e-20 { 1e20_f32.copysign(x) } else { 1.0 / x };
+        Region::Ray { origin: origin.into(), inverse: [inverse(along.x), inverse(along.y)], reach }
+    }
+
+    /// Makes a ray shorter.
+    pub fn shorten(&mut self, to: f32) {
+        if let Region::Ray { reach, .. } = self {
+            *reach = to;
+        }
+    }
+
+    /// The lanes of a node that it meets. Boxes of shapes are larger than their shapes by more than rounding.
+    fn hits(&self, node: &Node) -> u32 {
+        let (origin, inverse, reach) = match *self {
+            Region::Area(sides) => return node.hits(&sides.map(f32x16::splat)),
+            Region::Ray { origin, inverse, reach } => (origin, inverse, reach),
+        };
+        let [min_x, min_y, max_x, max_y] = node.sides.map(|side| f32x16::new(side.0));
+        let mut enter = f32x16::ZERO;
+        let mut leave = f32x16::splat(reach);
+        for (k, [min, max]) in [[min_x, max_x], [min_y, max_y]].into_iter().enumerate() {
+            let (origin, inverse) = (f32x16::splat(origin[k]), f32x16::splat(inverse[k]));
+            let (a, b) = ((min - origin) * inverse, (max - origin) * inverse);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        // Lanes without a box hold NaN, which `max` and `min` leave out.
+        let is_box = min_x.simd_eq(min_x);
+        (enter.simd_le(leave) & is_box).to_bitmask() & 0xFFFF
+    }
+}
+
+impl BroadPhase {
+    /// Calls `visit` with each proxy whose box meets the region, which `visit` may make smaller. The tree is that of the
+    /// last call of [`BroadPhase::pairs`] or [`BroadPhase::update`], and `proxies` are the same.
+    pub fn visit(&self, proxies: &[Proxy], region: &mut Region, mut visit: impl FnMut(&mut Region, u32)) {
+        if let BroadPhase::Tree(tree) = self {
+            tree.visit(region, |region, node| region.hits(node), visit);
+            return;
+        }
+        // The others keep nothing that could be asked.
+        for (k, chunk) in proxies.chunks(FAN).enumerate() {
+            let mut node = Node::EMPTY;
+            for (lane, Proxy { aabb: Aabb { min, max }, .. }) in chunk.iter().enumerate() {
+                node.set(lane, [min.x, min.y, max.x, max.y]);
+            }
+            let mut hits = region.hits(&node);
+            while hits != 0 {
+                visit(region, (k * FAN) as u32 + hits.trailing_zeros());
+                hits &= hits - 1;
+            }
+        }
+    }
+}

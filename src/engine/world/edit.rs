@@ -1,0 +1,319 @@
+//! Bodies come, go and are moved by the caller.
+
+use super::{Surface, World};
+use crate::engine::bodies::def::{finite, finite_pair};
+use crate::engine::bodies::{BodyDef, BodyHandle, BodyKind};
+use crate::engine::broadphase::Proxy;
+use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
+use crate::engine::error::Error;
+use crate::engine::shapes::{Aabb, MassProperties, Shape};
+use glam::Vec2;
+
+/// Which bodies there are.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Slots {
+    /// Of the body that is or was last at an index; `[bodies]`.
+    pub generation: Vec<u32>,
+    /// Whether there is one; `[bodies]`.
+    pub lives: Vec<bool>,
+    /// First shape of each body; its shapes follow one another. `[bodies]`
+    pub first_shape: Vec<u32>,
+    /// Shapes of each body; `[bodies]`.
+    pub shapes: Vec<u32>,
+    /// Bodies whose places may be taken.
+    pub free: Vec<u32>,
+    /// Bodies that were removed since the last step: what solvers remember of them goes in the next.
+    pub removed: Vec<u32>,
+}
+
+/// What a body's standing forces were before some were applied for one step.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Standing {
+    pub(super) body: u32,
+    force: Vec2,
+    torque: f32,
+}
+
+/// Where nothing is.
+const NOWHERE: Aabb = Aabb { min: Vec2::NAN, max: Vec2::NAN };
+
+impl World {
+    /// Adds a body; the handle stays valid until it is removed.
+    ///
+    /// A body takes the place of one that was removed before the last step and had as many shapes, if there is one.
+    /// Errors: as [`BodyDef::check`].
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    ///
+    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// assert_eq!(world.bodies.origin(ball.index()), [0.0, 2.0]);
+    /// let heavy = ShapeDef::circle(0.5)?.with_density(-1.0);
+    /// let error = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(heavy)).unwrap_err();
+    /// assert_eq!(error.to_string(), "shapes[0].density: must be positive, is -1.0");
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
+    pub fn add_body(&mut self, body: &BodyDef) -> Result<BodyHandle, Error> {
+        let mass = body.check()?;
+        let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
+        let shapes: Vec<Shape> = body.shapes.iter().map(|part| part.shape.translated(-center)).collect();
+        let count = shapes.len() as u32;
+        let slots = &mut self.slots;
+        let place = slots.free.iter().position(|&i| slots.shapes[i as usize] == count);
+        let index = match place {
+            Some(k) => {
+                let index = slots.free.swap_remove(k) as usize;
+                self.bodies.set(index, body, &mass);
+                self.work.kept.forget_body(index);
+                index
+            }
+            None => self.push_body(body, &mass, shapes.len()),
+        };
+        self.slots.lives[index] = true;
+        let round = |shape: &Shape| matches!(shape, Shape::Circle { center, .. } if *center == Vec2::ZERO);
+        self.bodies.round[index] = shapes.iter().all(round);
+        let first = self.slots.first_shape[index] as usize;
+        for (k, (part, shape)) in body.shapes.iter().zip(shapes).enumerate() {
+            self.set_shape(first + k, index, shape, [part.friction, part.restitution].map(|x| x as f32));
+        }
+        self.fat_boxes.set(index, first, &self.shapes[first..first + count as usize]);
+        self.traits.add(body, self.bodies.round[index]);
+        self.features = self.traits.features();
+        (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
+        Ok(BodyHandle { index: index as u32, generation: self.slots.generation[index] })
+    }
+
+    /// Room for a body and its shapes, behind all others.
+    pub(super) fn push_body(&mut self, body: &BodyDef, mass: &MassProperties, shapes: usize) -> usize {
+        let index = self.bodies.push(body, mass);
+        let slots = &mut self.slots;
+        slots.generation.push(0);
+        slots.lives.push(false);
+        slots.first_shape.push(self.shapes.len() as u32);
+        slots.shapes.push(shapes as u32);
+        for _ in 0..shapes {
+            self.shapes.push(Shape::Circle { center: Vec2::ZERO, radius: 1.0 });
+            self.shape_body.push(index as u32);
+            self.surfaces.push(Surface::default());
+            self.proxies.push(Proxy { aabb: NOWHERE, body: index as u32, group: 0, dynamic: false });
+        }
+        index
+    }
+
+    /// Makes shape `i`, of body `body`, one of this kind and this friction and restitution.
+    pub(super) fn set_shape(
+        &mut self,
+        i: usize,
+        body: usize,
+        shape: Shape,
+        [friction, restitution]: [f32; 2],
+    ) {
+        // Fat boxes are made at the next step.
+        let aabb = shape.aabb(&self.bodies.pose(body));
+        let mut reach = 0.0_f32;
+        shape.for_each_vertex(|v| reach = reach.max(v.length()));
+        let (class, number) = self.narrow.shapes.push(&shape);
+        self.shapes[i] = shape;
+        self.surfaces[i] = Surface { friction, restitution, reach: reach + shape.radius(), class, number };
+        let (group, dynamic) = (self.bodies.group[body], self.bodies.is_dynamic(body));
+        self.proxies[i] = Proxy { aabb, body: body as u32, group, dynamic };
+    }
+
+    /// Removes a body and its contacts. Other handles stay valid, and so do indices of other bodies.
+    ///
+    /// Until another body takes its place, the index stands for a static body that nothing touches. `contacts` remain those
+    /// of the last step until the next. Errors: the body was removed before; a constraint of another type is on it.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// world.remove_body(ball)?;
+    /// assert!(!world.contains(ball));
+    /// assert_eq!(world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err().to_string(), "body 0 was removed");
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
+    pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        let mut ends = self.work.types.iter().flat_map(|joined| joined.kind.ends()).flatten();
+        if ends.any(|&end| end as usize == i) {
+            return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
+        }
+        let nothing = BodyDef::fixed([0.0; 2]);
+        self.bodies.set(i, &nothing, &MassProperties::ZERO);
+        let slots = &mut self.slots;
+        slots.lives[i] = false;
+        slots.generation[i] = slots.generation[i].wrapping_add(1);
+        slots.removed.push(body.index);
+        let [first, count] = [slots.first_shape[i], slots.shapes[i]].map(|k| k as usize);
+        self.leave_world(i, first, count);
+        self.applied.retain(|standing| standing.body != body.index);
+        (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
+        Ok(())
+    }
+
+    /// Takes a body's shapes, `count` from `first` on, out of the broad phase.
+    pub(super) fn leave_world(&mut self, body: usize, first: usize, count: usize) {
+        for proxy in &mut self.proxies[first..first + count] {
+            (proxy.aabb, proxy.dynamic) = (NOWHERE, false);
+        }
+        self.fat_boxes.remove(body);
+    }
+
+    /// Whether the body was not removed.
+    pub fn contains(&self, body: BodyHandle) -> bool {
+        self.index_of(body).is_ok()
+    }
+
+    /// The index of a body. Errors: it was removed.
+    pub fn index_of(&self, body: BodyHandle) -> Result<usize, Error> {
+        let (i, slots) = (body.index(), &self.slots);
+        let is_same = slots.generation.get(i) == Some(&body.generation) && slots.lives[i];
+        if is_same { Ok(i) } else { Err(Error::Removed { body: i }) }
+    }
+
+    /// The handle of the body at an index, as contacts and divergences name it; none if no body is there.
+    pub fn handle(&self, index: usize) -> Option<BodyHandle> {
+        let lives = self.slots.lives.get(index).copied().unwrap_or(false);
+        lives.then(|| BodyHandle { index: index as u32, generation: self.slots.generation[index] })
+    }
+
+    /// Handles of all bodies, in the order of their indices.
+    pub fn handles(&self) -> impl Iterator<Item = BodyHandle> {
+        (0..self.bodies.len()).filter_map(|i| self.handle(i))
+    }
+
+    /// Puts a body elsewhere: the origin of its frame to `position` (m), turned to `angle` (rad). It keeps its velocity.
+    ///
+    /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// world.set_pose(ball, [3.0, 1.0], 0.3)?;
+    /// world.set_velocity(ball, [0.0, 5.0], -1.0)?;
+    /// assert_eq!(world.bodies.origin(ball.index()), [3.0, 1.0]);
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
+    pub fn set_pose(&mut self, body: BodyHandle, position: [f64; 2], angle: f64) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        finite_pair("position", position)?;
+        finite("angle", angle)?;
+        let center = self.bodies.local_center[i].as_dvec2().to_array();
+        self.bodies.place(i, position, angle, center);
+        self.fat_boxes.forget(i);
+        Ok(())
+    }
+
+    /// Sets the velocity of a body's centre of mass (m/s) and its spin (rad/s).
+    ///
+    /// Errors: the body was removed; it is static; a value that is not finite.
+    pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f32; 2], spin: f32) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        finite_pair("velocity", velocity.map(f64::from))?;
+        finite("angular_velocity", f64::from(spin))?;
+        if self.bodies.kind[i] == BodyKind::Static {
+            return Err(Error::invalid(format!("body {i}"), "is static and has no velocity"));
+        }
+        [self.bodies.velocity_x[i], self.bodies.velocity_y[i]] = velocity;
+        self.bodies.angular_velocity[i] = spin;
+        self.may_spin(spin);
+        Ok(())
+    }
+
+    /// Applies a force (N) at the centre of mass over the next step, in addition to the standing
+    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic bodies are
+    /// moved by it.
+    ///
+    /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// world.apply_force(ball, [500.0, 0.0])?;
+    /// world.step()?;
+    /// let speed = world.bodies.velocity_x[ball.index()];
+    /// world.step()?;
+    /// assert_eq!(world.bodies.velocity_x[ball.index()], speed);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn apply_force(&mut self, body: BodyHandle, force: [f32; 2]) -> Result<(), Error> {
+        self.apply(body, force.into(), 0.0)
+    }
+
+    /// Applies a torque (N·m) over the next step. Errors: as [`World::apply_force`].
+    pub fn apply_torque(&mut self, body: BodyHandle, torque: f32) -> Result<(), Error> {
+        self.apply(body, Vec2::ZERO, torque)
+    }
+
+    /// Changes the velocity of a dynamic body at once by an impulse (N·s) at a point of the world (m).
+    ///
+    /// Errors: the body was removed; a value that is not finite.
+    pub fn apply_impulse(
+        &mut self,
+        body: BodyHandle,
+        impulse: [f32; 2],
+        point: [f64; 2],
+    ) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        finite_pair("impulse", impulse.map(f64::from))?;
+        finite_pair("point", point)?;
+        let [x, y] = self.bodies.center(i);
+        let (arm, impulse) = (Vec2::new((point[0] - x) as f32, (point[1] - y) as f32), Vec2::from(impulse));
+        let b = &mut self.bodies;
+        b.velocity_x[i] += b.inv_mass[i] * impulse.x;
+        b.velocity_y[i] += b.inv_mass[i] * impulse.y;
+        let spin = b.inv_inertia[i] * arm.perp_dot(impulse);
+        b.angular_velocity[i] += spin;
+        self.may_spin(spin);
+        Ok(())
+    }
+
+    fn apply(&mut self, body: BodyHandle, force: Vec2, torque: f32) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        finite_pair("force", [force.x, force.y].map(f64::from))?;
+        finite("torque", f64::from(torque))?;
+        let b = &mut self.bodies;
+        let standing =
+            Standing { body: body.index, force: Vec2::new(b.force_x[i], b.force_y[i]), torque: b.torque[i] };
+        self.applied.push(standing);
+        b.force_x[i] += force.x;
+        b.force_y[i] += force.y;
+        b.torque[i] += torque;
+        self.may_spin(torque);
+        Ok(())
+    }
+
+    /// Scenes in which nothing turns have no rotation in their kernels.
+    fn may_spin(&mut self, spin: f32) {
+        if spin != 0.0 {
+            self.traits.spins();
+            self.features = self.traits.features();
+        }
+    }
+
+    /// After a step: forces that were applied for it go, and places of removed bodies may be taken.
+    pub(super) fn end_edits(&mut self) {
+        while let Some(Standing { body, force, torque }) = self.applied.pop() {
+            let i = body as usize;
+            (self.bodies.force_x[i], self.bodies.force_y[i]) = (force.x, force.y);
+            self.bodies.torque[i] = torque;
+        }
+        self.slots.free.append(&mut self.slots.removed);
+    }
+
+    /// Adds constraints of another type than contacts. They take part in every pass of the solver.
+    pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
+        self.work.types.push(Joined::new(kind));
+        self.lanes_are_for = None;
+    }
+}

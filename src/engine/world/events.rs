@@ -1,0 +1,207 @@
+//! What happens at contacts: which began, which ended, which were hit. And contacts as a caller reads them.
+
+use super::World;
+use crate::engine::bodies::BodyHandle;
+use crate::engine::contacts::Contact;
+use crate::engine::error::Error;
+use crate::engine::params::HIT_SPEED;
+use glam::{DVec2, Vec2};
+
+/// Something that happened at a contact in the last step. Bodies and shapes are in the order of the [`Contact`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactEvent {
+    /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::engine::params::SPECULATIVE_DISTANCE), where contacts begin.
+    Begin {
+        /// The bodies.
+        bodies: [BodyHandle; 2],
+        /// Indices of the shapes.
+        shapes: [u32; 2],
+    },
+    /// They parted, or one of them was removed: its handle is then no longer valid.
+    End {
+        /// The bodies.
+        bodies: [BodyHandle; 2],
+        /// Indices of the shapes.
+        shapes: [u32; 2],
+    },
+    /// They approached faster than [`HIT_SPEED`] and pushed each other. A solver with soft contacts stops a body over several
+    /// steps, and each of them may be a hit.
+    Hit {
+        /// The bodies.
+        bodies: [BodyHandle; 2],
+        /// Indices of the shapes.
+        shapes: [u32; 2],
+        /// Midway between the points that were pushed (m).
+        point: [f64; 2],
+        /// Unit vector from the first body to the second.
+        normal: Vec2,
+        /// Speed of approach along the normal before the step (m/s), > 0.
+        approach_speed: f32,
+        /// Normal impulse of the whole step, of all points (N·s).
+        impulse: f32,
+    },
+}
+
+/// A point of a contact in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPoint {
+    /// Where it is (m), as of the start of the last step.
+    pub position: [f64; 2],
+    /// Unit vector from body a to body b.
+    pub normal: Vec2,
+    /// Signed gap along the normal (m); negative is overlap.
+    pub separation: f32,
+    /// Normal impulse of the last substep, ≥ 0 (N·s).
+    pub normal_impulse: f32,
+    /// Tangential impulse of the last substep (N·s).
+    pub tangent_impulse: f32,
+}
+
+/// Who touches whom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Touching {
+    key: u64,
+    bodies: [BodyHandle; 2],
+    shapes: [u32; 2],
+}
+
+/// Events of the last step, and what finds those of the next.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Events {
+    #[cfg_attr(feature = "serde", serde(skip))]
+    list: Vec<ContactEvent>,
+    /// After the last step, sorted by key.
+    touching: Vec<Touching>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    last_touching: Vec<Touching>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    /// Speed of approach before the step (m/s) and point (m) of each contact.
+    approach: Vec<(f32, DVec2)>,
+}
+
+impl World {
+    /// What happened at contacts in the last step: ends, begins and hits in the order of shape pairs. Empty unless
+    /// [`Settings::contact_events`](super::Settings::contact_events) is set.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// use simpulse::engine::bodies::{BodyDef, ShapeDef};
+    /// use simpulse::engine::{solvers, world::{ContactEvent, Settings, World}};
+    ///
+    /// let settings = Settings { contact_events: true, ..Settings::new(solvers::find("shim")?) };
+    /// let mut world = World::new(settings);
+    /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
+    /// world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+    /// let mut hit = 0.0;
+    /// for _ in 0..60 {
+    ///     world.step()?;
+    ///     for event in world.contact_events() {
+    ///         if let ContactEvent::Hit { impulse, .. } = event {
+    ///             hit += impulse;
+    ///         }
+    ///     }
+    /// }
+    /// // It fell 1.5 m: 5.5 m/s.
+    /// assert!(hit > 5.0, "{hit} N·s");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn contact_events(&self) -> &[ContactEvent] {
+        &self.events.list
+    }
+
+    /// Contacts of a body in the last step. Looks through all contacts. Errors: the body was removed.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
+    /// let crate_ = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+    /// for _ in 0..60 {
+    ///     world.step()?;
+    /// }
+    /// // The normal impulse of a substep, over its length, is the force: 1000 kg on the ground.
+    /// let h = world.settings.h();
+    /// let points = world.contacts_of(crate_)?.flat_map(|contact| world.points_of(contact));
+    /// let force: f32 = points.map(|point| point.normal_impulse / h).sum();
+    /// let mass = 1.0 / world.bodies.inv_mass[crate_.index()];
+    /// assert!((force / (10.0 * mass) - 1.0).abs() < 1e-3, "{force} N on {mass} kg");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn contacts_of(&self, body: BodyHandle) -> Result<impl Iterator<Item = &Contact>, Error> {
+        let i = self.index_of(body)? as u32;
+        Ok(self.contacts.iter().filter(move |c| c.body_a == i || c.body_b == i))
+    }
+
+    /// The points of a contact of the last step, in the world.
+    pub fn points_of<'a>(&'a self, contact: &'a Contact) -> impl Iterator<Item = ContactPoint> + 'a {
+        let [x, y] = self.bodies.center(contact.body_b as usize);
+        contact.manifold.points().iter().map(move |point| ContactPoint {
+            position: [x + f64::from(point.anchor_b.x), y + f64::from(point.anchor_b.y)],
+            normal: contact.manifold.normal,
+            separation: point.separation,
+            normal_impulse: point.normal_impulse,
+            tangent_impulse: point.tangent_impulse,
+        })
+    }
+
+    /// Notes how fast bodies approach at each contact, before the step changes it.
+    pub(super) fn note_approach(&mut self) {
+        let b = &self.bodies;
+        self.events.approach.clear();
+        self.events.approach.extend(self.contacts.iter().map(|contact| {
+            let [i, j] = [contact.body_a as usize, contact.body_b as usize];
+            let points = contact.manifold.points();
+            let at = |i: usize, arm: Vec2| b.velocity(i) + b.angular_velocity[i] * arm.perp();
+            let speed = |p: &crate::engine::contacts::ManifoldPoint| {
+                (at(i, p.anchor_a) - at(j, p.anchor_b)).dot(contact.manifold.normal)
+            };
+            let arm = points.iter().map(|p| p.anchor_b).sum::<Vec2>() / points.len().max(1) as f32;
+            let fastest = points.iter().map(speed).fold(f32::NEG_INFINITY, f32::max);
+            (fastest, DVec2::from(b.center(j)) + arm.as_dvec2())
+        }));
+    }
+
+    /// Compares the contacts of this step with those of the last.
+    pub(super) fn find_events(&mut self) {
+        let mut events = std::mem::take(&mut self.events);
+        std::mem::swap(&mut events.touching, &mut events.last_touching);
+        events.list.clear();
+        events.touching.clear();
+        events.touching.extend(self.contacts.iter().map(|contact| {
+            let handle = |index| BodyHandle { index, generation: self.slots.generation[index as usize] };
+            Touching {
+                key: contact.key(),
+                bodies: [contact.body_a, contact.body_b].map(handle),
+                shapes: [contact.shape_a, contact.shape_b],
+            }
+        }));
+        let Events { list, touching, last_touching, approach } = &mut events;
+        let end = |&Touching { bodies, shapes, .. }: &Touching| ContactEvent::End { bodies, shapes };
+        let mut last = last_touching.iter().peekable();
+        for ((now, contact), &(approach_speed, point)) in touching.iter().zip(&self.contacts).zip(&*approach)
+        {
+            let Touching { key, bodies, shapes } = *now;
+            while let Some(gone) = last.next_if(|old| old.key < key) {
+                list.push(end(gone));
+            }
+            match last.next_if(|old| old.key == key) {
+                Some(old) if old == now => {}
+                old => {
+                    // Of other bodies, whose places these have taken.
+                    list.extend(old.map(end));
+                    list.push(ContactEvent::Begin { bodies, shapes });
+                }
+            }
+            let impulse = contact.step_impulse[0][0] + contact.step_impulse[1][0];
+            if approach_speed > HIT_SPEED && impulse > 0.0 {
+                let (normal, point) = (contact.manifold.normal, point.to_array());
+                list.push(ContactEvent::Hit { bodies, shapes, point, normal, approach_speed, impulse });
+            }
+        }
+        list.extend(last.map(end));
+        self.events = events;
+    }
+}

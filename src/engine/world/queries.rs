@@ -1,0 +1,194 @@
+//! What is where: rays, points, boxes and shapes against the bodies of a world.
+//!
+//! The tree of the broad phase says which shapes are near, and the cores of those are measured exactly, in `f64`
+//! ([`distance`]).
+//!
+//! **Rays.** At a point p of the ray let d be the distance of the shape and n the direction to its nearest point. All of
+//! the shape lies behind the plane at distance d with normal n. So the ray may advance to that plane, by d / (n·u) along
+//! its direction u, and if n·u ≤ 0 it misses. For a polygon this ends after a few faces; for round shapes it is Newton's
+//! method on a convex function, from the side where it converges. Source: `vandenbergen2004`.
+
+use super::World;
+use crate::engine::bodies::BodyHandle;
+use crate::engine::bodies::def::finite_pair;
+use crate::engine::broadphase::Region;
+use crate::engine::error::Error;
+use crate::engine::narrowphase::gjk::distance;
+use crate::engine::shapes::{Aabb, Pose, Shape};
+use glam::{DVec2, Vec2};
+
+/// Where a ray meets a shape first. Distances are good to 10⁻⁷ of themselves, to which places relative to a ray are rounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// The body.
+    pub body: BodyHandle,
+    /// Index of the shape in [`World::shapes`].
+    pub shape: usize,
+    /// Where (m).
+    pub point: [f64; 2],
+    /// Unit vector out of the shape; against the ray if that begins inside.
+    pub normal: Vec2,
+    /// From the start of the ray (m); 0 if that is inside.
+    pub distance: f64,
+}
+
+/// Distances below this (m) count as touching.
+const TOUCH: f64 = 1e-9;
+
+/// Advances of a ray along one shape: it has at most eight faces, and Newton's method needs few.
+const MOST_ADVANCES: u32 = 64;
+
+/// Bounds are read in `f32`: what lies this far outside of a query, relative to its coordinates, is still looked at.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
+/// The bodies of a world where they are now. Made by [`World::queries`], which brings the tree up to date once for many
+/// queries.
+#[derive(Debug)]
+pub struct Queries<'w> {
+    world: &'w World,
+}
+
+impl World {
+    /// Queries on the bodies where they are now. A step after it gives the same bits as without.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// use simpulse::engine::bodies::{BodyDef, ShapeDef};
+    /// use simpulse::engine::{solvers, world::{Settings, World}};
+    ///
+    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
+    /// let queries = world.queries();
+    /// let hit = queries.ray_cast([0.0, 10.0], [0.0, -1.0])?.expect("the ball is below");
+    /// assert_eq!((hit.body, hit.distance), (ball, 7.5));
+    /// assert_eq!(queries.bodies_at([0.4, 2.0])?, [ball]);
+    /// assert_eq!(queries.bodies_in([0.45, 0.0], [3.0, 1.8])?, [ball]);
+    /// // Its bounds reach into this box, but the ball does not.
+    /// assert_eq!(queries.bodies_in([0.45, 0.0], [3.0, 1.6])?, []);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn queries(&mut self) -> Queries<'_> {
+        self.update_pairs();
+        Queries { world: self }
+    }
+
+    /// [`Queries::ray_cast`]
+    pub fn ray_cast(&mut self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
+        self.queries().ray_cast(from, direction)
+    }
+}
+
+impl Queries<'_> {
+    /// The first shape along a ray without end. Errors: a value that is not finite, a direction of length zero.
+    pub fn ray_cast(&self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
+        self.ray_cast_where(from, direction, f64::INFINITY, |_| true)
+    }
+
+    /// The first shape within `reach` (m) along a ray, of bodies that pass `filter`. Errors: as [`Self::ray_cast`].
+    pub fn ray_cast_where(
+        &self,
+        from: [f64; 2],
+        direction: [f64; 2],
+        reach: f64,
+        filter: impl Fn(BodyHandle) -> bool,
+    ) -> Result<Option<RayHit>, Error> {
+        finite_pair("from", from)?;
+        finite_pair("direction", direction)?;
+        let (origin, along) = (DVec2::from(from), DVec2::from(direction).normalize_or_zero());
+        if along == DVec2::ZERO {
+            return Err(Error::invalid("direction", "must not be zero"));
+        }
+        let mut best: Option<RayHit> = None;
+        let mut region = Region::ray(origin.as_vec2(), along.as_vec2(), reach as f32);
+        self.visit(&mut region, |region, shape, body| {
+            let limit = best.map_or(reach, |hit| hit.distance);
+            let Some((distance, normal)) = self.advance(shape, origin, along, limit) else { return };
+            // Of two at one distance the lower index, whatever the order of the tree.
+            let is_better = best.is_none_or(|hit| (distance, shape) < (hit.distance, hit.shape));
+            if is_better && filter(body) {
+                let point = (origin + distance * along).to_array();
+                best = Some(RayHit { body, shape, point, normal: normal.as_vec2(), distance });
+                region.shorten(distance as f32);
+            }
+        });
+        Ok(best)
+    }
+
+    /// Bodies with a shape that contains a point (m), ascending. Errors: a value that is not finite.
+    pub fn bodies_at(&self, point: [f64; 2]) -> Result<Vec<BodyHandle>, Error> {
+        finite_pair("point", point)?;
+        self.near(&Shape::Circle { center: Vec2::ZERO, radius: 0.0 }, DVec2::from(point), Vec2::ZERO)
+    }
+
+    /// Bodies with a shape that shares a point with a box from corner `min` to corner `max` (m), ascending.
+    ///
+    /// Errors: a value that is not finite, a corner `max` that is not above and to the right of `min`.
+    pub fn bodies_in(&self, min: [f64; 2], max: [f64; 2]) -> Result<Vec<BodyHandle>, Error> {
+        finite_pair("min", min)?;
+        finite_pair("max", max)?;
+        let half = 0.5 * (DVec2::from(max) - DVec2::from(min));
+        let shape = Shape::rectangle("box", half.as_vec2(), Vec2::ZERO, 0.0, 0.0)?;
+        self.near(&shape, 0.5 * (DVec2::from(min) + DVec2::from(max)), half.as_vec2())
+    }
+
+    /// Bodies that share a point with a shape at `center`, whose bounds reach `half` from there.
+    fn near(&self, shape: &Shape, center: DVec2, half: Vec2) -> Result<Vec<BodyHandle>, Error> {
+        let at = center.as_vec2();
+        let margin = ROUNDING * (at.abs() + half).max_element();
+        let mut region = Region::area(Aabb { min: at - half, max: at + half }.grown(margin));
+        let mut found = Vec::new();
+        self.visit(&mut region, |_, i, body| {
+            if self.distance(i, shape, center).0 <= TOUCH {
+                found.push(body);
+            }
+        });
+        found.sort_unstable();
+        found.dedup();
+        Ok(found)
+    }
+
+    /// Calls `visit` with shapes whose bounds meet the region, and their bodies.
+    fn visit(&self, region: &mut Region, mut visit: impl FnMut(&mut Region, usize, BodyHandle)) {
+        let World { broadphase, proxies, .. } = self.world;
+        broadphase.visit(proxies, region, |region, shape| {
+            if let Some(body) = self.world.handle(self.world.shape_body[shape as usize] as usize) {
+                visit(region, shape as usize, body);
+            }
+        });
+    }
+
+    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector towards it; zero where
+    /// cores overlap.
+    fn distance(&self, i: usize, other: &Shape, center: DVec2) -> (f64, DVec2) {
+        let bodies = &self.world.bodies;
+        let body = self.world.shape_body[i] as usize;
+        // From the query, so that nothing is lost far out.
+        let offset = (DVec2::from(bodies.center(body)) - center).as_vec2();
+        let pose = Pose { position: offset, ..bodies.pose(body) };
+        let shape = &self.world.shapes[i];
+        let found = distance(other, &Pose { position: Vec2::ZERO, rotation: Vec2::X }, shape, &pose);
+        (found.distance - f64::from(shape.radius()) - f64::from(other.radius()), found.normal)
+    }
+
+    /// Where a ray meets shape `i`, if within `limit`: distance (m) and outward normal.
+    fn advance(&self, i: usize, origin: DVec2, along: DVec2, limit: f64) -> Option<(f64, DVec2)> {
+        let point = Shape::Circle { center: Vec2::ZERO, radius: 0.0 };
+        let (mut at, mut normal) = (0.0, -along);
+        for _ in 0..MOST_ADVANCES {
+            let (gap, toward) = self.distance(i, &point, origin + at * along);
+            if gap <= TOUCH {
+                break;
+            }
+            let approach = toward.dot(along);
+            if approach <= 0.0 {
+                return None;
+            }
+            normal = -toward;
+            at += gap / approach;
+            if at > limit {
+                return None;
+            }
+        }
+        Some((at, normal))
+    }
+}

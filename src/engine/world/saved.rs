@@ -1,0 +1,251 @@
+//! A world as a document: what a step starts from, without what is found again.
+//!
+//! Not in it: constraints of other types than contacts, which refuse to be saved, and what a solver keeps in fields of its
+//! own, beside the numbers per contact and body. So a solver without such fields goes on with the same bits.
+
+use super::edit::{Slots, Standing};
+use super::events::Events;
+use super::traits::Traits;
+use super::{Order, Settings, World};
+use crate::engine::bodies::{BodyDef, BodyKind};
+use crate::engine::broadphase::BroadPhaseKind;
+use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::constraints::{Features, Impacts};
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::LaneWidth;
+use crate::engine::params::{Budget, Parameters};
+use crate::engine::shapes::{MassProperties, Shape};
+use crate::engine::solvers;
+use glam::Vec2;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// [`Settings`], with names and numbers for what is static.
+#[derive(Serialize, Deserialize)]
+struct SavedSettings {
+    solver: String,
+    lanes: usize,
+    narrowest_lanes: usize,
+    order: Order,
+    budget: Budget,
+    gravity: [f32; 2],
+    dt: f32,
+    parameters: Parameters,
+    impacts: Impacts,
+    record_impulses: bool,
+    contact_events: bool,
+    observe_rule: bool,
+    timed: bool,
+    broadphase: BroadPhaseKind,
+    integrator: Integrator,
+    rotation: RotationUpdate,
+    continuous: bool,
+    extra_features: Features,
+}
+
+impl Serialize for Settings {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let s = self;
+        let saved = SavedSettings {
+            solver: s.solver.name.into(),
+            lanes: s.width.lanes(),
+            narrowest_lanes: s.narrowest.lanes(),
+            order: s.order,
+            budget: s.budget,
+            gravity: s.gravity,
+            dt: s.dt,
+            parameters: s.parameters,
+            impacts: s.impacts,
+            record_impulses: s.record_impulses,
+            contact_events: s.contact_events,
+            observe_rule: s.observe_rule,
+            timed: s.timed,
+            broadphase: s.broadphase,
+            integrator: s.integrator,
+            rotation: s.rotation,
+            continuous: s.continuous,
+            extra_features: s.extra_features,
+        };
+        saved.serialize(to)
+    }
+}
+
+/// Errors: a solver that is not in the table, a number of lanes that is none of 1, 4, 8 and 16.
+impl<'de> Deserialize<'de> for Settings {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let s = SavedSettings::deserialize(from)?;
+        let error = serde::de::Error::custom::<String>;
+        let lanes =
+            |n: usize| LaneWidth::from_lanes(n).ok_or_else(|| error(format!("{n} lanes: 1, 4, 8 or 16")));
+        Ok(Settings {
+            solver: solvers::find(&s.solver).map_err(|e| error(e.to_string()))?,
+            width: lanes(s.lanes)?,
+            narrowest: lanes(s.narrowest_lanes)?,
+            order: s.order,
+            budget: s.budget,
+            gravity: s.gravity,
+            dt: s.dt,
+            parameters: s.parameters,
+            impacts: s.impacts,
+            record_impulses: s.record_impulses,
+            contact_events: s.contact_events,
+            observe_rule: s.observe_rule,
+            timed: s.timed,
+            broadphase: s.broadphase,
+            integrator: s.integrator,
+            rotation: s.rotation,
+            continuous: s.continuous,
+            extra_features: s.extra_features,
+        })
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct SavedWorld {
+    settings: Settings,
+    step_index: u64,
+    slots: Slots,
+    kind: Vec<BodyKind>,
+    group: Vec<i32>,
+    bullet: Vec<bool>,
+    round: Vec<bool>,
+    local_center: Vec<Vec2>,
+    /// The arrays of floats, in the order of [`Bodies::arrays`](crate::engine::bodies::Bodies::arrays).
+    floats: Vec<Vec<f32>>,
+    shapes: Vec<Shape>,
+    /// Friction and restitution of each shape.
+    surfaces: Vec<[f32; 2]>,
+    contacts: Vec<Contact>,
+    impulses_of: Option<f32>,
+    kept: Kept,
+    applied: Vec<Standing>,
+    events: Events,
+    traits: Traits,
+}
+
+/// Errors: constraints of other types than contacts.
+impl Serialize for World {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        if !self.work.types.is_empty() {
+            let message = "constraints of other types than contacts cannot be saved";
+            return Err(serde::ser::Error::custom(message));
+        }
+        let b = &self.bodies;
+        let saved = SavedWorld {
+            settings: self.settings.clone(),
+            step_index: self.step_index,
+            slots: self.slots.clone(),
+            kind: b.kind.clone(),
+            group: b.group.clone(),
+            bullet: b.bullet.clone(),
+            round: b.round.clone(),
+            local_center: b.local_center.clone(),
+            floats: b.arrays().map(|array| array.to_vec()).into(),
+            shapes: self.shapes.clone(),
+            surfaces: self.surfaces.iter().map(|s| [s.friction, s.restitution]).collect(),
+            contacts: self.contacts.clone(),
+            impulses_of: self.impulses_of,
+            kept: self.work.kept.clone(),
+            applied: self.applied.clone(),
+            events: self.events.clone(),
+            traits: self.traits,
+        };
+        saved.serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for World {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let saved = SavedWorld::deserialize(from)?;
+        saved.check().map_err(serde::de::Error::custom)?;
+        Ok(saved.restore())
+    }
+}
+
+impl SavedWorld {
+    /// Whether all arrays fit each other and all indices point into them.
+    fn check(&self) -> Result<(), String> {
+        let (n, shapes) = (self.kind.len(), self.shapes.len());
+        let s = &self.slots;
+        let lengths = [
+            self.group.len(),
+            self.bullet.len(),
+            self.round.len(),
+            self.local_center.len(),
+            s.generation.len(),
+            s.lives.len(),
+            s.first_shape.len(),
+            s.shapes.len(),
+        ];
+        if self.floats.len() != 17 || self.floats.iter().map(Vec::len).chain(lengths).any(|len| len != n) {
+            return Err(format!("arrays of bodies have other lengths than {n}"));
+        }
+        if self.surfaces.len() != shapes {
+            return Err(format!("{} surfaces of {shapes} shapes", self.surfaces.len()));
+        }
+        let mut next = 0_u64;
+        for (i, (&first, &count)) in s.first_shape.iter().zip(&s.shapes).enumerate() {
+            if u64::from(first) != next {
+                return Err(format!("body {i}: its shapes begin at {first}, not at {next}"));
+            }
+            next += u64::from(count);
+        }
+        if next != shapes as u64 {
+            return Err(format!("bodies have {next} shapes of {shapes}"));
+        }
+        for (i, shape) in self.shapes.iter().enumerate() {
+            shape.check().map_err(|e| format!("shapes[{i}]: {e}"))?;
+        }
+        if !self.kept.is_consistent() {
+            return Err("kept: as many numbers as names".into());
+        }
+        let is_body = |&i: &u32| (i as usize) < n;
+        let mut named = s.free.iter().chain(&s.removed);
+        if !named.all(is_body) || !self.applied.iter().all(|standing| is_body(&standing.body)) {
+            return Err(format!("a body that is none of {n}"));
+        }
+        let is_one = |c: &Contact| {
+            let in_range = [c.shape_a, c.shape_b].into_iter().all(|shape| (shape as usize) < shapes);
+            in_range && [c.body_a, c.body_b].iter().all(is_body) && c.manifold.count <= 2
+        };
+        match self.contacts.iter().position(|contact| !is_one(contact)) {
+            Some(i) => Err(format!("contacts[{i}] names a body or shape that there is not")),
+            None => Ok(()),
+        }
+    }
+
+    fn restore(self) -> World {
+        let mut world = World::new(self.settings);
+        let nothing = BodyDef::fixed([0.0; 2]);
+        for &count in &self.slots.shapes {
+            world.push_body(&nothing, &MassProperties::ZERO, count as usize);
+        }
+        let b = &mut world.bodies;
+        (b.kind, b.group, b.round, b.local_center) = (self.kind, self.group, self.round, self.local_center);
+        b.bullet = self.bullet;
+        for (array, saved) in b.arrays_mut().into_iter().zip(&self.floats) {
+            array.copy_from_slice(saved);
+        }
+        for (i, (shape, surface)) in self.shapes.into_iter().zip(self.surfaces).enumerate() {
+            world.set_shape(i, world.shape_body[i] as usize, shape, surface);
+        }
+        for (i, (&first, &count)) in self.slots.first_shape.iter().zip(&self.slots.shapes).enumerate() {
+            let (first, count) = (first as usize, count as usize);
+            world.fat_boxes.set(i, first, &world.shapes[first..first + count]);
+            if !self.slots.lives[i] {
+                world.leave_world(i, first, count);
+            }
+        }
+        world.slots = self.slots;
+        (world.step_index, world.traits) = (self.step_index, self.traits);
+        world.features = world.traits.features();
+        (world.applied, world.events, world.impulses_of) = (self.applied, self.events, self.impulses_of);
+        if self.kept.size() == world.solver_is.kept {
+            world.work.kept = self.kept;
+        }
+        world.update_pairs();
+        world.contacts = self.contacts;
+        world.narrow.relink(&mut world.contacts);
+        world
+    }
+}
