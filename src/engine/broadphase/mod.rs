@@ -62,7 +62,7 @@ impl Proxy {
 
     /// [`Self::may_touch`] without the look at the bounds.
     #[inline]
-    fn may_meet(&self, other: &Proxy) -> bool {
+    pub fn may_meet(&self, other: &Proxy) -> bool {
         (self.body != other.body)
             & (self.dynamic | other.dynamic)
             & ((self.group == 0) | (self.group != other.group))

@@ -112,7 +112,7 @@ impl Continuous {
                 let proxy = &moving.proxies[other as usize];
                 let [x, y, ..] = rows[proxy.body as usize].delta;
                 let near = overlap(&proxy.aabb.grown(x.abs().max(y.abs())), &swept);
-                if near && proxy.may_touch(&moving.proxies[shape as usize]) {
+                if near && proxy.may_meet(&moving.proxies[shape as usize]) {
                     part = part.min(pair(moving, rows, [other, shape], part));
                 }
             }
@@ -127,7 +127,7 @@ impl Continuous {
             let own = swept(moving, rows, shape as usize);
             for (other, proxy) in moving.proxies.iter().enumerate() {
                 let mine = &moving.proxies[shape as usize];
-                if !proxy.dynamic || proxy.body == body || !proxy.may_touch(mine) {
+                if !proxy.dynamic || proxy.body == body || !proxy.may_meet(mine) {
                     continue;
                 }
                 if !overlap(&swept(moving, rows, other), &own) {
