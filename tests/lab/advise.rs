@@ -19,6 +19,7 @@ fn text(bytes: &[u8]) -> &str {
 /// Nothing here may depend on the clock: the search never runs out of time.
 fn plan(scene: &str, limits: Limits) -> Plan {
     Plan {
+        impacts: simpulse::engine::constraints::Impacts::Own,
         scene: scene.to_string(),
         limits,
         solvers: ["pgs", "soft_step"].map(|name| find(name).unwrap()).to_vec(),

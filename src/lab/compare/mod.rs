@@ -9,14 +9,12 @@
 
 pub mod text;
 
-use crate::engine::params::Budget;
 use crate::engine::world::Order;
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
-use crate::lab::study::sweep::Swept;
 use serde::Serialize;
 
 /// Errors below this share of their tolerance are as good as none (1).
@@ -194,8 +192,8 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
     }
 }
 
-fn key(r: &Record) -> (&str, &str, Budget, Option<Swept>, Order, usize) {
-    (&r.scene, r.solver, r.budget, r.swept, r.order, r.lanes)
+fn key(r: &Record) -> impl PartialEq {
+    (&r.scene, r.setting(), r.lanes)
 }
 
 fn pair(one: &Record, other: &Record) -> Pair {
@@ -205,6 +203,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         let (error, unit, tolerance) = match axis {
             ErrorAxis::Penetration => ("penetration", "m", tolerances.penetration.value),
             ErrorAxis::Law => ("residual", "", tolerances.residual.value),
+            ErrorAxis::Rest => ("rest speed", "m/s", tolerances.rest.map_or(0.0, |t| t.value)),
             ErrorAxis::Truth => {
                 ("reference", one.truth.map_or("", |t| t.unit), tolerances.truth.map_or(0.0, |t| t.value))
             }
@@ -213,7 +212,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
     });
     let time = || {
         let samples = [one.sample.as_ref()?, other.sample.as_ref()?];
-        let Ratio { median, interval } = Ratio::of(samples[1], samples[0])?;
+        let Ratio { median, interval, .. } = Ratio::of(samples[1], samples[0])?;
         Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
     };
     Pair {

@@ -218,6 +218,7 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
         "lanes": plan.widths.iter().map(|w| w.lanes()).collect::<Vec<_>>(),
         "orders": plan.orders,
+        "impacts": plan.impacts,
         "budgets": plan.budgets,
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,

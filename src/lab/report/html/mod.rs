@@ -256,6 +256,7 @@ fn command(settings: &Value) -> String {
     option("solvers", solvers);
     option("lanes", list(&settings["lanes"]));
     option("orders", list(&settings["orders"]));
+    option("impacts", list(&settings["impacts"]));
     for name in ["substeps", "velocity_iterations", "relax_iterations", "position_iterations"] {
         option(&name.replace('_', "-"), list(&settings["budgets"][name]));
     }
@@ -269,8 +270,12 @@ fn command(settings: &Value) -> String {
         let values: Vec<String> = values.map(|v| v.to_string()).collect();
         option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
     }
-    let options =
-        [("penetration", "penetration", "m"), ("residual", "residual", ""), ("truth", "reference", "")];
+    let options = [
+        ("penetration", "penetration", "m"),
+        ("residual", "residual", ""),
+        ("truth", "reference", ""),
+        ("rest", "rest-speed", "m/s"),
+    ];
     let given = |(name, option, unit): &(&str, &str, &str)| {
         settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))
     };
@@ -288,8 +293,7 @@ fn command(settings: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::tolerance::Tolerances;
-    use crate::lab::study::record::tests::{failed, fell, record};
+    use crate::lab::study::record::tests::{failed, fell, record, tolerances};
     use crate::lab::study::{Record, StudyPlan, TruthError, mark_fronts};
 
     fn records() -> Vec<Record> {
@@ -298,7 +302,7 @@ mod tests {
             solver: "soft_step",
             truth: Some(truth),
             speed_up: Some(3.0),
-            tolerances: Tolerances::standard().percent(1e7),
+            tolerances: tolerances().percent(1e7),
             ..record(8, substeps, time, error)
         };
         let mut records = vec![
