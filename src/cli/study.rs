@@ -229,7 +229,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
-    html::write_recordings(&args.out, &[])?;
+    let lock = files::Lock::of(&args.out)?;
     note(&(without + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
@@ -248,10 +248,13 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     drop(bar);
     let study = StudyFile::new(&plan, records, elsewhere);
     let replays = telling::recordings(&plan, &study.records)?;
+    // From here on files of an earlier study are replaced: a signal waits until all of them are.
+    let guard = guard.finish();
     let replays = html::write_recordings(&args.out, &replays)?;
     let mut paths = report::write_study(&args.out, &study)?;
     paths.extend(replays);
     drop(guard);
+    drop(lock);
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
@@ -298,6 +301,10 @@ fn keep(plan: &StudyPlan, out: &Path, records: Vec<Record>, elsewhere: Vec<Strin
     }
     // Scenes are finished in the order of the plan.
     let missing = plan.scenes[done.min(all)..].iter().cloned().chain(elsewhere).collect();
+    // Recordings there are of another study.
+    if let Err(error) = html::write_recordings(out, &[]) {
+        return format!("interrupted; finished scenes could not be written: {error}\n");
+    }
     match report::write_study(out, &StudyFile::new(plan, records, missing)) {
         Ok(_) if done == all => format!("interrupted; all scenes are in {}\n", out.display()),
         Ok(_) => format!("interrupted; {done} of {all} scenes are in {}, marked as partial\n", out.display()),

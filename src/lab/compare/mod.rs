@@ -240,6 +240,7 @@ fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
     differ("instructions", a.instructions().into(), b.instructions().into());
     differ("compiler", a.compiler.clone(), b.compiler.clone());
     differ("version", a.version.clone(), b.version.clone());
+    differ("commit", a.commit.clone(), b.commit.clone());
     let empty = serde_json::Map::new();
     let [a, b] = [before, after].map(|study| study.settings.as_object().unwrap_or(&empty));
     let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();

@@ -54,44 +54,56 @@ pub struct Errors {
     /// Points at which shapes were as near as a contact after a step, over all steps.
     pub points: u64,
     /// Deepest overlap (m).
+    #[serde(rename = "penetration_max_m")]
     pub penetration_max: f64,
     /// Mean overlap of such points, open ones counted as zero (m).
+    #[serde(rename = "penetration_mean_m")]
     pub penetration_mean: f64,
     /// Root mean square of the same (m).
+    #[serde(rename = "penetration_rms_m")]
     pub penetration_rms: f64,
     /// What 99 % of such points do not exceed (m).
+    #[serde(rename = "penetration_p99_m")]
     pub penetration_p99: f64,
     /// How deep bodies that were no contact yet had flown into each other by the end of a step, at most (m): no
     /// solver saw them.
-    #[serde(default)]
+    #[serde(rename = "flight_depth_max_m")]
     pub flight_depth_max: f64,
     /// What 99 % of the points of contacts do not exceed beyond the depth at which they were found (m).
-    #[serde(default)]
+    #[serde(rename = "held_depth_p99_m")]
     pub held_depth_p99: f64,
     /// Deepest overlap of the last second (m).
-    #[serde(default)]
+    #[serde(rename = "rest_depth_max_m")]
     pub rest_depth_max: f64,
     /// Deepest overlap, in half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
     /// Deepest overlap of the last second beyond what soft contacts give way at rest (m); none
     /// without soft contacts.
+    #[serde(rename = "penetration_excess_m")]
     pub penetration_excess: Option<f64>,
     /// The most that soft contacts give way under the last second's load (m).
+    #[serde(rename = "soft_floor_m")]
     pub soft_floor: Option<f64>,
     /// Normal law residual, root mean square, in the weight of the scene × step.
+    #[serde(rename = "residual_normal_rms")]
     pub law_normal_rms: f64,
     /// Largest normal law residual.
+    #[serde(rename = "residual_normal_max")]
     pub law_normal_max: f64,
     /// Tangential law residual, root mean square.
+    #[serde(rename = "residual_tangent_rms")]
     pub law_tangent_rms: f64,
     /// Largest tangential law residual.
+    #[serde(rename = "residual_tangent_max")]
     pub law_tangent_max: f64,
     /// Both parts together, root mean square. At equal quality it falls with the number of bodies.
+    #[serde(rename = "residual_rms_scene_weights")]
     pub law_rms: f64,
     /// The same in the mean weight of a body × step, which does not.
+    #[serde(rename = "residual_rms_body_weights")]
     pub law_rms_body: f64,
     /// Both parts together, each point's in the weight of the lighter of its two bodies × step, root mean square.
-    #[serde(default)]
+    #[serde(rename = "residual_rms_lighter_weights")]
     pub law_rms_lighter: f64,
     /// Largest violation of complementarity, in (weight × step)²/mass.
     pub complementarity: f64,
@@ -101,8 +113,10 @@ pub struct Errors {
     pub dissipation: f64,
     /// Residual of what the solver set out to solve, both parts, root mean square, in the
     /// weight of the scene × substep; only with `Settings::observe_rule`.
+    #[serde(rename = "own_residual_rms")]
     pub own_rms: Option<f64>,
     /// Largest of its normal and tangential parts.
+    #[serde(rename = "own_residual_max")]
     pub own_max: Option<f64>,
     /// Momentum out of balance, see [`Balance::close`].
     pub momentum: f64,
@@ -119,12 +133,16 @@ pub struct Errors {
     /// Most energy in one step that no impulse explains.
     pub energy_unexplained: f64,
     /// Root mean square of √(2 E_kin/M) over the last second (m/s).
+    #[serde(rename = "rest_speed_m_s")]
     pub rest_velocity: f64,
     /// Fastest creep of one body on another over the last second, without its sign (m/s).
+    #[serde(rename = "creep_m_s")]
     pub creep: f64,
     /// Half the width of its 95 % interval (m/s).
+    #[serde(rename = "creep_half_width_m_s")]
     pub creep_half_width: f64,
     /// When the scene came to rest for good (s), if it did.
+    #[serde(rename = "settled_s")]
     pub settled: Option<f64>,
 }
 

@@ -22,6 +22,8 @@ pub struct Environment {
     pub debug_assertions: bool,
     /// Version of this crate.
     pub version: String,
+    /// Commit that the program was built from, or `unknown`.
+    pub commit: String,
 }
 
 impl Environment {
@@ -37,6 +39,7 @@ impl Environment {
             native_lanes: native_lanes(),
             debug_assertions: cfg!(debug_assertions),
             version: env!("CARGO_PKG_VERSION").into(),
+            commit: env!("SIMPULSE_COMMIT").into(),
         }
     }
 }

@@ -76,8 +76,10 @@ pub struct Tolerances {
     /// Contact-law residual, root mean square, in the weight of the lighter body × step (1).
     pub residual: Tolerance,
     /// Distance to what is known about the scene, in its unit; none where nothing is known.
+    #[serde(rename = "reference")]
     pub truth: Option<Tolerance>,
     /// Speed that is left at the end (m/s); none where nothing has to come to rest.
+    #[serde(rename = "rest_speed")]
     pub rest: Option<Tolerance>,
 }
 

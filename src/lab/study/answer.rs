@@ -55,6 +55,17 @@ impl<'a> Answer<'a> {
         [self.best(), self.runner_up()].into_iter().flatten().filter(|r| r.later.is_none())
     }
 
+    /// The cheapest of each solver.
+    pub fn of_each_solver(&self) -> Vec<&'a Record> {
+        let mut first: Vec<&Record> = Vec::new();
+        for record in &self.good {
+            if first.iter().all(|r| r.solver != record.solver) {
+                first.push(record);
+            }
+        }
+        first
+    }
+
     /// The cheapest, if any is good enough.
     pub fn best(&self) -> Option<&'a Record> {
         self.good.first().copied()

@@ -93,8 +93,11 @@ pub fn run_on(
 ) -> Result<(), Error> {
     loop {
         let mut untried: Vec<&Record> = Vec::new();
-        for answer in Accuracy::ALL.into_iter().filter_map(|accuracy| Answer::at(records, accuracy)) {
-            for record in answer.untried() {
+        for accuracy in Accuracy::ALL {
+            let Some(answer) = Answer::at(records, accuracy) else { return Ok(()) };
+            // What a solver is good for is said of plausible runs: there each has to stand.
+            let each = if accuracy == Accuracy::Plausible { answer.of_each_solver() } else { Vec::new() };
+            for record in answer.untried().chain(each.into_iter().filter(|r| r.later.is_none())) {
                 if untried.iter().all(|other| !same(other, record)) {
                     untried.push(record);
                 }

@@ -13,6 +13,7 @@ pub mod compare;
 pub mod cost;
 pub mod curve;
 pub mod horizon;
+pub mod impacts;
 pub mod interleave;
 pub mod pareto;
 pub mod profile;

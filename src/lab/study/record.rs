@@ -51,10 +51,12 @@ pub struct Record {
     /// Errors, the same for all widths; none if the run failed.
     pub errors: Option<Errors>,
     /// Distance to what is known about the scene.
+    #[serde(rename = "reference")]
     pub truth: Option<TruthError>,
     /// How wrong the scene may be.
     pub tolerances: Tolerances,
     /// The first demand of the scene that was not met.
+    #[serde(rename = "holds", with = "holding")]
     pub broken: Option<Broken>,
     /// What nobody checked, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -70,6 +72,30 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
+/// What holds is `"yes"` in files; what does not has its word and its step.
+mod holding {
+    use super::Broken;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Holds {
+        Yes(String),
+        No(Broken),
+    }
+
+    pub fn serialize<S: Serializer>(broken: &Option<Broken>, serializer: S) -> Result<S::Ok, S::Error> {
+        broken.map_or(Holds::Yes("yes".into()), Holds::No).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Broken>, D::Error> {
+        match Holds::deserialize(deserializer)? {
+            Holds::Yes(_) => Ok(None),
+            Holds::No(broken) => Ok(Some(broken)),
+        }
+    }
+}
+
 /// A run to the horizon of its scene.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Later {
@@ -78,6 +104,7 @@ pub struct Later {
     /// The same (s).
     pub seconds: f64,
     /// The first demand that was not met.
+    #[serde(rename = "holds", with = "holding")]
     pub broken: Option<Broken>,
     /// Root mean square of the speed over the last second (m/s); none where nothing has to rest.
     pub rest_speed_m_s: Option<f64>,
@@ -180,8 +207,10 @@ pub struct Fronts {
     /// Against the deepest penetration.
     pub penetration: bool,
     /// Against the contact-law residual (root mean square).
+    #[serde(rename = "residual")]
     pub law: bool,
     /// Against the distance to the truth.
+    #[serde(rename = "reference")]
     pub truth: bool,
 }
 

@@ -221,7 +221,7 @@ fn machine(study: &StudyFile) -> String {
         ("compiler", e.compiler.clone()),
         ("instructions", e.target_features.join(" ")),
         ("native lanes", e.native_lanes.to_string()),
-        ("version", e.version.clone()),
+        ("version", format!("{}, commit {}", e.version, e.commit)),
         ("command", command(&study.settings)),
     ];
     let mut text = String::from("<table class=\"facts\"><tbody>\n");
