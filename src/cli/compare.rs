@@ -28,7 +28,7 @@ pub struct CompareArgs {
     #[arg(value_name = "AFTER")]
     pub after: PathBuf,
     /// Growth of a time or an error from which it is a regression, as 0.1 or 10%
-    #[arg(long, default_value = "10%", value_name = "SHARE", value_parser = share)]
+    #[arg(long, default_value = "5%", value_name = "SHARE", value_parser = share)]
     pub threshold: f64,
     /// Judge times relative to the median of all: for another machine, or a slower day
     #[arg(long)]

@@ -20,6 +20,7 @@ pub mod run;
 pub mod savings;
 pub mod snapshot;
 pub mod study;
+pub mod times;
 pub mod values;
 pub mod verify;
 

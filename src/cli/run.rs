@@ -2,8 +2,8 @@
 
 use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
+use super::times::Times;
 use super::values::{self, SettingArgs, scene_help};
-use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
@@ -16,11 +16,11 @@ use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{bodies, digits, lanes, ratio, si};
+use crate::lab::report::units::{bodies, lanes, ratio, si};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::study::cost::sweeps;
-use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
+use crate::lab::study::{Failure, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -138,7 +138,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let mut observation = Observation::new(&world);
     let mut watch = Watch::new(&world, loaded.demands.clone());
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
-    let mut times = Times::default();
     let bar = Bar::new();
     let diverged = |failure: Failure| {
         note(&format!("failed: {} {failure}; nothing written\n", args.scene));
@@ -155,7 +154,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             return diverged(divergence.into());
         }
         bar.step(step as usize, scene.steps as usize, "steps");
-        times.add(&world.timings);
         if let Some((_, recorder)) = &mut recorder {
             recorder.add(&world)?;
         }
@@ -177,6 +175,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
     }
     drop(bar);
+    // Metrics empty the caches: times come from passes of their own, and the bits say that it is the same run.
+    let own = Settings { record_impulses: false, ..world.settings.clone() };
+    let times = Times::measure(scene, own, world.state_hash())?;
     let truth = loaded.truth.as_ref().map(TruthError::of);
     let (unchecked, rests) = (loaded.unchecked.clone(), loaded.rests());
     let found =
@@ -201,11 +202,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
-/// What the run will take: each step is timed and its errors are measured.
+/// What the run will take: its errors are measured, and then it is timed.
 fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     let bodies = scene.bodies.len();
     let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
-    let seconds = f64::from(scene.steps) * (step + estimate::errors(bodies));
+    let seconds = f64::from(scene.steps) * (5.0 * step + estimate::errors(bodies));
     Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
 }
 
@@ -222,7 +223,7 @@ pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -
         (Order::Colored, Some(width)) => own.exactly(width),
         (Order::Colored, None) => own,
     };
-    Ok(Settings { order, record_impulses: true, timed: true, ..own })
+    Ok(Settings { order, record_impulses: true, ..own })
 }
 
 impl Found {
@@ -246,6 +247,7 @@ impl Found {
         let line = |name: &str, value: String, note: String| {
             format!("  {:<34}{:>12}  {note}", name, value).trim_end().to_string() + "\n"
         };
+        let sample = &self.times.sample;
         let (longest, share) = self.times.longest();
         let reference = match &self.truth {
             None => line("distance to reference value", "–".into(), "none is known".into()),
@@ -262,8 +264,8 @@ impl Found {
         let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
         [
             "cost\n".to_string(),
-            line("time of a step, median", si(1e-9 * self.times.step_ns(), "s"), String::new()),
-            line("longest phase", longest.to_string(), format!("{:.0} % of the time", 100.0 * share)),
+            line("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
+            line("longest phase", longest.to_string(), format!("{:.0} % of a median step", 100.0 * share)),
             "error\n".to_string(),
             line(
                 if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },
@@ -287,6 +289,7 @@ impl Found {
         ]
         .concat()
             + &unchecked
+            + &self.times.note()
             + "--all prints every figure\n"
     }
 }
@@ -312,6 +315,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
     let s = &world.settings;
     let phases: serde_json::Map<String, Value> =
         found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();
+    let sample = &found.times.sample;
     Ok(json!({
         "environment": Environment::current(),
         "scene": scene.name,
@@ -324,7 +328,13 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "impacts": s.impacts.name(),
         "order": s.order,
         "lanes": world.lane_width().lanes(),
-        "step_ns": found.times.step_ns(),
+        "mean_step_ns": sample.mean_ns,
+        "median_step_ns": sample.median_ns,
+        "longest_step_ns": sample.worst_ns,
+        "rounds": sample.rounds,
+        "waited_share": sample.waited,
+        "noise_share": sample.noise,
+        "bits_equal": found.times.same_bits,
         "phase_ns": phases,
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
@@ -378,59 +388,6 @@ fn truth_line(truth: &TruthError) -> String {
     match truth.error {
         Some(error) => format!("  distance to reference value: {} ({known})\n", si(error, truth.unit)),
         None => format!("  distance to reference value: not reached in this run ({known})\n"),
-    }
-}
-
-/// Times of every step.
-#[derive(Default)]
-struct Times {
-    phases: [Vec<f64>; Phase::ALL.len()],
-    steps: Vec<f64>,
-}
-
-impl Times {
-    fn add(&mut self, timings: &Timings) {
-        for (times, &ns) in self.phases.iter_mut().zip(&timings.phase_ns) {
-            times.push(ns as f64);
-        }
-        self.steps.push(timings.step_ns as f64);
-    }
-
-    /// Median time of a step (ns).
-    fn step_ns(&self) -> f64 {
-        interleave::median(&self.steps)
-    }
-
-    /// Median times (ns) of the phases that the solver has.
-    fn by_phase(&self) -> impl Iterator<Item = (String, f64)> {
-        let all = Phase::ALL.iter().zip(&self.phases).filter(|(_, times)| times.iter().any(|&t| t > 0.0));
-        all.map(|(phase, times)| (phase.name().to_string(), interleave::median(times)))
-    }
-
-    /// The phase that takes most of the time, and its share (1).
-    fn longest(&self) -> (&'static str, f64) {
-        let sum = |times: &[f64]| times.iter().sum::<f64>();
-        let all = Phase::ALL.iter().zip(&self.phases).map(|(phase, times)| (phase.name(), sum(times)));
-        let (name, time) = all.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(("none", 0.0));
-        (name, time / sum(&self.steps).max(1.0))
-    }
-
-    /// Mean and median per step; phases that the solver does not have are left out.
-    fn table(&self) -> String {
-        let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
-        let whole = mean(&self.steps);
-        let line = |name: &str, times: &[f64]| {
-            let (mean, median) = (mean(times), interleave::median(times));
-            let share = if whole > 0.0 { 100.0 * mean / whole } else { 0.0 };
-            format!("  {name:<12}{:>12}{:>12}{share:>9.1} %\n", digits(mean / 1e3), digits(median / 1e3))
-        };
-        let mut text = format!("  {:<12}{:>12}{:>12}{:>11}\n", "µs per step", "mean", "median", "share");
-        for (phase, times) in Phase::ALL.iter().zip(&self.phases) {
-            if times.iter().any(|&t| t > 0.0) {
-                text += &line(phase.name(), times);
-            }
-        }
-        text + &line("whole step", &self.steps)
     }
 }
 

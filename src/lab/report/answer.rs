@@ -34,7 +34,7 @@ next: the cheapest setting of another solver, and how much slower; tie: no diffe
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let ranking = ranking(records);
-    let mut text = recommendation(&ranking, scenes.len(), steps) + "\n";
+    let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
     text += &warnings(records, steps);
     text += &head(records, environment, scenes.len());
     text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
@@ -78,7 +78,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
             );
         }
         (None, _) if ranking.first.is_empty() => text += "Nothing that ran is good enough anywhere.",
-        (None, _) => text += "No solver leads: choose by scene.",
+        (None, _) => text += "No one solver will do: choose by scene.",
     }
     if ranking.leader().is_none() && ranking.first.len() > 1 {
         text += &format!(
@@ -100,6 +100,29 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
         );
     }
     text + "\n"
+}
+
+/// Longest line of prose (characters).
+const WIDTH: usize = 150;
+
+/// The same with lines of [`WIDTH`] at most.
+fn wrapped(text: &str) -> String {
+    let mut wrapped = String::new();
+    for line in text.lines() {
+        let mut length = 0;
+        for word in line.split(' ') {
+            let count = word.chars().count();
+            let gap = match length {
+                0 => "",
+                _ if length + 1 + count > WIDTH => "\n",
+                _ => " ",
+            };
+            length = if gap == " " { length + 1 + count } else { count };
+            wrapped += &format!("{gap}{word}");
+        }
+        wrapped += "\n";
+    }
+    wrapped
 }
 
 /// The first few of a list.
@@ -377,10 +400,11 @@ fn waves(records: &[Record]) -> String {
     let mut costs: Vec<f64> = found.iter().filter_map(|g| g.time).collect();
     costs.sort_by(f64::total_cmp);
     let cost = costs.get(costs.len() / 2).map_or("–".to_string(), |c| digits(*c));
-    format!(
+    let text = format!(
         "--impacts waves: of {} solver and scene pairs where something bounces, {better} become better by a tenth or more; in the median {cost} times the time (tables.txt)\n",
         found.len()
-    )
+    );
+    wrapped(&text)
 }
 
 /// Solvers that the default list leaves out.
@@ -478,12 +502,12 @@ mod tests {
         ];
         let text = page(&steady);
         assert!(text.starts_with("Use shim: good enough on 2 of 2 scenes"), "{text}");
-        assert!(text.contains("soft_step, the default, is number 2 of 2"), "{text}");
+        assert!(text.contains("shim, the default, is number 1 of 2"), "{text}");
         let mut torn = steady.clone();
         torn[3] = on("y", "soft_step", 1.0);
         let text = page(&torn);
         assert!(
-            text.starts_with("No solver leads") && text.contains("first is one of soft_step, shim"),
+            text.starts_with("No one solver will do") && text.contains("first is one of soft_step, shim"),
             "{text}"
         );
     }

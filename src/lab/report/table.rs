@@ -248,7 +248,7 @@ mod tests {
         wrong.bits_equal = Some(false);
         let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1), fell(8, 3, 5.0, 0.1)]);
         assert!(text.contains(" fell ") && text.contains(" yes "), "{text}");
-        assert_eq!(text.matches("1.23 mm").count(), 2, "{text}");
+        assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
         assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));

@@ -80,6 +80,8 @@ pub struct Sample {
     pub phase_ns: [f64; Phase::ALL.len()],
     /// Median time of all sweeps over the rows that they solve (ns).
     pub row_sweep_ns: f64,
+    /// Median time of a fixed loop between the rounds (ns): what the machine was worth just then.
+    pub yardstick_ns: f64,
     /// Averages over the steps.
     pub load: Load,
     /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
@@ -240,6 +242,7 @@ struct Timing {
     waited_and_ran: [f64; 2],
     phases: [Vec<f64>; Phase::ALL.len()],
     row_sweep: Vec<f64>,
+    yardstick: Vec<f64>,
     load: LoadSum,
     hash: u64,
     failure: Option<Divergence>,
@@ -281,9 +284,16 @@ impl<'a> Interleaved<'a> {
                 timing.blocks.push(vec![f64::NAN; blocks.len()]);
             }
             let timings = &mut self.timings;
+            let mut measured = Vec::new();
+            let mut last = None;
             take_turns(names.len(), blocks.len(), |place, round| {
+                if last != Some(round) {
+                    last = Some(round);
+                    measured.push(yardstick());
+                }
                 timings[names[place]].go(&mut worlds[place], blocks[round].clone(), round);
             });
+            timings.iter_mut().for_each(|timing| timing.yardstick.extend(&measured));
             for (&i, world) in names.iter().zip(&worlds) {
                 self.timings[i].hash = world.state_hash();
             }
@@ -407,11 +417,24 @@ impl Timing {
             quartiles_ns: [quantile(&medians, 0.25), quantile(&medians, 0.75)],
             phase_ns: self.phases.each_ref().map(|times| median(times)),
             row_sweep_ns: median(&self.row_sweep),
+            yardstick_ns: median(&self.yardstick),
             load: self.load.average(),
             blocks_ns: self.blocks.clone(),
             hash: self.hash,
         })
     }
+}
+
+/// Time of a chain of multiply-adds that nothing can shorten (ns): about 10 µs.
+fn yardstick() -> f64 {
+    const LINKS: u32 = 4000;
+    let start = Instant::now();
+    let mut x = std::hint::black_box(1.0_f32);
+    for _ in 0..LINKS {
+        x = x * 0.999 + 0.001;
+    }
+    std::hint::black_box(x);
+    nanos(start.elapsed())
 }
 
 fn nanos(duration: Duration) -> f64 {

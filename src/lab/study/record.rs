@@ -295,6 +295,7 @@ pub(crate) mod tests {
             quartiles_ns: [0.0; 2],
             phase_ns: Default::default(),
             row_sweep_ns: 1.0,
+            yardstick_ns: 1e4,
             load: Load::default(),
             blocks_ns: vec![vec![1e3 * time; 20]],
             hash: 0,

@@ -130,8 +130,8 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         "overview",
         "Speed against error over all scenes",
         "Small marks: every solver and budget on every scene, in colours, at its fastest lane width. Large marks: \
-         the geometric mean of a budget over the scenes on which it holds, from the smallest budget to the \
-         largest. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
+         the geometric mean of a budget, from the smallest to the largest; hollow ones leave out scenes on which it \
+         does not hold, and their names say how many. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
         overview::overview(records),
     );
     if !recordings.is_empty() {
@@ -362,14 +362,14 @@ mod tests {
         let page = page(&study, None, &[]);
         for part in [
             "PARTIAL: without arch",
-            "ranks first: it is good enough on",
+            "fails on",
             "fell at step 100",
             "blew up at step 7",
             "performance profiles",
             "lanes filled",
             "time per phase",
             "sweeps of a step",
-            "deepest penetration",
+            "penetration, 99 % or at rest",
             "load of &lt;ground&gt;",
             "2 kN",
             "simpulse study --quick --scenes",

@@ -60,7 +60,7 @@ pub fn answer(records: &[Record], steps: Option<u64>) -> String {
 
 /// What to use, what speaks against it, and where nothing is good enough.
 fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: Option<u32>) -> String {
-    let mut text = escaped(&recommendation(ranking, answers.len(), steps)).replace('\n', "<br>");
+    let mut text = escaped(&recommendation(ranking, answers.len(), steps)).replace('\n', "<br/>");
     let none: Vec<&str> = answers.iter().filter(|a| a.best().is_none()).map(|a| a.scene).collect();
     if !none.is_empty() {
         text += &format!("Nothing that ran is good enough on {}.", escaped(&none.join(", ")));
