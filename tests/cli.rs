@@ -494,6 +494,9 @@ fn printed_commands() -> Vec<(String, Vec<String>)> {
                 let Some(rest) = part.strip_prefix("simpulse ") else { continue };
                 let rest = rest.split(" > ").next().unwrap_or(rest);
                 let words: Vec<String> = rest.split_whitespace().map(String::from).collect();
+                if words.first().is_some_and(|w| w == "=") {
+                    continue;
+                }
                 commands.push((format!("{}: {part}", file.display()), words));
             }
         }

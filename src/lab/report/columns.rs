@@ -3,6 +3,9 @@
 //! Cells are empty where there is nothing: a run that failed has no errors, a scene without a
 //! reference value no distance to it.
 
+/// Version of `study.csv` and `study.json`: it grows with every change that an older program cannot read.
+pub const SCHEMA: u32 = 2;
+
 /// A column.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {

@@ -1,7 +1,7 @@
 //! The study as `study.csv` and `study.json`.
 
+use super::columns::SCHEMA;
 use super::environment::Environment;
-use super::study_file::SCHEMA;
 use super::units::is_emulated;
 use crate::engine::clock::Phase;
 use crate::engine::params;

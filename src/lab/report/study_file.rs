@@ -1,5 +1,6 @@
 //! `study.json`: everything that a study chose and measured, written and read back.
 
+use super::columns::SCHEMA;
 use super::environment::Environment;
 use super::export::settings;
 use crate::lab::error::Error;
@@ -10,9 +11,6 @@ use std::path::{Path, PathBuf};
 
 /// Name of the file in a study's folder.
 pub const NAME: &str = "study.json";
-
-/// Version of the form of the file: it grows with every change that an older program cannot read.
-pub const SCHEMA: u32 = 2;
 
 /// A study: whole, cut short, or put together.
 #[derive(Clone, Debug, Serialize, Deserialize)]

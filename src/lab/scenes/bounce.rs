@@ -28,7 +28,7 @@ pub(super) const BOUNCE: Entry =
     })
     .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)))
     .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, apex| tolerances(scene, apex));
+    .within(tolerances);
 
 pub(super) const ELASTIC: Entry =
     Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces for ever", |_| {
@@ -37,7 +37,7 @@ pub(super) const ELASTIC: Entry =
     })
     .known(|scene, _| truth("apexes of twenty bounces", scene, 1.0, 1.0, 20))
     .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, apex| tolerances(scene, apex));
+    .within(tolerances);
 
 /// Rising to `apex` (m) after the first impact.
 fn tolerances(scene: &Scene, apex: f64) -> Tolerances {

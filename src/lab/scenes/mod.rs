@@ -14,6 +14,7 @@ mod column;
 mod compounds;
 mod dominoes;
 pub mod expect;
+mod expected;
 mod far;
 mod format;
 mod free;
@@ -38,6 +39,8 @@ mod washer;
 pub const SCHEMA: &str = include_str!("scene.schema.json");
 
 pub use check::{MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
+pub use expect::Measure;
+pub use expected::loaded as expecting;
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };

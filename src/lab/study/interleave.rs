@@ -503,7 +503,7 @@ pub(crate) mod tests {
     fn blocks_cover_every_step_and_begin_elsewhere_in_every_pass() {
         assert_eq!((blocks(200, 0).len(), blocks(40, 0)[1].clone()), (20, 3..6));
         assert_eq!((blocks(200, 1)[0].clone(), blocks(200, 1)[1].clone()), (0..7, 7..17));
-        assert_eq!((blocks(2, 0), blocks(1, 0), blocks(0, 0)), (vec![0..2], vec![0..1], vec![]));
+        assert_eq!([blocks(2, 0).len(), blocks(1, 0).len(), blocks(0, 0).len()], [1, 1, 0]);
         for (steps, pass) in (0..300).flat_map(|steps| (0..5).map(move |pass| (steps, pass))) {
             let covered: Vec<u32> = blocks(steps, pass).into_iter().flatten().collect();
             assert_eq!(covered, (0..steps).collect::<Vec<_>>());

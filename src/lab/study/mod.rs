@@ -235,7 +235,7 @@ pub fn open_scene(
         scene.steps = steps.unwrap_or(scene.steps);
         scene.dt = dt.unwrap_or(scene.dt);
         scene.validate()?;
-        return scenes::expect::loaded(scene);
+        return scenes::expecting(scene);
     }
     let mut loaded = match seed {
         Some(seed) => scenes::load_with_seed(name, seed)?,
