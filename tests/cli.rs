@@ -214,10 +214,20 @@ fn a_small_study_leaves_whole_files() {
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // 2 scenes × all solvers of the default list × 3 budgets × (natural order and 2 widths).
-    assert_eq!(rows.len(), 2 * DEFAULT_SOLVERS.len() * 3 * 3);
+    // Two scenes, of which one bounces and runs with waves of impacts, too; × all solvers of the default list
+    // × 3 budgets × (natural order and 2 widths).
+    assert_eq!(rows.len(), 3 * DEFAULT_SOLVERS.len() * 3 * 3);
     for row in &rows {
-        for name in ["median_us", "penetration_max", "law_rms", "momentum", "sweeps", "occupancy"] {
+        for name in [
+            "mean_step_us",
+            "median_step_us",
+            "longest_step_us",
+            "penetration_max_m",
+            "residual_rms_lighter_weights",
+            "momentum",
+            "sweeps",
+            "occupancy",
+        ] {
             let value: f64 = row[column(name)].parse().unwrap();
             assert!(value.is_finite() && value >= 0.0, "{name} {value}");
         }
@@ -328,7 +338,8 @@ fn every_csv_header_is_documented() {
     }
     let shown = simpulse(folder.path(), &["columns"]);
     assert!(
-        text(&shown.stdout).contains("penetration_max") && text(&shown.stdout).contains("tangent_impulse")
+        text(&shown.stdout).contains("penetration_judged_m")
+            && text(&shown.stdout).contains("tangent_impulse")
     );
 }
 
@@ -460,4 +471,112 @@ fn lists_and_scenes_are_printed() {
 fn the_default_study_names_scenes_that_exist() {
     simpulse::lab::study::StudyPlan::default().check().unwrap();
     simpulse::lab::study::StudyPlan::quick().check().unwrap();
+}
+
+/// Every command that README and papers print, as words; what a shell does with them is left out.
+fn printed_commands() -> Vec<(String, Vec<String>)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = vec![root.join("README.md")];
+    let papers = std::fs::read_dir(root.join("papers")).unwrap().map(|entry| entry.unwrap().path());
+    files.extend(papers.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    let mut commands = Vec::new();
+    for file in files {
+        let content = std::fs::read_to_string(&file).unwrap();
+        let quoted = content.split('`').skip(1).step_by(2).filter(|part| !part.contains('\n'));
+        let mut fenced = false;
+        let code = content.lines().filter(|line| {
+            fenced ^= line.starts_with("```");
+            fenced
+        });
+        for line in code.chain(quoted) {
+            for part in line.split("# ").next().unwrap_or("").split([';', '|']) {
+                let part = part.trim().trim_start_matches("$ ");
+                let Some(rest) = part.strip_prefix("simpulse ") else { continue };
+                let rest = rest.split(" > ").next().unwrap_or(rest);
+                let words: Vec<String> = rest.split_whitespace().map(String::from).collect();
+                if words.first().is_some_and(|w| w == "=") {
+                    continue;
+                }
+                commands.push((format!("{}: {part}", file.display()), words));
+            }
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_in_readme_and_papers_is_one() {
+    use clap::Parser;
+    let commands = printed_commands();
+    assert!(commands.len() > 30, "{}", commands.len());
+    for (place, words) in commands {
+        // `NAME` stands for a name, and prose may speak of a command without what it needs.
+        let is_prose = words.len() == 1 && words[0].chars().all(|c| c.is_ascii_lowercase());
+        let words = words.iter().map(|w| if w == "NAME" { "arch" } else { w.as_str() });
+        let words: Vec<&str> = std::iter::once("simpulse").chain(words).collect();
+        if let Err(error) = simpulse::cli::args::Cli::try_parse_from(&words) {
+            let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
+            assert!(is_prose && missing, "{place}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_that_was_printed_falls_as_its_own_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let printed = simpulse(folder.path(), &["scene", "stack:20", "--json"]).stdout;
+    std::fs::write(folder.path().join("st.json"), &printed).unwrap();
+    let run = |args: &[&str]| {
+        let output = simpulse(folder.path(), args);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    let options = ["--solver", "pgs", "--steps", "1200", "--json"];
+    let own = run(&[&["run", "stack:20"], &options[..]].concat());
+    let file = run(&[&["run", "st.json"], &options[..]].concat());
+    for key in ["holds", "reference", "errors"] {
+        assert_eq!(own[key], file[key], "{key}");
+    }
+    assert!(own["holds"].as_str().unwrap().starts_with("fell at step"), "{}", own["holds"]);
+    assert_eq!(own["bits_equal"], true);
+    assert_eq!(own["impacts"], "own");
+    // Where a file says nothing, the answer says that nothing was checked.
+    let bare =
+        r#"{"name":"b","bodies":[{"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":1}}]}]}"#;
+    std::fs::write(folder.path().join("bare.json"), bare).unwrap();
+    let output = simpulse(folder.path(), &["run", "bare.json", "--steps", "5"]);
+    assert!(text(&output.stdout).contains("not checked: what must hold"), "{}", text(&output.stdout));
+}
+
+#[test]
+fn what_a_solver_ignores_is_refused_with_who_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let relax = ["run", "stack:2", "--solver", "pgs", "--relax-iterations", "3"];
+    refused(folder.path(), &relax, &["--relax-iterations", "pgs", "soft_step"]);
+    let hertz = ["run", "stack:2", "--solver", "pgs", "--set", "contact_hertz=60"];
+    refused(folder.path(), &hertz, &["contact_hertz", "pgs", "soft_step"]);
+}
+
+#[test]
+fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = |i: usize| {
+        let (shard, out) = (format!("{i}/3"), format!("part-{i}"));
+        let args = ["--quick", "--scenes", "stack:2,stack:3,stack:4", "--solvers", "pgs", "--lanes", "1"];
+        let output = simpulse(folder.path(), &[&args[..], &["--shard", &shard, "--out", &out]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    };
+    (1..=3).for_each(part);
+    refused(folder.path(), &["merge", "part-1", "part-3"], &["stack:3", "--partial"]);
+    let whole = simpulse(folder.path(), &["merge", "part-1", "part-2", "part-3", "--out", "whole"]);
+    assert_eq!(whole.status.code(), Some(0), "{}", text(&whole.stderr));
+
+    let lock = simpulse::lab::files::Lock::of(&folder.path().join("whole")).unwrap();
+    let args = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "whole"];
+    refused(folder.path(), &args, &["whole", "another study"]);
+    drop(lock);
+
+    // A folder of an older program is refused with its version.
+    std::fs::write(folder.path().join("whole/study.json"), r#"{"environment":{"version":"0.0.1"}}"#).unwrap();
+    refused(folder.path(), &["report", "whole"], &["schema version 1", "0.0.1"]);
 }

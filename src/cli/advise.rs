@@ -2,7 +2,8 @@
 
 use super::output::{print, print_json};
 use super::progress::Bar;
-use super::values::{self, Solvers, scene_help};
+use super::values::{self, ImpactArgs, Solvers, scene_help};
+use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::Limits;
@@ -13,6 +14,7 @@ use crate::lab::report::environment::Environment;
 use crate::lab::report::table::{error_list, finish, table};
 use crate::lab::report::units::{self, digits, quantity, ratio, si, si_short};
 use crate::lab::study::open_scene;
+use crate::lab::study::record::Later;
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -39,7 +41,8 @@ pub struct AdviseArgs {
     /// Scene
     #[arg(value_name = "SCENE", help = scene_help())]
     pub scene: String,
-    /// Deepest penetration allowed, such as 1mm
+    /// Penetration allowed, such as 1mm: what 99 % of contact points keep, and where the scene has to rest the deepest
+    /// of the last second
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub max_penetration: Option<String>,
     /// Median time of a step allowed, such as 500us
@@ -48,12 +51,19 @@ pub struct AdviseArgs {
     /// Distance to the scene's reference value allowed
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub max_reference: Option<String>,
-    /// Contact-law residual allowed, root mean square in the mean weight of a body × step
+    /// Contact-law residual allowed, root mean square in the weight of the lighter body × step
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub max_residual: Option<String>,
+    /// Speed allowed over the last second, after a minute, where the scene has to rest [default: half a hundredth of a
+    /// body per second]
+    #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
+    pub max_rest_speed: Option<String>,
     /// Solvers
     #[command(flatten)]
     pub solvers: Solvers,
+    /// Impacts
+    #[command(flatten)]
+    pub impacts: ImpactArgs,
     /// Lanes per instruction; with 1 also natural order [default: the widest that this build has
     /// instructions for; wider ones are emulated]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
@@ -86,6 +96,13 @@ impl AdviseArgs {
             penetration: read("max-penetration", &self.max_penetration, "m")?,
             time_ns: read("max-time", &self.max_time, "s")?.map(|s| 1e9 * s),
             residual: read("max-residual", &self.max_residual, "")?,
+            rest: match (loaded.tolerances.rest, &self.max_rest_speed) {
+                (None, Some(text)) => {
+                    let message = format!("{text}, but nothing of '{}' has to rest", self.scene);
+                    return Err(Error::invalid("max-rest-speed", message));
+                }
+                (own, text) => read("max-rest-speed", text, "m/s")?.or(own.map(|t| t.value)),
+            },
             truth: match (&self.max_reference, &loaded.truth) {
                 (Some(text), None) => {
                     let message = format!("{text}, but no reference value of '{}' is known", self.scene);
@@ -104,6 +121,7 @@ impl AdviseArgs {
         Ok(Plan {
             scene: self.scene.clone(),
             limits,
+            impacts: self.impacts.impacts,
             solvers: self.solvers.chosen(),
             widths: values::widths(&self.lanes, vec![native_width()]),
             steps: self.steps,
@@ -130,7 +148,7 @@ pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
 /// The command that runs what was chosen.
 fn repeat(plan: &Plan, advice: &Advice) -> String {
     let Some(chosen) = advice.best().or(advice.nearest()) else { return String::new() };
-    let Setting { solver, order, budget, parameters } = &chosen.setting;
+    let Setting { solver, order, budget, parameters, impacts } = &chosen.setting;
     let mut words = vec!["simpulse run".to_string(), quoted(&plan.scene)];
     words.push(format!("--solver {}", solver.name));
     match order {
@@ -146,6 +164,7 @@ fn repeat(plan: &Plan, advice: &Advice) -> String {
     words.extend(fields.iter().filter(|f| f.2).map(|(name, n, _)| format!("--{name}-iterations {n}")));
     let changed = solver.parameters.iter().zip(parameters).filter(|(p, value)| p.default != **value);
     words.extend(changed.map(|(p, value)| format!("--set {}={value}", p.name)));
+    words.extend((*impacts != Impacts::Own).then(|| format!("--impacts {}", impacts.name())));
     words.extend(plan.steps.map(|n| format!("--steps {n}")));
     words.push(format!("--seed {}", plan.seed));
     format!("\nto run it: {}\n", words.join(" "))
@@ -167,6 +186,7 @@ fn limits(plan: &Plan, unit: &str) -> String {
         l.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
         l.residual.map(|r| format!("residual ≤ {}", ratio(r))),
         l.truth.map(|t| format!("distance to reference value ≤ {}", si_short(t, unit))),
+        l.rest.map(|v| format!("stands for a minute, rest speed ≤ {}", si_short(v, "m/s"))),
         l.time_ns.map(|t| format!("time ≤ {}", si_short(1e-9 * t, "s"))),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
@@ -174,30 +194,31 @@ fn limits(plan: &Plan, unit: &str) -> String {
 
 fn text(plan: &Plan, advice: &Advice) -> String {
     let unit = advice.trials.iter().find_map(|t| t.truth).map_or("", |t| t.unit);
-    let mut text = format!("{}: {}\n\n", plan.scene, limits(plan, unit));
+    let mut text = String::new();
     match (advice.best(), advice.nearest()) {
         (Some(best), _) => {
-            text += &format!("cheapest: {}\n{}", name(best), evidence(best, advice));
+            text += &format!("{}\n\n", sentence(plan, best));
+            text += &rejected(plan, advice);
             text += &match advice.runner_up() {
-                Some(next) => format!("\nrunner-up: {}, {}\n", name(next), loses(next, best)),
-                None => "\nnothing else that was compared keeps the limits\n".to_string(),
+                Some(next) => format!("runner-up: {}, {}\n", name(next), loses(next, best)),
+                None => "nothing else that was compared keeps the limits\n".to_string(),
             };
+            text +=
+                &format!("limits on {}: {}\n\n{}", plan.scene, limits(plan, unit), evidence(best, advice));
         }
         (None, Some(nearest)) => {
+            text += &format!("{}: {}\n", plan.scene, limits(plan, unit));
             text += "no setting that was tried keeps the limits\n\nnearest: ";
             text += &format!("{}\n{}\n", name(nearest), evidence(nearest, advice));
             let over = match nearest.excess.is_finite() {
                 true => format!("it is over its worst limit by a factor of {}", digits(nearest.excess)),
-                false => match nearest.broken {
-                    Some(broken) => format!("it {broken}"),
-                    None => "it failed, or never came to its reference value".to_string(),
-                },
+                false => format!("it {}", nearest.fails(&plan.limits).unwrap_or("failed".into())),
             };
             text += &format!("{over}\n");
         }
         (None, None) => text += "nothing was tried: the time was up\n",
     }
-    text += &format!("\n{}", finalists(advice));
+    text += &format!("\n{}", finalists(plan, advice));
     text += &format!(
         "\ntried {} settings; left out {} that should not be cheaper{}\n",
         advice.trials.len(),
@@ -205,6 +226,42 @@ fn text(plan: &Plan, advice: &Advice) -> String {
         if advice.is_cut_short { "; the time was up before the rest" } else { "" }
     );
     text
+}
+
+/// The advice: what it costs, and what was seen of it.
+fn sentence(plan: &Plan, best: &Trial) -> String {
+    let mut text = format!("{}: ", name(best));
+    if let Some(time) = best.time {
+        text += &format!(
+            "{} a step (mean; longest {}).",
+            si(1e-9 * time.mean_ns, "s"),
+            si(1e-9 * time.worst_ns, "s")
+        );
+    }
+    let errors = best.errors.unwrap_or_default();
+    let penetration = si(errors.penetration(plan.limits.rest.is_some()), "m");
+    match best.later {
+        Some(Later { seconds, rest_speed_m_s: Some(speed), .. }) => {
+            let speed = si(speed, "m/s");
+            text += &format!(
+                " Stands for {seconds:.0} s (checked), {penetration} of penetration, {speed} at rest."
+            );
+        }
+        _ => text += &format!(" {penetration} of penetration."),
+    }
+    text
+}
+
+/// What is faster and was not taken, with the reason.
+fn rejected(plan: &Plan, advice: &Advice) -> String {
+    let mut rows = table(&["  rejected although faster", "µs/step", "why"]);
+    let rejected = advice.rejected();
+    for trial in &rejected {
+        let time = trial.time.map_or("–".into(), |t| digits(1e-3 * t.median_ns));
+        let why = trial.fails(&plan.limits).unwrap_or_default();
+        rows.add_row([format!("  {}", trial.setting.text()), time, why]);
+    }
+    if rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
 }
 
 /// The setting with its lanes.
@@ -253,7 +310,8 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
 }
 
 /// Everything that was timed, a line each.
-fn finalists(advice: &Advice) -> String {
+fn finalists(plan: &Plan, advice: &Advice) -> String {
+    let rests = plan.limits.rest.is_some();
     let mut rows = table(&[
         "compared",
         "lanes",
@@ -284,17 +342,12 @@ fn finalists(advice: &Advice) -> String {
                 true => "tie".to_string(),
                 false => format!("{:.1} %", 100.0 * by),
             }),
-            error(&|e| si(e.penetration_max, "m")),
-            error(&|e| ratio(e.law_rms_body)),
+            error(&|e| si(e.penetration(rests), "m")),
+            error(&|e| ratio(e.law_rms_lighter)),
             trial
                 .truth
                 .map_or("–".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
-            match trial.broken {
-                Some(broken) => broken.mark.word(),
-                None if trial.is_good() => "kept",
-                None => "broken",
-            }
-            .to_string(),
+            trial.fails(&plan.limits).unwrap_or("kept".into()),
         ]);
     }
     finish(rows, 2)
@@ -307,6 +360,7 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
             "order": s.order,
             "budget": s.budget,
             "parameters": overrides::by_name(s.solver, &s.parameters),
+            "impacts": s.impacts.name(),
         })
     };
     let trial = |t: &Trial| {
@@ -317,6 +371,8 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
             "truth": t.truth,
             "failure": t.failure,
             "broken": t.broken,
+            "later": t.later,
+            "why_not": t.fails(&plan.limits),
             "in_limits": Some(t.excess).filter(|e| e.is_finite()),
             "keeps_limits": t.is_good(),
         })

@@ -3,7 +3,7 @@
 use super::output::{print_beside, print_json, value};
 use super::progress::Bar;
 use super::values::{SettingArgs, scene_help};
-use crate::engine::world::{Settings, World};
+use crate::engine::world::World;
 use crate::lab::capture::capture;
 use crate::lab::error::Error;
 use crate::lab::reference::certify::reference;
@@ -52,12 +52,7 @@ pub struct CaptureArgs {
 /// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
 /// the step, a step without contacts.
 pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, Option<String>), Error> {
-    let settings = Settings {
-        budget: setting.budget()?,
-        parameters: setting.parameters()?,
-        ..Settings::new(setting.solver)
-    };
-    let mut world = open_scene(name, None, None, None)?.scene.build(settings)?;
+    let mut world = open_scene(name, None, None, None)?.scene.build(setting.settings()?)?;
     let bar = Bar::new();
     advance(&mut world, step, &bar)?;
     let problem = capture(&mut world, format!("{name}, step {step}"));

@@ -27,8 +27,8 @@ pub struct CompareArgs {
     /// Folder of the second study, or its study.json
     #[arg(value_name = "AFTER")]
     pub after: PathBuf,
-    /// Smallest increase that counts as a regression, as 0.1 or 10%
-    #[arg(long, default_value = "10%", value_name = "SHARE", value_parser = share)]
+    /// Growth of a time or an error from which it is a regression, as 0.1 or 10%
+    #[arg(long, default_value = "5%", value_name = "SHARE", value_parser = share)]
     pub threshold: f64,
     /// Judge times relative to the median of all: for another machine, or a slower day
     #[arg(long)]

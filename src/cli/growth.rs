@@ -176,11 +176,7 @@ fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate
 /// Runs the command.
 pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     let (solver, width) = (args.setting.solver, args.lanes.or_native());
-    let settings = Settings {
-        budget: args.setting.budget()?,
-        parameters: args.setting.parameters()?,
-        ..Settings::new(solver).exactly(width)
-    };
+    let settings = args.setting.settings()?.exactly(width);
     let targets = targets(&args.contacts)?;
     // Unknown names first; a path is read when it is opened.
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {

@@ -2,7 +2,7 @@
 
 use crate::lab::files;
 use std::process::exit;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Exit code of an interrupted command.
 const INTERRUPTED: i32 = 130;
@@ -19,6 +19,8 @@ pub fn install() {
         if let Some(rescue) = take() {
             rescue();
         }
+        // Whoever writes files that belong together ends that first, and the process with it.
+        let _writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         files::remove_temporaries();
         exit(INTERRUPTED);
     });
@@ -32,6 +34,21 @@ pub fn on_interrupt(rescue: impl FnOnce() + Send + 'static) -> Guard {
 
 /// Forgets what [`on_interrupt`] was given.
 pub struct Guard;
+
+/// Held while files are written that belong together.
+static WRITING: Mutex<()> = Mutex::new(());
+
+/// Until it is dropped a signal waits.
+pub struct Writing(#[allow(dead_code)] MutexGuard<'static, ()>);
+
+impl Guard {
+    /// Nothing is rescued any more: results are being written, and a signal lets that end.
+    pub fn finish(self) -> Writing {
+        let writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(self);
+        Writing(writing)
+    }
+}
 
 impl Drop for Guard {
     fn drop(&mut self) {

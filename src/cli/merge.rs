@@ -3,6 +3,7 @@
 use super::output::print;
 use super::study;
 use crate::lab::error::Error;
+use crate::lab::files;
 use crate::lab::report;
 use crate::lab::report::html;
 use crate::lab::report::study_file::StudyFile;
@@ -24,6 +25,9 @@ pub struct MergeArgs {
     /// Folders of the parts, or their study.json files
     #[arg(value_name = "PART", required = true)]
     pub parts: Vec<PathBuf>,
+    /// Put together what there is, though scenes are missing
+    #[arg(long)]
+    pub partial: bool,
     /// Print the tables of every scene after the answer
     #[arg(long)]
     pub verbose: bool,
@@ -40,6 +44,13 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode, Error> {
     let parts = args.parts.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<String> = args.parts.iter().map(|path| path.display().to_string()).collect();
     let whole = StudyFile::merged(parts, &names)?;
+    if !whole.missing_scenes.is_empty() && !args.partial {
+        let missing = whole.missing_scenes.join(", ");
+        let message = format!("no part has {missing}; --partial puts together what there is");
+        return Err(Error::invalid("merge", message));
+    }
+    files::prepare_folder(&args.out)?;
+    let _lock = files::Lock::of(&args.out)?;
     // Those of another study there.
     html::write_recordings(&args.out, &[])?;
     let paths = report::write_study(&args.out, &whole)?;

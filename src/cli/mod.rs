@@ -21,6 +21,7 @@ pub mod run;
 pub mod savings;
 pub mod snapshot;
 pub mod study;
+pub mod times;
 pub mod torture;
 pub mod values;
 pub mod verify;
@@ -250,21 +251,26 @@ fn described(scene: &Description) -> String {
         text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
     }
     text += "holds if nothing blows up and no body passes through a static or kinematic one";
-    for demand in scene.demands {
+    for demand in &scene.demands {
         text += &format!("; {}", demand.meaning());
     }
-    text += "\ntolerances\n";
+    text += "\ntolerances of a plausible run; a tight one keeps a tenth of them, an exact one a hundredth\n";
     let own = scene.tolerances;
     let unit = scene.reference.map_or("", |(_, _, unit)| unit);
     let lines = [
         ("penetration", Some((own.penetration, "m"))),
         ("residual", Some((own.residual, ""))),
         ("reference", own.truth.map(|t| (t, unit))),
+        ("rest speed", own.rest.map(|t| (t, "m/s"))),
     ];
     for (name, line) in lines {
-        let Some((Tolerance { value, reason }, unit)) = line else { continue };
+        let Some((Tolerance { value, reason, fixed }, unit)) = line else { continue };
         let value = if unit.is_empty() { format!("{value} body weights") } else { si(value, unit) };
-        text += &format!("  {name:<12} {value}: {reason}\n");
+        let fixed = if fixed { " (at every accuracy)" } else { "" };
+        text += &format!("  {name:<12} {value}: {reason}{fixed}\n");
+    }
+    for what in &scene.unchecked {
+        text += &format!("not checked: {what}\n");
     }
     text
 }

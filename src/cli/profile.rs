@@ -111,9 +111,7 @@ fn phase() -> impl TypedValueParser<Value = Which> {
 }
 
 fn settings(args: &ProfileArgs) -> Result<Settings, Error> {
-    let setting = &args.setting;
-    let own = Settings::new(setting.solver).exactly(args.lanes.or_native());
-    Ok(Settings { budget: setting.budget()?, parameters: setting.parameters()?, ..own })
+    Ok(args.setting.settings()?.exactly(args.lanes.or_native()))
 }
 
 /// Runs the command.

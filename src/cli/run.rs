@@ -2,8 +2,8 @@
 
 use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
+use super::times::Times;
 use super::values::{self, SettingArgs, scene_help};
-use crate::engine::clock::{Phase, Timings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
@@ -16,11 +16,11 @@ use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{bodies, digits, lanes, ratio, si};
+use crate::lab::report::units::{bodies, lanes, ratio, si};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Watch};
 use crate::lab::study::cost::sweeps;
-use crate::lab::study::{Failure, TruthError, budget, interleave, open_scene};
+use crate::lab::study::{Failure, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -94,6 +94,9 @@ struct Found {
     errors: Errors,
     truth: Option<TruthError>,
     broken: Option<Broken>,
+    unchecked: Vec<String>,
+    /// Whether the scene has to rest.
+    rests: bool,
 }
 
 /// Runs the scene; writes its files once all of it has run.
@@ -137,9 +140,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     });
     let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
-    let mut watch = Watch::new(&world, loaded.demands);
+    let mut watch = Watch::new(&world, loaded.demands.clone());
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
-    let mut times = Times::default();
     let bar = Bar::new();
     let diverged = |failure: Failure| {
         note(&format!("failed: {} {failure}; nothing written\n", args.scene));
@@ -160,7 +162,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             return diverged(divergence.into());
         }
         bar.step(step as usize, scene.steps as usize, "steps");
-        times.add(&world.timings);
         if let Some((_, recorder)) = &mut recorder {
             recorder.add(&world)?;
         }
@@ -182,8 +183,13 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
     }
     drop(bar);
+    // Metrics empty the caches: times come from passes of their own, and the bits say that it is the same run.
+    let own = Settings { record_impulses: false, ..world.settings.clone() };
+    let times = Times::measure(scene, own, world.state_hash())?;
     let truth = loaded.truth.as_ref().map(TruthError::of);
-    let found = Found { times, errors: observation.errors(), truth, broken: watch.broken() };
+    let (unchecked, rests) = (loaded.unchecked.clone(), loaded.rests());
+    let found =
+        Found { times, errors: observation.errors(), truth, broken: watch.broken(), unchecked, rests };
     let mut written = String::new();
     if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
         let outcome = found.broken.map_or("holds".to_string(), |broken| broken.to_string());
@@ -204,18 +210,18 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
-/// What the run will take: each step is timed and its errors are measured.
+/// What the run will take: its errors are measured, and then it is timed.
 fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     let bodies = scene.bodies.len();
     let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
-    let seconds = f64::from(scene.steps) * (step + estimate::errors(bodies));
+    let seconds = f64::from(scene.steps) * (5.0 * step + estimate::errors(bodies));
     Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
 }
 
 /// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
 /// lanes.
 pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
-    let own = Settings::new(setting.solver);
+    let own = setting.settings()?;
     let own = match (order, lanes) {
         (Order::Natural, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
         (Order::Natural, Some(width)) => {
@@ -225,14 +231,7 @@ pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -
         (Order::Colored, Some(width)) => own.exactly(width),
         (Order::Colored, None) => own,
     };
-    Ok(Settings {
-        order,
-        budget: setting.budget()?,
-        parameters: setting.parameters()?,
-        record_impulses: true,
-        timed: true,
-        ..own
-    })
+    Ok(Settings { order, record_impulses: true, ..own })
 }
 
 impl Found {
@@ -256,6 +255,7 @@ impl Found {
         let line = |name: &str, value: String, note: String| {
             format!("  {:<34}{:>12}  {note}", name, value).trim_end().to_string() + "\n"
         };
+        let sample = &self.times.sample;
         let (longest, share) = self.times.longest();
         let reference = match &self.truth {
             None => line("distance to reference value", "–".into(), "none is known".into()),
@@ -265,15 +265,30 @@ impl Found {
                 line("distance to reference value", distance, known)
             }
         };
-        let holds = self.broken.map_or("yes".to_string(), |broken| broken.mark.word().to_string());
+        let unchecked: String = self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect();
+        let demanded = self.unchecked.iter().all(|what| !what.contains("file"));
+        let yes = if demanded { "yes" } else { "not checked" };
+        let holds = self.broken.map_or(yes.to_string(), |broken| broken.mark.word().to_string());
         let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
         [
             "cost\n".to_string(),
-            line("time of a step, median", si(1e-9 * self.times.step_ns(), "s"), String::new()),
-            line("longest phase", longest.to_string(), format!("{:.0} % of the time", 100.0 * share)),
+            line("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
+            line("longest phase", longest.to_string(), format!("{:.0} % of a median step", 100.0 * share)),
             "error\n".to_string(),
-            line("greatest penetration", si(e.penetration_max, "m"), String::new()),
-            line("contact-law residual, rms", ratio(e.law_rms_body), "body weights × step".into()),
+            line(
+                if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },
+                si(e.penetration(self.rests), "m"),
+                format!(
+                    "greatest {}; {} flown into before a contact",
+                    si(e.penetration_max, "m"),
+                    si(e.flight_depth_max, "m")
+                ),
+            ),
+            line(
+                "contact-law residual, rms",
+                ratio(e.law_rms_lighter),
+                "weights of the lighter body × step".into(),
+            ),
             reference,
             "behaviour\n".to_string(),
             line("holds", holds, when),
@@ -281,6 +296,8 @@ impl Found {
             line("energy change", ratio(e.energy_change), "relative; positive is gained".into()),
         ]
         .concat()
+            + &unchecked
+            + &self.times.note()
             + "--all prints every figure\n"
     }
 }
@@ -296,7 +313,8 @@ fn everything(world: &World, found: &Found) -> String {
     }
     text + &match found.broken {
         Some(broken) => format!("  does not hold: {broken}\n"),
-        None => "  holds\n".to_string(),
+        None if found.unchecked.is_empty() => "  holds\n".to_string(),
+        None => found.unchecked.iter().map(|what| format!("  not checked: {what}\n")).collect(),
     }
 }
 
@@ -305,6 +323,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
     let s = &world.settings;
     let phases: serde_json::Map<String, Value> =
         found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();
+    let sample = &found.times.sample;
     Ok(json!({
         "environment": Environment::current(),
         "scene": scene.name,
@@ -315,13 +334,21 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "budget": s.budget,
         "parameters": overrides::by_name(s.solver, &s.parameters),
         "continuous": s.continuous,
+        "impacts": s.impacts.name(),
         "order": s.order,
         "lanes": world.lane_width().lanes(),
-        "step_ns": found.times.step_ns(),
+        "mean_step_ns": sample.mean_ns,
+        "median_step_ns": sample.median_ns,
+        "longest_step_ns": sample.worst_ns,
+        "rounds": sample.rounds,
+        "waited_share": sample.waited,
+        "noise_share": sample.noise,
+        "bits_equal": found.times.same_bits,
         "phase_ns": phases,
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
-        "broken": value(&found.broken)?,
+        "holds": found.broken.map_or("yes".to_string(), |b| b.to_string()),
+        "not_checked": found.unchecked,
         "islands_answered_by": world.answers().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     }))
 }
@@ -333,7 +360,7 @@ fn how(world: &World) -> String {
         Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(world.lane_width().lanes()),
     };
-    format!("{}, {order}", budget::brief(&s.budget, s.solver))
+    format!("{}, {order}", budget::with_impacts(budget::brief(&s.budget, s.solver), s.impacts))
 }
 
 fn head(world: &World, scene: &Scene) -> String {
@@ -377,59 +404,6 @@ fn truth_line(truth: &TruthError) -> String {
     match truth.error {
         Some(error) => format!("  distance to reference value: {} ({known})\n", si(error, truth.unit)),
         None => format!("  distance to reference value: not reached in this run ({known})\n"),
-    }
-}
-
-/// Times of every step.
-#[derive(Default)]
-struct Times {
-    phases: [Vec<f64>; Phase::ALL.len()],
-    steps: Vec<f64>,
-}
-
-impl Times {
-    fn add(&mut self, timings: &Timings) {
-        for (times, &ns) in self.phases.iter_mut().zip(&timings.phase_ns) {
-            times.push(ns as f64);
-        }
-        self.steps.push(timings.step_ns as f64);
-    }
-
-    /// Median time of a step (ns).
-    fn step_ns(&self) -> f64 {
-        interleave::median(&self.steps)
-    }
-
-    /// Median times (ns) of the phases that the solver has.
-    fn by_phase(&self) -> impl Iterator<Item = (String, f64)> {
-        let all = Phase::ALL.iter().zip(&self.phases).filter(|(_, times)| times.iter().any(|&t| t > 0.0));
-        all.map(|(phase, times)| (phase.name().to_string(), interleave::median(times)))
-    }
-
-    /// The phase that takes most of the time, and its share (1).
-    fn longest(&self) -> (&'static str, f64) {
-        let sum = |times: &[f64]| times.iter().sum::<f64>();
-        let all = Phase::ALL.iter().zip(&self.phases).map(|(phase, times)| (phase.name(), sum(times)));
-        let (name, time) = all.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(("none", 0.0));
-        (name, time / sum(&self.steps).max(1.0))
-    }
-
-    /// Mean and median per step; phases that the solver does not have are left out.
-    fn table(&self) -> String {
-        let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
-        let whole = mean(&self.steps);
-        let line = |name: &str, times: &[f64]| {
-            let (mean, median) = (mean(times), interleave::median(times));
-            let share = if whole > 0.0 { 100.0 * mean / whole } else { 0.0 };
-            format!("  {name:<12}{:>12}{:>12}{share:>9.1} %\n", digits(mean / 1e3), digits(median / 1e3))
-        };
-        let mut text = format!("  {:<12}{:>12}{:>12}{:>11}\n", "µs per step", "mean", "median", "share");
-        for (phase, times) in Phase::ALL.iter().zip(&self.phases) {
-            if times.iter().any(|&t| t > 0.0) {
-                text += &line(phase.name(), times);
-            }
-        }
-        text + &line("whole step", &self.steps)
     }
 }
 

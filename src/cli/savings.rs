@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
-use super::values::{Lanes, solver};
+use super::values::{ImpactArgs, Lanes, solver};
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
@@ -42,6 +42,9 @@ pub struct SavingsArgs {
     /// Lanes
     #[command(flatten)]
     pub lanes: Lanes,
+    /// Impacts
+    #[command(flatten)]
+    pub impacts: ImpactArgs,
     /// Timing runs of each setting
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub repeats: u32,
@@ -60,6 +63,7 @@ pub fn run(args: &SavingsArgs) -> Result<ExitCode, Error> {
         solvers: vec![args.solver],
         widths: vec![args.lanes.or_native()],
         orders: vec![Order::Colored],
+        impacts: vec![args.impacts.impacts],
         repeats: args.repeats,
         seed: args.seed,
         ..StudyPlan::default()

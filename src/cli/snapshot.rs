@@ -91,7 +91,7 @@ pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
     };
     let time = si(f64::from(args.step) * loaded.scene.dt, "s");
     let title = format!("{} · step {} ({time})", loaded.scene.name, args.step);
-    let budget = budget::brief(&s.budget, s.solver);
+    let budget = budget::with_impacts(budget::brief(&s.budget, s.solver), s.impacts);
     let changed = crate::lab::overrides::brief(s.solver, &s.parameters);
     let changed = if changed.is_empty() { changed } else { format!(" · {changed}") };
     let points = frame.points.len();

@@ -4,6 +4,7 @@ use super::interrupt::on_interrupt;
 use super::output::{note, print};
 use super::progress::Bar;
 use super::values::{self, Solvers};
+use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
@@ -56,6 +57,10 @@ pub struct StudyArgs {
     /// Constraint orders [default: both]
     #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
+    /// Treatments of impacts: own is the solver's, waves are waves of impacts before the step, none lets nothing
+    /// bounce. On scenes where nothing bounces only the first one runs [default: own,waves; in a sweep own]
+    #[arg(long, value_delimiter = ',', value_name = "TREATMENT,…", value_parser = values::impacts())]
+    pub impacts: Vec<Impacts>,
     /// Substeps to try
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub substeps: Vec<u32>,
@@ -121,6 +126,11 @@ impl StudyArgs {
             solvers: self.solvers.chosen(),
             widths: values::widths(&self.lanes, base.widths),
             orders: if self.orders.is_empty() { base.orders } else { unique(&self.orders) },
+            impacts: match (self.impacts.is_empty(), self.sweep.is_some()) {
+                (false, _) => unique(&self.impacts),
+                (true, true) => vec![Impacts::Own],
+                (true, false) => base.impacts,
+            },
             budgets: BudgetGrid {
                 substeps: self.substeps.clone(),
                 velocity_iterations: self.velocity_iterations.clone(),
@@ -148,8 +158,9 @@ fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
             "penetration" => (&mut tolerances.penetration, "m"),
             "residual" => (&mut tolerances.residual, ""),
             "reference" => (&mut tolerances.truth, ""),
+            "rest-speed" => (&mut tolerances.rest, "m/s"),
             other => {
-                let known = ["penetration", "residual", "reference"].into_iter();
+                let known = ["penetration", "residual", "reference", "rest-speed"].into_iter();
                 return Err(Error::unknown("tolerance", other, known));
             }
         };
@@ -218,7 +229,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
-    html::write_recordings(&args.out, &[])?;
+    let lock = files::Lock::of(&args.out)?;
     note(&(without + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
@@ -237,10 +248,13 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     drop(bar);
     let study = StudyFile::new(&plan, records, elsewhere);
     let replays = telling::recordings(&plan, &study.records)?;
+    // From here on files of an earlier study are replaced: a signal waits until all of them are.
+    let guard = guard.finish();
     let replays = html::write_recordings(&args.out, &replays)?;
     let mut paths = report::write_study(&args.out, &study)?;
     paths.extend(replays);
     drop(guard);
+    drop(lock);
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
@@ -287,6 +301,10 @@ fn keep(plan: &StudyPlan, out: &Path, records: Vec<Record>, elsewhere: Vec<Strin
     }
     // Scenes are finished in the order of the plan.
     let missing = plan.scenes[done.min(all)..].iter().cloned().chain(elsewhere).collect();
+    // Recordings there are of another study.
+    if let Err(error) = html::write_recordings(out, &[]) {
+        return format!("interrupted; finished scenes could not be written: {error}\n");
+    }
     match report::write_study(out, &StudyFile::new(plan, records, missing)) {
         Ok(_) if done == all => format!("interrupted; all scenes are in {}\n", out.display()),
         Ok(_) => format!("interrupted; {done} of {all} scenes are in {}, marked as partial\n", out.display()),

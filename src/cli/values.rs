@@ -1,10 +1,11 @@
 //! What options may be: one meaning per option in every command, every list of values in the help
 //! and in the message about a wrong one.
 
+use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
-use crate::engine::world::Order;
+use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
@@ -116,6 +117,22 @@ pub fn order() -> impl TypedValueParser<Value = Order> {
     })
 }
 
+/// The parser of `--impacts`.
+pub fn impacts() -> impl TypedValueParser<Value = Impacts> {
+    let names = Impacts::ALL.map(|i| PossibleValue::new(i.name()));
+    PossibleValuesParser::new(names)
+        .map(|name| Impacts::ALL.into_iter().find(|i| i.name() == name).unwrap_or_default())
+}
+
+/// `--impacts` of commands that take one treatment.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct ImpactArgs {
+    /// What happens where bodies hit each other: own is the solver's treatment, waves are waves of impacts
+    /// before the step, none lets nothing bounce
+    #[arg(long, default_value = "own", value_name = "TREATMENT", value_parser = impacts())]
+    pub impacts: Impacts,
+}
+
 /// Each width once, from the narrowest; `own` where none are given.
 pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
     if given.is_empty() {
@@ -148,6 +165,9 @@ pub struct SettingArgs {
     /// Parameters of the solver, as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
+    /// Impacts
+    #[command(flatten)]
+    pub impacts: ImpactArgs,
 }
 
 impl SettingArgs {
@@ -161,12 +181,28 @@ impl SettingArgs {
             relax_iterations: none,
             position_iterations: none,
             set: Vec::new(),
+            impacts: ImpactArgs::default(),
         })
     }
 
-    /// The budget. Errors: one that the solver cannot work with.
+    /// The solver with its budget, parameters and treatment of impacts. Errors: as [`Self::budget`] and
+    /// [`Self::parameters`].
+    pub fn settings(&self) -> Result<Settings, Error> {
+        let (budget, parameters) = (self.budget()?, self.parameters()?);
+        Ok(Settings { budget, parameters, impacts: self.impacts.impacts, ..Settings::new(self.solver) })
+    }
+
+    /// The budget. Errors: one that the solver cannot work with; sweeps that it does not make.
     pub fn budget(&self) -> Result<Budget, Error> {
         let own = self.solver.budget;
+        let given = [
+            ("velocity-iterations", self.velocity_iterations),
+            ("relax-iterations", self.relax_iterations),
+            ("position-iterations", self.position_iterations),
+        ];
+        for (option, _) in given.iter().filter(|(_, count)| count.is_some()) {
+            budget::check_used(option, &[self.solver])?;
+        }
         let chosen = Budget {
             substeps: self.substeps.unwrap_or(own.substeps),
             velocity_iterations: self.velocity_iterations.unwrap_or(own.velocity_iterations),

@@ -2,7 +2,8 @@
 
 use super::output::{self, finite, print_json};
 use super::progress::Bar;
-use super::values::{self, Solvers};
+use super::values::{self, ImpactArgs, Solvers};
+use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
 use crate::lab::estimate::Estimate;
@@ -37,6 +38,9 @@ pub struct VerifyArgs {
     /// Solvers
     #[command(flatten)]
     pub solvers: Solvers,
+    /// Impacts
+    #[command(flatten)]
+    pub impacts: ImpactArgs,
     /// Print JSON instead of text: everything that was measured
     #[arg(long)]
     pub json: bool,
@@ -62,11 +66,12 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let seconds = SECONDS_PER_CASE * (cases.len() * solvers.len()) as f64 / f64::from(args.threads);
     output::note(&Estimate { seconds, bytes: 0.0 }.time_note("verify"));
     let bar = Bar::new();
+    let impacts = args.impacts.impacts;
     let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
-    let matrix = verify::run(cases, solvers, args.threads.into(), Lab::new, &tell);
+    let matrix = verify::run(cases, solvers, args.threads.into(), |v| Lab::new(v).impacts(impacts), &tell);
     drop(bar);
     if args.json {
-        print_json(&json(&matrix))?;
+        print_json(&json(&matrix, impacts))?;
         return Ok(exit_code(&matrix));
     }
     print(&(text(&matrix) + &note + &verdict(&matrix)), exit_code(&matrix))
@@ -238,10 +243,11 @@ fn number(value: f64) -> String {
     }
 }
 
-fn json(matrix: &Matrix) -> Value {
+fn json(matrix: &Matrix, impacts: Impacts) -> Value {
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
-            "case": case.id, "solver": solver.name, "budget": solver.budget, "unit": case.unit,
+            "case": case.id, "solver": solver.name, "budget": solver.budget,
+            "impacts": impacts.name(), "unit": case.unit,
             "required": case.required.is_required() && solver.name == DEFAULT,
             "passed": cell.passed(),
         });
@@ -340,7 +346,7 @@ mod tests {
     fn json_holds_every_cell() {
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
         let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_| ());
-        let value = json(&matrix);
+        let value = json(&matrix, Impacts::Own);
         assert_eq!(value["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
         assert_eq!(value["broken_promises"], json!([]));
     }

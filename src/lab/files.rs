@@ -20,6 +20,9 @@ const MOST_LINKS: usize = 40;
 
 static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// Folders that were made for files that are not there yet.
+static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
 /// A file that does not exist under its name until [`Pending::commit`].
 pub struct Pending {
     file: BufWriter<Target>,
@@ -157,7 +160,8 @@ impl Temporary {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         // Locked before the file exists: a signal finds it in the list or not at all.
         let mut list = temporaries();
-        let file = builder.tempfile_in(folder)?;
+        // Its message names the temporary file, which nobody asked for.
+        let file = builder.tempfile_in(folder).map_err(plain)?;
         let name = file.path().to_path_buf();
         list.push(name.clone());
         Ok(Temporary { file: Some(file), name })
@@ -169,7 +173,7 @@ impl Temporary {
 
     fn persist(mut self, place: &Path) -> std::io::Result<()> {
         match self.file.take() {
-            Some(file) => file.persist(place).map(drop).map_err(|e| e.error),
+            Some(file) => file.persist(place).map(drop).map_err(|e| plain(e.error)),
             None => Err(ErrorKind::NotFound.into()),
         }
     }
@@ -183,6 +187,17 @@ impl Drop for Temporary {
     }
 }
 
+/// An error of the system without the path that `tempfile` adds.
+fn plain(error: std::io::Error) -> std::io::Error {
+    match error.get_ref().and_then(|inner| std::error::Error::source(inner)) {
+        Some(source) => match source.downcast_ref::<std::io::Error>().and_then(|e| e.raw_os_error()) {
+            Some(code) => std::io::Error::from_raw_os_error(code),
+            None => error.kind().into(),
+        },
+        None => error,
+    }
+}
+
 fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -193,14 +208,65 @@ pub fn remove_temporaries() {
     for path in list.iter() {
         let _ = std::fs::remove_file(path);
     }
+    // Only what is empty can be removed.
+    for folder in MADE.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        let _ = std::fs::remove_dir(folder);
+    }
     std::mem::forget(list);
 }
 
-/// Makes the folder if need be, and makes sure that a file can be written there.
+/// Makes the folder if need be, and makes sure that a file can be written there. A folder that was made goes
+/// again with [`remove_temporaries`] if nothing has been written into it.
 pub fn prepare_folder(folder: &Path) -> Result<(), Error> {
+    let missing: Vec<PathBuf> = folder
+        .ancestors()
+        .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
+        .map(PathBuf::from)
+        .collect();
+    // The innermost first, as they can be removed.
+    MADE.lock().unwrap_or_else(PoisonError::into_inner).extend(missing);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     Temporary::in_folder(folder).map_err(Error::io(folder))?;
     Ok(())
+}
+
+/// Name of the file that says that a folder is in use.
+const LOCK: &str = ".simpulse.lock";
+
+/// A folder of results that nobody else writes into, until it is dropped or the process ends.
+#[derive(Debug)]
+pub struct Lock {
+    path: PathBuf,
+    /// The system lets go of it when the process ends, however it does.
+    file: Option<File>,
+}
+
+impl Lock {
+    /// Errors: a folder that another process has, or one that cannot be written.
+    pub fn of(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(LOCK);
+        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(Error::io(folder))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(std::fs::TryLockError::WouldBlock) => {
+                let message = "another study writes into it; give another folder with --out";
+                return Err(Error::invalid(folder.display().to_string(), message));
+            }
+            // A system without locks: two studies are the user's to keep apart.
+            Err(std::fs::TryLockError::Error(_)) => {}
+        }
+        temporaries().push(path.clone());
+        Ok(Lock { path, file: Some(file) })
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+        drop(self.file.take());
+        temporaries().retain(|name| *name != self.path);
+    }
 }
 
 /// Writes a whole file.
@@ -227,6 +293,17 @@ mod tests {
         assert_eq!(std::fs::read_dir(&inner).unwrap().count(), 0);
         write(&path, b"whole").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"whole");
+    }
+
+    #[test]
+    fn a_folder_in_use_is_refused_by_name_and_free_afterwards() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Lock::of(folder.path()).unwrap();
+        let message = Lock::of(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("another study") && !message.contains(LOCK), "{message}");
+        drop(first);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        Lock::of(folder.path()).unwrap();
     }
 
     #[test]

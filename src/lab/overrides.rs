@@ -4,7 +4,7 @@
 //! parameter and must reach at least one.
 
 use crate::engine::params::Parameters;
-use crate::engine::solvers::Variant;
+use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 use std::str::FromStr;
 
@@ -32,7 +32,15 @@ impl FromStr for Override {
 pub fn check(solvers: &[&'static Variant], overrides: &[Override]) -> Result<(), Error> {
     for given in overrides {
         if solvers.iter().all(|v| v.parameter(&given.name).is_err()) {
-            let known = solvers.iter().flat_map(|v| v.parameters).map(|p| p.name);
+            let having: Vec<&str> =
+                VARIANTS.iter().filter(|v| v.parameter(&given.name).is_ok()).map(|v| v.name).collect();
+            if !having.is_empty() {
+                let without: Vec<&str> = solvers.iter().map(|v| v.name).collect();
+                let (without, having) = (without.join(", "), having.join(", "));
+                let message = format!("not a parameter of {without}; solvers that have it: {having}");
+                return Err(Error::invalid(given.name.as_str(), message));
+            }
+            let known = VARIANTS.iter().flat_map(|v| v.parameters).map(|p| p.name);
             return Err(Error::unknown("parameter", &given.name, known));
         }
     }
@@ -53,6 +61,12 @@ pub fn brief(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     let texts = changed.map(|(p, value)| format!("{} {value} {}", p.name, p.unit).trim_end().to_string());
     texts.collect::<Vec<_>>().join(" ")
+}
+
+/// All values in words: `contact_hertz=30 contact_damping_ratio=10`.
+pub fn words(variant: &Variant, values: &Parameters) -> String {
+    let each = variant.parameters.iter().zip(values).map(|(p, value)| format!("{}={value}", p.name));
+    each.collect::<Vec<_>>().join(" ")
 }
 
 /// All values by name.
@@ -79,7 +93,7 @@ mod tests {
         check(&[soft, pgs], &list).unwrap();
         assert_eq!(brief(soft, &values(soft, &list).unwrap()), "contact_hertz 60 Hz");
         assert_eq!(brief(pgs, &values(pgs, &list).unwrap()), "baumgarte 0.5");
-        assert!(check(&[pgs], &list).unwrap_err().to_string().contains("contact_hertz"));
+        assert!(check(&[pgs], &list).unwrap_err().to_string().contains("soft_step"));
         assert_eq!(by_name(pgs, &values(pgs, &list).unwrap())["baumgarte"], 0.5);
     }
 

@@ -18,6 +18,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
             "array" => value.is_array(),
             "string" => value.is_string(),
             "number" => value.is_number(),
+            "boolean" => value.is_boolean(),
             "integer" => value.as_f64().is_some_and(|x| x.fract() == 0.0),
             other => panic!("{other}"),
         },
@@ -66,6 +67,11 @@ fn every_scene_of_the_catalogue_follows_the_schema() {
 fn scene() -> Value {
     json!({
         "name": "x", "gravity": [0, -10], "dt": 0.01, "steps": 5,
+        "expect": {
+            "catalogue": "arch", "rests": true, "stands": false, "stays_stacked": true, "gains_no_energy": false,
+            "stays_within": 0.5, "stays_inside": [[-5, -5], [5, 5]],
+            "reference": { "measure": "resting_height", "body": 1, "value": 0.5, "tolerance": 0.1 },
+        },
         "bodies": [
             { "type": "static", "position": [0, 0], "shapes": [{ "segment": { "a": [-5, 0], "b": [5, 0] } }] },
             {
@@ -89,6 +95,18 @@ fn schema_and_reading_agree_on_every_member() {
     let shape = |i: usize, name: &str| format!("{body}/shapes/{i}/{name}");
     let places = [
         ["/name", "/gravity", "/dt", "/steps", "/bodies"].map(String::from).to_vec(),
+        [
+            "rests",
+            "stands",
+            "stays_stacked",
+            "gains_no_energy",
+            "stays_within",
+            "reference/measure",
+            "reference/value",
+            "reference/tolerance",
+        ]
+        .map(|name| format!("/expect/{name}"))
+        .to_vec(),
         [
             "type",
             "position",

@@ -6,14 +6,16 @@ use crate::lab::study::TruthError;
 /// Limits that a setting has to keep; where none, anything will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Limits {
-    /// Deepest penetration (m).
+    /// Penetration (m), see [`Errors::penetration`].
     pub penetration: Option<f64>,
     /// Time of a step (ns).
     pub time_ns: Option<f64>,
     /// Distance to the truth, in the truth's unit.
     pub truth: Option<f64>,
-    /// Contact-law residual, root mean square in body weights (1).
+    /// Contact-law residual, root mean square in weights of the lighter body (1).
     pub residual: Option<f64>,
+    /// Speed over the last second, where the scene has to rest (m/s).
+    pub rest: Option<f64>,
 }
 
 impl Limits {
@@ -22,8 +24,9 @@ impl Limits {
     pub fn of_errors(&self, errors: &Errors, truth: Option<&TruthError>) -> f64 {
         let distance = truth.and_then(|t| t.error).unwrap_or(f64::INFINITY);
         let pairs = [
-            (errors.penetration_max, self.penetration),
-            (errors.law_rms_body, self.residual),
+            (errors.penetration(self.rest.is_some()), self.penetration),
+            (errors.law_rms_lighter, self.residual),
+            (errors.rest_velocity, self.rest),
             (distance, self.truth),
         ];
         pairs.into_iter().fold(0.0, |worst: f64, (value, limit)| worst.max(in_limits(value, limit)))
@@ -49,7 +52,7 @@ mod tests {
 
     #[test]
     fn the_worst_limit_counts() {
-        let errors = Errors { penetration_max: 2e-3, law_rms_body: 0.5, ..Errors::default() };
+        let errors = Errors { held_depth_p99: 2e-3, law_rms_lighter: 0.5, ..Errors::default() };
         let truth = TruthError { quantity: "", unit: "m", expected: 0.0, error: Some(3.0) };
         let limits = Limits { penetration: Some(1e-3), residual: Some(1.0), ..Limits::default() };
         assert_eq!(limits.of_errors(&errors, None), 2.0);

@@ -7,6 +7,9 @@
 //! 2. refines what is good enough: each part is lowered by bisection towards its half;
 //! 3. times the best few again, in turns and several times, and lets that decide.
 //!
+//! Where a scene has to rest, what keeps the limits is [run on](crate::lab::study::horizon) for a minute before
+//! it counts as good enough.
+//!
 //! Left out is what should only cost more than something known: a budget that contains, in
 //! every part, one of the same solver, order and stiffness that is good enough already; or one
 //! of the same solver and order that took far longer than is allowed, or than the fastest
@@ -16,6 +19,7 @@
 pub mod limits;
 mod search;
 
+use crate::engine::constraints::Impacts;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::Variant;
@@ -26,7 +30,9 @@ use crate::lab::overrides;
 use crate::lab::scenes::holds::Broken;
 use crate::lab::study::compare::compare;
 use crate::lab::study::interleave::{Sample, time_in_turns};
+use crate::lab::study::record::Later;
 use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
+use crate::lab::units::{ratio, si};
 use limits::Limits;
 use search::Search;
 
@@ -37,6 +43,8 @@ pub struct Plan {
     pub scene: String,
     /// What is good enough.
     pub limits: Limits,
+    /// What happens where bodies hit each other.
+    pub impacts: Impacts,
     /// Rows of [`crate::engine::solvers::VARIANTS`].
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of coloured settings; with one lane there is natural order too.
@@ -69,6 +77,8 @@ pub struct Setting {
     pub budget: Budget,
     /// The solver's own parameters.
     pub parameters: Parameters,
+    /// What happens where bodies hit each other.
+    pub impacts: Impacts,
 }
 
 impl Setting {
@@ -78,13 +88,15 @@ impl Setting {
             order: self.order,
             budget: self.budget,
             parameters: self.parameters,
+            impacts: self.impacts,
             ..Settings::new(self.solver).exactly(width)
         }
     }
 
     /// `soft_step, 4 sub 1 vel 1 rel, contact_hertz 60 Hz`
     pub fn text(&self) -> String {
-        let mut text = format!("{}, {}", self.solver.name, budget::brief(&self.budget, self.solver));
+        let budget = budget::with_impacts(budget::brief(&self.budget, self.solver), self.impacts);
+        let mut text = format!("{}, {budget}", self.solver.name);
         let changed = overrides::brief(self.solver, &self.parameters);
         if !changed.is_empty() {
             text += &format!(", {changed}");
@@ -98,8 +110,12 @@ impl Setting {
 pub struct Time {
     /// Lanes per instruction.
     pub lanes: usize,
+    /// Mean time of a step over the run (ns).
+    pub mean_ns: f64,
     /// Median time of a step (ns).
     pub median_ns: f64,
+    /// The longest step (ns).
+    pub worst_ns: f64,
     /// Its spread (ns), see [`Sample::spread_ns`].
     pub spread_ns: f64,
 }
@@ -121,6 +137,8 @@ pub struct Trial {
     pub failure: Option<Failure>,
     /// The first demand of the scene that was not met: no limit is kept by what fell.
     pub broken: Option<Broken>,
+    /// What happened in a minute, where the scene has to rest and the run itself kept the limits.
+    pub later: Option<Later>,
     /// The largest of errors and time in their limits: up to 1 is good enough.
     pub excess: f64,
 }
@@ -129,6 +147,43 @@ impl Trial {
     /// Whether it keeps every limit.
     pub fn is_good(&self) -> bool {
         self.excess <= 1.0
+    }
+
+    /// Why it is not good, in words; none if it is.
+    pub fn fails(&self, limits: &Limits) -> Option<String> {
+        if self.is_good() {
+            return None;
+        }
+        if let Some(failure) = self.failure {
+            return Some(failure.to_string());
+        }
+        if let Some(broken) = self.broken.or(self.later.and_then(|later| later.broken)) {
+            return Some(broken.to_string());
+        }
+        let errors = self.errors?;
+        let speed = self.later.and_then(|l| l.rest_speed_m_s).unwrap_or(0.0).max(errors.rest_velocity);
+        let reference = self.truth.and_then(|t| t.error);
+        let over = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value > limit);
+        let unit = self.truth.map_or("", |t| t.unit);
+        let reasons = [
+            (over(speed, limits.rest), format!("moves at {} at rest", si(speed, "m/s"))),
+            (
+                over(errors.penetration(limits.rest.is_some()), limits.penetration),
+                format!("{} of penetration", si(errors.penetration(limits.rest.is_some()), "m")),
+            ),
+            (
+                over(errors.law_rms_lighter, limits.residual),
+                format!("residual {}", ratio(errors.law_rms_lighter)),
+            ),
+            (
+                limits.truth.is_some() && reference.is_none_or(|e| over(e, limits.truth)),
+                reference.map_or("never comes to its reference value".into(), |e| {
+                    format!("{} off its reference value", si(e, unit))
+                }),
+            ),
+            (over(self.time_ns(), limits.time_ns), format!("takes {}", si(1e-9 * self.time_ns(), "s"))),
+        ];
+        reasons.into_iter().find(|(is_over, _)| *is_over).map(|(_, reason)| reason)
     }
 
     fn time_ns(&self) -> f64 {
@@ -166,6 +221,24 @@ impl Advice {
     /// The next one that is good enough.
     pub fn runner_up(&self) -> Option<&Trial> {
         self.finalists.get(1).filter(|t| t.is_good())
+    }
+
+    /// What is faster than the best and not good enough: of each solver the fastest, those first that only fail
+    /// later.
+    pub fn rejected(&self) -> Vec<&Trial> {
+        let Some(best) = self.best() else { return Vec::new() };
+        let mut faster: Vec<&Trial> =
+            self.trials.iter().filter(|t| !t.is_good() && t.time_ns() < best.time_ns()).collect();
+        faster.sort_by(|a, b| {
+            b.later.is_some().cmp(&a.later.is_some()).then(b.time_ns().total_cmp(&a.time_ns()))
+        });
+        let mut kept: Vec<&Trial> = Vec::new();
+        for trial in faster {
+            if kept.iter().all(|k| k.setting.solver.name != trial.setting.solver.name) {
+                kept.push(trial);
+            }
+        }
+        kept
     }
 
     /// Of what is not good enough, the nearest.
@@ -266,11 +339,24 @@ fn race_again(
 
 fn fastest<'a>(samples: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(Time, &'a Sample)> {
     let (width, sample) = samples.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
-    Some((Time { lanes: width.lanes(), median_ns: sample.median_ns, spread_ns: sample.spread_ns }, sample))
+    let time = Time {
+        lanes: width.lanes(),
+        mean_ns: sample.mean_ns,
+        median_ns: sample.median_ns,
+        worst_ns: sample.worst_ns,
+        spread_ns: sample.spread_ns,
+    };
+    Some((time, sample))
 }
 
 fn excess(limits: &Limits, trial: &Trial) -> f64 {
     let Some(errors) = trial.errors.as_ref().filter(|_| trial.broken.is_none()) else { return f64::INFINITY };
+    if let Some(later) = &trial.later {
+        let rest = later.rest_speed_m_s.filter(|_| later.broken.is_none());
+        let Some(speed) = rest else { return f64::INFINITY };
+        let errors = Errors { rest_velocity: speed.max(errors.rest_velocity), ..*errors };
+        return limits.of_errors(&errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()));
+    }
     limits.of_errors(errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()))
 }
 
@@ -281,9 +367,10 @@ mod tests {
 
     pub fn trial(time: f64, excess: f64) -> Trial {
         let solver = find("pgs").unwrap();
-        let setting =
-            Setting { solver, order: Order::Colored, budget: solver.budget, parameters: solver.defaults() };
-        let time = Some(Time { lanes: 8, median_ns: time, spread_ns: 0.0 });
+        let (budget, parameters) = (solver.budget, solver.defaults());
+        let setting = Setting { solver, order: Order::Colored, budget, parameters, impacts: Impacts::Own };
+        let (mean_ns, median_ns, worst_ns) = (time, time, time);
+        let time = Some(Time { lanes: 8, mean_ns, median_ns, worst_ns, spread_ns: 0.0 });
         Trial {
             setting,
             time,
@@ -292,6 +379,7 @@ mod tests {
             truth: None,
             failure: None,
             broken: None,
+            later: None,
             excess,
         }
     }
@@ -338,7 +426,8 @@ mod tests {
         let soft = find("soft_step").unwrap();
         let mut parameters = soft.defaults();
         soft.set(&mut parameters, "contact_hertz", 60.0).unwrap();
-        let setting = Setting { solver: soft, order: Order::Natural, budget: soft.budget, parameters };
+        let (order, impacts) = (Order::Natural, Impacts::Own);
+        let setting = Setting { solver: soft, order, budget: soft.budget, parameters, impacts };
         assert_eq!(setting.text(), "soft_step, 4 sub 1 vel 1 rel, contact_hertz 60 Hz");
         let settings = setting.settings(LaneWidth::W1);
         assert_eq!(

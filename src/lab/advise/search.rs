@@ -6,6 +6,7 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
+use crate::lab::study::horizon;
 use crate::lab::study::interleave::time_in_turns;
 use crate::lab::study::{Failure, Progress, observe, open_scene};
 use std::time::Instant;
@@ -129,7 +130,9 @@ impl<'a> Search<'a> {
             for budget in budgets(solver) {
                 let h = self.scene.dt as f32 / budget.substeps as f32;
                 for parameters in parameters(solver, h) {
-                    grid.extend(orders.iter().map(|&order| Setting { solver, order, budget, parameters }));
+                    let impacts = self.plan.impacts;
+                    let of = |&order: &Order| Setting { solver, order, budget, parameters, impacts };
+                    grid.extend(orders.iter().map(of));
                 }
             }
         }
@@ -225,6 +228,7 @@ impl<'a> Search<'a> {
             truth: outcome.truth,
             failure: outcome.errors.err().map(Failure::from),
             broken: outcome.broken,
+            later: None,
             excess: f64::INFINITY,
         };
         if trial.errors.is_some() {
@@ -235,6 +239,11 @@ impl<'a> Search<'a> {
                 widths.iter().zip(&samples).filter_map(|(&w, sample)| Some((w, sample.as_ref().ok()?)));
             trial.time = fastest(finished).map(|(time, _)| time);
             trial.excess = excess(&self.plan.limits, &trial);
+            let loaded = open_scene(&self.plan.scene, Some(self.plan.seed), self.plan.steps, None)?;
+            if trial.is_good() && loaded.rests() {
+                trial.later = Some(horizon::later(&loaded, setting.settings(widest))?);
+                trial.excess = excess(&self.plan.limits, &trial);
+            }
         }
         Ok(trial)
     }
@@ -250,6 +259,7 @@ mod tests {
     use super::super::limits::Limits;
     use super::super::tests::trial;
     use super::*;
+    use crate::engine::constraints::Impacts;
     use crate::engine::lanes::LaneWidth;
     use crate::engine::solvers::{VARIANTS, find};
     use crate::lab::scenes;
@@ -283,6 +293,7 @@ mod tests {
     fn plan(limits: Limits) -> Plan {
         Plan {
             scene: "stack:1".to_string(),
+            impacts: Impacts::Own,
             limits,
             solvers: vec![find("pgs").unwrap()],
             widths: vec![LaneWidth::W8],

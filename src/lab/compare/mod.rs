@@ -6,17 +6,21 @@
 //! studies went through the same steps in the same blocks, so block k is paired with block k, and the
 //! median of the ratios has an interval ([`Ratio`]). A machine may be slower on another day, or be another
 //! machine; the median ratio over all settings is what they have in common, and can be divided out.
+//!
+//! One binary run twice differs, too: by where its memory lies, by the clock of the processor, by what else the
+//! machine does. What of that can be seen is measured and widens every interval ([`Noise`]): a fixed loop that
+//! each study timed between its rounds says what the machine was worth, the scatter of the settings around their
+//! common ratio what placement does, and the time in which threads waited how busy it was.
 
 pub mod text;
 
-use crate::engine::params::Budget;
 use crate::engine::world::Order;
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
-use crate::lab::study::sweep::Swept;
+use crate::lab::study::interleave::{Sample, median};
 use serde::Serialize;
 
 /// Errors below this share of their tolerance are as good as none (1).
@@ -72,8 +76,44 @@ pub struct TimeChange {
     pub median_ns: [f64; 2],
     /// Ratio over paired blocks, divided by the common one where times are relative.
     pub ratio: f64,
-    /// Its interval.
+    /// Its interval, with the [`Noise`] between two runs.
     pub interval: [f64; 2],
+}
+
+/// What two runs of one program differ by, as logarithms of ratios (1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Noise {
+    /// Time of the fixed loop after, in that before (1); all times are divided by it.
+    pub machine: f64,
+    /// Scatter of the settings around their common ratio; 0 of fewer than [`FEWEST`].
+    pub scatter: f64,
+    /// Share of the time that threads waited, in the busier of the two (1).
+    pub waited: f64,
+    /// By how much every interval is widened, both ways.
+    pub allowed: f64,
+}
+
+/// What remains between two runs on a machine that does nothing else: code and data lie elsewhere.
+const PLACEMENT: f64 = 0.02;
+
+/// Settings whose scatter says something.
+const FEWEST: usize = 8;
+
+impl Noise {
+    /// Of all pairs: logarithms of their ratios, what the machine did, and the share of waiting.
+    ///
+    /// The settings are alike in most, so that their scatter is noise: of the median deviation d of n normal
+    /// numbers, 1.48 d is the standard deviation, and the largest of n is below √(2 ln n) + 1 of these 19 times
+    /// in 20.
+    fn of(logs: &[f64], machine: f64, waited: f64) -> Self {
+        let middle = median(logs);
+        let deviations: Vec<f64> = logs.iter().map(|x| (x - middle).abs()).collect();
+        let scatter = if logs.len() < FEWEST { 0.0 } else { 1.4826 * median(&deviations) };
+        let most = (2.0 * (logs.len().max(2) as f64).ln()).sqrt() + 1.0;
+        // The loop has no memory and no vectors: half of what it says is not what the settings feel.
+        let allowed = PLACEMENT + most * scatter + waited + 0.5 * machine.ln().abs();
+        Noise { machine, scatter, waited, allowed }
+    }
 }
 
 /// Better, worse, or neither that anybody need act on.
@@ -139,6 +179,8 @@ impl Pair {
 /// The whole comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
+    /// What was allowed for.
+    pub noise: Noise,
     /// Median ratio of times over all settings (1); none without times.
     pub common: Option<f64>,
     /// Whether times are divided by it.
@@ -175,6 +217,12 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
             pairs.push(pair(one, other));
         }
     }
+    let noise = noise(before, after, &pairs);
+    for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
+        time.ratio /= noise.machine;
+        let [low, high] = time.interval.map(|bound| bound / noise.machine);
+        time.interval = [low * (-noise.allowed).exp(), high * noise.allowed.exp()];
+    }
     let mut ratios: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio)).collect();
     ratios.sort_by(f64::total_cmp);
     let common = (!ratios.is_empty()).then(|| ratios[ratios.len() / 2]);
@@ -185,6 +233,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
         }
     }
     Comparison {
+        noise,
         common,
         relative: options.relative,
         threshold: options.threshold,
@@ -194,8 +243,21 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
     }
 }
 
-fn key(r: &Record) -> (&str, &str, Budget, Option<Swept>, Order, usize) {
-    (&r.scene, r.solver, r.budget, r.swept, r.order, r.lanes)
+/// What the two runs differ by where nothing was changed.
+fn noise(before: &StudyFile, after: &StudyFile, pairs: &[Pair]) -> Noise {
+    let logs: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio.ln())).collect();
+    let mean = |study: &StudyFile, of: fn(&Sample) -> f64| {
+        let values: Vec<f64> = study.records.iter().filter_map(|r| r.sample.as_ref().map(of)).collect();
+        values.iter().sum::<f64>() / values.len().max(1) as f64
+    };
+    let loops = [before, after].map(|study| mean(study, |s| s.yardstick_ns));
+    let machine = if loops.iter().all(|ns| *ns > 0.0) { loops[1] / loops[0] } else { 1.0 };
+    let waited = mean(before, |s| s.waited).max(mean(after, |s| s.waited));
+    Noise::of(&logs, machine, waited)
+}
+
+fn key(r: &Record) -> impl PartialEq {
+    (&r.scene, r.setting(), r.lanes)
 }
 
 fn pair(one: &Record, other: &Record) -> Pair {
@@ -205,6 +267,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         let (error, unit, tolerance) = match axis {
             ErrorAxis::Penetration => ("penetration", "m", tolerances.penetration.value),
             ErrorAxis::Law => ("residual", "", tolerances.residual.value),
+            ErrorAxis::Rest => ("rest speed", "m/s", tolerances.rest.map_or(0.0, |t| t.value)),
             ErrorAxis::Truth => {
                 ("reference", one.truth.map_or("", |t| t.unit), tolerances.truth.map_or(0.0, |t| t.value))
             }
@@ -213,7 +276,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
     });
     let time = || {
         let samples = [one.sample.as_ref()?, other.sample.as_ref()?];
-        let Ratio { median, interval } = Ratio::of(samples[1], samples[0])?;
+        let Ratio { median, interval, .. } = Ratio::of(samples[1], samples[0])?;
         Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
     };
     Pair {
@@ -241,6 +304,7 @@ fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
     differ("instructions", a.instructions().into(), b.instructions().into());
     differ("compiler", a.compiler.clone(), b.compiler.clone());
     differ("version", a.version.clone(), b.version.clone());
+    differ("commit", a.commit.clone(), b.commit.clone());
     let empty = serde_json::Map::new();
     let [a, b] = [before, after].map(|study| study.settings.as_object().unwrap_or(&empty));
     let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
@@ -328,6 +392,51 @@ mod tests {
         assert_eq!((raw.common, count(&raw)), (Some(1.5), 5));
         let relative = compare(&before, &after, &Options { relative: true, ..STRICT });
         assert_eq!(count(&relative), 1);
+    }
+
+    /// Two studies of one program, of `count` settings whose times scatter by `scatter` from run to run and whose
+    /// machine is `machine` times as slow the second time; setting 0 is `slower` times as slow.
+    fn two_runs(count: u32, scatter: f64, machine: f64, slower: f64, seed: u64) -> Comparison {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut run = |machine: f64, slower: f64| {
+            let records = (0..count).map(|i| {
+                // Sums of three are near enough to normal; one setting in 30 lies where it is twice as bad.
+                let normal: f64 = (0..3).map(|_| random.random_range(-1.0..1.0)).sum();
+                let own = if i % 30 == 7 { 2.0 * scatter } else { scatter };
+                let own = machine * (own * normal).exp() * if i == 0 { slower } else { 1.0 };
+                let mut r = record(8, i + 1, 10.0 * own, 1e-3);
+                let sample = r.sample.as_mut().unwrap();
+                sample.yardstick_ns *= machine;
+                for block in sample.blocks_ns.iter_mut().flatten() {
+                    *block *= 1.0 + random.random_range(-0.02..0.02);
+                }
+                r
+            });
+            study(records.collect())
+        };
+        let before = run(1.0, 1.0);
+        let after = run(machine, slower);
+        compare(&before, &after, &Options { threshold: 0.05, relative: false })
+    }
+
+    #[test]
+    fn a_null_race_finds_no_difference_and_a_known_slowdown_is_found() {
+        let worse = |c: &Comparison| {
+            let verdicts = c.pairs.iter().map(|p| p.time.unwrap().verdict(c.threshold));
+            verdicts.filter(|v| *v != Verdict::Same).count()
+        };
+        for seed in 0..20 {
+            for (scatter, machine) in [(0.005, 1.0), (0.05, 1.0), (0.1, 1.3), (0.03, 0.8)] {
+                let null = two_runs(120, scatter, machine, 1.0, seed);
+                assert_eq!(worse(&null), 0, "seed {seed}, scatter {scatter}, machine {machine}");
+            }
+        }
+        let found = (0..10).filter(|&seed| {
+            let slowed = two_runs(120, 0.004, 1.0, 1.1, seed);
+            slowed.pairs[0].time.unwrap().verdict(0.05) == Verdict::Worse
+        });
+        assert!(found.count() >= 9);
     }
 
     #[test]

@@ -31,6 +31,14 @@ pub fn text(found: &Comparison, all: bool) -> String {
         "worse, better: by more than {} % and beyond the noise; errors below 1 % of a scene's tolerance count as none\n",
         digits(threshold)
     );
+    let n = found.noise;
+    text += &format!(
+        "allowed between two runs of one program: {:.1} % (settings scatter by {:.1} %, threads waited {:.1} %, a fixed loop took {:.3} times as long, which is divided out)\n",
+        100.0 * n.allowed.exp_m1(),
+        100.0 * n.scatter,
+        100.0 * n.waited,
+        n.machine
+    );
     text += "\n";
     // The widths of a setting end in the same bits: one of them says what happened.
     let own = |p: &Pair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);

@@ -42,6 +42,7 @@ use overlaps::Overlaps;
 use rest::Rest;
 use softness::{Depths, RestDepths};
 use state::BodyState;
+use std::collections::BTreeMap;
 use violation::Violation;
 
 /// The errors of a run. All are finite, and zero where there is nothing to measure; absent is
@@ -53,32 +54,57 @@ pub struct Errors {
     /// Points at which shapes were as near as a contact after a step, over all steps.
     pub points: u64,
     /// Deepest overlap (m).
+    #[serde(rename = "penetration_max_m")]
     pub penetration_max: f64,
     /// Mean overlap of such points, open ones counted as zero (m).
+    #[serde(rename = "penetration_mean_m")]
     pub penetration_mean: f64,
     /// Root mean square of the same (m).
+    #[serde(rename = "penetration_rms_m")]
     pub penetration_rms: f64,
     /// What 99 % of such points do not exceed (m).
+    #[serde(rename = "penetration_p99_m")]
     pub penetration_p99: f64,
+    /// How deep bodies that were no contact yet had flown into each other by the end of a step, at most (m): no
+    /// solver saw them.
+    #[serde(rename = "flight_depth_max_m")]
+    pub flight_depth_max: f64,
+    /// What 99 % of the points of contacts do not exceed beyond the depth at which they were found (m).
+    #[serde(rename = "held_depth_p99_m")]
+    pub held_depth_p99: f64,
+    /// Deepest overlap of the last second (m).
+    #[serde(rename = "rest_depth_max_m")]
+    pub rest_depth_max: f64,
     /// Deepest overlap, in half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
     /// Deepest overlap of the last second beyond what soft contacts give way at rest (m); none
     /// without soft contacts.
+    #[serde(rename = "penetration_excess_m")]
     pub penetration_excess: Option<f64>,
     /// The most that soft contacts give way under the last second's load (m).
+    #[serde(rename = "soft_floor_m")]
     pub soft_floor: Option<f64>,
     /// Normal law residual, root mean square, in the weight of the scene × step.
+    #[serde(rename = "residual_normal_rms")]
     pub law_normal_rms: f64,
     /// Largest normal law residual.
+    #[serde(rename = "residual_normal_max")]
     pub law_normal_max: f64,
     /// Tangential law residual, root mean square.
+    #[serde(rename = "residual_tangent_rms")]
     pub law_tangent_rms: f64,
     /// Largest tangential law residual.
+    #[serde(rename = "residual_tangent_max")]
     pub law_tangent_max: f64,
     /// Both parts together, root mean square. At equal quality it falls with the number of bodies.
+    #[serde(rename = "residual_rms_scene_weights")]
     pub law_rms: f64,
     /// The same in the mean weight of a body × step, which does not.
+    #[serde(rename = "residual_rms_body_weights")]
     pub law_rms_body: f64,
+    /// Both parts together, each point's in the weight of the lighter of its two bodies × step, root mean square.
+    #[serde(rename = "residual_rms_lighter_weights")]
+    pub law_rms_lighter: f64,
     /// Largest violation of complementarity, in (weight × step)²/mass.
     pub complementarity: f64,
     /// Largest violation of the friction cone, in weight × step.
@@ -87,8 +113,10 @@ pub struct Errors {
     pub dissipation: f64,
     /// Residual of what the solver set out to solve, both parts, root mean square, in the
     /// weight of the scene × substep; only with `Settings::observe_rule`.
+    #[serde(rename = "own_residual_rms")]
     pub own_rms: Option<f64>,
     /// Largest of its normal and tangential parts.
+    #[serde(rename = "own_residual_max")]
     pub own_max: Option<f64>,
     /// Momentum out of balance, see [`Balance::close`].
     pub momentum: f64,
@@ -105,14 +133,30 @@ pub struct Errors {
     /// Most energy in one step that no impulse explains.
     pub energy_unexplained: f64,
     /// Root mean square of √(2 E_kin/M) over the last second (m/s).
+    #[serde(rename = "rest_speed_m_s")]
     pub rest_velocity: f64,
     /// Fastest creep of one body on another over the last second, without its sign (m/s).
+    #[serde(rename = "creep_m_s")]
     pub creep: f64,
     /// Half the width of its 95 % interval (m/s).
+    #[serde(rename = "creep_half_width_m_s")]
     pub creep_half_width: f64,
     /// When the scene came to rest for good (s), if it did.
+    #[serde(rename = "settled_s")]
     pub settled: Option<f64>,
 }
+
+impl Errors {
+    /// The penetration that is judged (m): what 99 % of the points of contacts keep, and where a scene has to
+    /// rest, also the deepest of its last second.
+    pub fn penetration(&self, rests: bool) -> f64 {
+        if rests { self.held_depth_p99.max(self.rest_depth_max) } else { self.held_depth_p99 }
+    }
+}
+
+/// What flew into each other counts in full after this long (s): in 30 steps a Baumgarte feedback of a fifth
+/// per step leaves a thousandth of it.
+const FLIGHT: f64 = 0.5;
 
 /// Root mean square and maximum of residuals (N·s).
 #[derive(Clone, Copy, Debug, Default)]
@@ -146,6 +190,12 @@ pub struct Observation {
     penetration: Distribution,
     normal: Residuals,
     tangent: Residuals,
+    /// In the weight of the lighter body × step (1).
+    lighter: Residuals,
+    held: Distribution,
+    /// What flew into each other without having been a contact: depth (m) and step, by pair of shapes.
+    flights: BTreeMap<u64, (f64, u64)>,
+    flight_max: f64,
     own: [Residuals; 2],
     violation: Violation,
     largest_impulse: f64,
@@ -180,6 +230,10 @@ impl Observation {
             penetration: Distribution::default(),
             normal: Residuals::default(),
             tangent: Residuals::default(),
+            lighter: Residuals::default(),
+            held: Distribution::default(),
+            flights: BTreeMap::new(),
+            flight_max: 0.0,
             own: Default::default(),
             violation: Violation::default(),
             largest_impulse: 0.0,
@@ -205,6 +259,12 @@ impl Observation {
             let [normal, tangent] = point.residual(&bodies[*a], &bodies[*b], self.dt);
             self.normal.add(normal);
             self.tangent.add(tangent);
+            let weights = [a, b].map(|i| self.previous[*i]).map(|s| (s.inv_mass > 0.0, s.force.length()));
+            let lighter = weights.into_iter().filter(|w| w.0 && w.1 > 0.0).map(|w| w.1);
+            let lighter = lighter.fold(f64::INFINITY, f64::min);
+            if lighter.is_finite() {
+                self.lighter.add(normal.hypot(tangent) / (lighter * self.dt));
+            }
             self.violation = self.violation.max(point.violation(&bodies[*a], &bodies[*b], self.dt));
             self.largest_impulse = self.largest_impulse.max(point.impulse[0]);
         }
@@ -232,6 +292,7 @@ impl Observation {
     /// Finds what overlaps where bodies are now: bodies that met within the step had no contact.
     fn add_penetrations(&mut self, world: &World, points: &[([usize; 2], PointStep)]) {
         let (mut depths, mut found) = (Depths::default(), Vec::new());
+        self.find_flights(world);
         // Pairs and contacts ascend alike.
         let (mut contacts, mut steps) = (world.contacts.iter().peekable(), points);
         self.overlaps.find(world, |[a, b], manifold| {
@@ -240,15 +301,45 @@ impl Observation {
             }
             let known = contacts.peek().filter(|c| c.key() == pair_key(a, b));
             let known = known.map(|&contact| (contact, steps));
-            found.extend(manifold.points().iter().map(|&point| (known, point)));
+            let key = pair_key(a, b);
+            found.extend(manifold.points().iter().map(|&point| (key, known, point)));
         });
-        for (known, point) in found {
+        for (key, known, point) in found {
             let depth = -point.separation as f64;
             self.penetration.add(depth);
+            let flown = match known {
+                Some(_) => self.flights.get(&key).map_or(0.0, |f| f.0),
+                None => self.fly(key, depth),
+            };
+            self.held.add(depth - flown);
             let floor = known.map_or(0.0, |(contact, own)| self.floor(world, contact, own, point.feature_id));
             depths.add(depth, floor);
         }
         self.depths.add(depths, self.dt);
+    }
+
+    /// Forgets what flew into each other long ago, and finds what overlaps before the first step: solvers have
+    /// [`FLIGHT`] to push it out.
+    fn find_flights(&mut self, world: &World) {
+        let steps = (FLIGHT / self.dt).ceil() as u64;
+        self.flights.retain(|_, (_, step)| self.steps < *step + steps);
+        if self.steps == 0 {
+            for contact in &world.contacts {
+                // Gaps of the first step are those of the start.
+                let depth = contact.manifold.points().iter().map(|p| -p.separation).fold(0.0, f32::max);
+                if depth > 0.0 {
+                    self.flights.insert(contact.key(), (f64::from(depth), 0));
+                }
+            }
+        }
+    }
+
+    /// A point of a pair that was no contact in this step: the depth of the pair (m).
+    fn fly(&mut self, key: u64, depth: f64) -> f64 {
+        self.flight_max = self.flight_max.max(depth);
+        let flight = self.flights.entry(key).or_insert((0.0, self.steps));
+        *flight = (if flight.1 == self.steps { flight.0.max(depth) } else { depth }, self.steps);
+        depth
     }
 
     /// How far the soft contact at this feature gives way under its load of the step (m).
@@ -285,6 +376,9 @@ impl Observation {
             penetration_mean: self.penetration.mean(),
             penetration_rms: self.penetration.rms(),
             penetration_p99: self.penetration.p99(),
+            flight_depth_max: self.flight_max,
+            held_depth_p99: self.held.p99(),
+            rest_depth_max: self.depths.largest().penetration,
             penetration_relative: ratio(self.penetration.max(), self.half_extent),
             penetration_excess: depths.map(|d| d.excess),
             soft_floor: depths.map(|d| d.floor),
@@ -294,6 +388,10 @@ impl Observation {
             law_tangent_max: ratio(self.tangent.max, unit),
             law_rms: rms(normal + tangent, count, unit),
             law_rms_body: rms(normal + tangent, count, unit / self.heavy.max(1) as f64),
+            law_rms_lighter: match self.lighter.count {
+                0 => rms(normal + tangent, count, unit / self.heavy.max(1) as f64),
+                count => rms(self.lighter.sum_of_squares, count, 1.0),
+            },
             complementarity: ratio(self.violation.complementarity, energy_unit),
             cone: ratio(self.violation.cone, unit),
             dissipation: ratio(self.violation.dissipation, energy_unit),

@@ -13,7 +13,12 @@ pub enum Limit {
     Latency,
     /// Not bandwidth; operations are not counted in this phase.
     NotBandwidth,
+    /// The noise of the ceilings and of the passes covers more than one verdict.
+    CannotTell,
 }
+
+/// By how much a ceiling may be off (1): measured twice on a shared machine, bandwidths differ by a tenth.
+const NOISE: f64 = 0.1;
 
 /// A phase that reaches this share of its lower ceiling is bound by it (1).
 pub const REACHED: f64 = 0.5;
@@ -28,13 +33,26 @@ impl Limit {
             return None;
         }
         let memory = phase.traffic.total() / bandwidth / phase.pass_ns;
-        Some(match phase.flops.map(|flops| flops / peak / phase.pass_ns) {
-            _ if memory >= REACHED && phase.flops.is_none() => Limit::Bandwidth,
+        let arithmetic = phase.flops.map(|flops| flops / peak / phase.pass_ns);
+        // Ceilings vary from run to run as the clock of the machine does, and each on its own.
+        let noise = 1.0 + NOISE + phase.spread_ns / phase.pass_ns;
+        let corners =
+            [(noise, 1.0 / noise), (1.0 / noise, noise), (noise, noise), (1.0 / noise, 1.0 / noise)];
+        let verdict = |a: f64, b: f64| Limit::at(a * memory, arithmetic.map(|x| b * x));
+        let own = verdict(1.0, 1.0);
+        let is_sure = corners.into_iter().all(|(a, b)| verdict(a, b) == own);
+        Some(if is_sure { own } else { Limit::CannotTell })
+    }
+
+    /// From the shares of both ceilings that are reached (1).
+    fn at(memory: f64, arithmetic: Option<f64>) -> Limit {
+        match arithmetic {
+            None if memory >= REACHED => Limit::Bandwidth,
             None => Limit::NotBandwidth,
             Some(arithmetic) if memory.max(arithmetic) < REACHED => Limit::Latency,
             Some(arithmetic) if memory >= arithmetic => Limit::Bandwidth,
             Some(_) => Limit::Compute,
-        })
+        }
     }
 
     /// The field's word.
@@ -44,6 +62,7 @@ impl Limit {
             Limit::Compute => "compute-bound",
             Limit::Latency => "latency-bound",
             Limit::NotBandwidth => "latency- or compute-bound",
+            Limit::CannotTell => "cannot tell",
         }
     }
 }
@@ -77,8 +96,11 @@ mod tests {
             flops,
         };
         let of = |pass_ns, flops| Limit::of(&phase(pass_ns, flops), Some(2.0)).map(Limit::word);
-        assert_eq!(of(199.0, Some(10.0)), Some("bandwidth-bound"));
-        assert_eq!(of(201.0, Some(10.0)), Some("latency-bound"));
+        assert_eq!(of(170.0, Some(10.0)), Some("bandwidth-bound"));
+        assert_eq!(of(230.0, Some(10.0)), Some("latency-bound"));
+        // Within a tenth of half the ceiling, or of each other, the machine's mood decides.
+        assert_eq!([of(195.0, Some(10.0)), of(205.0, Some(10.0))], [Some("cannot tell"); 2]);
+        assert_eq!([of(150.0, Some(190.0)), of(150.0, Some(210.0))], [Some("cannot tell"); 2]);
         // 400 operations take 200 ns.
         assert_eq!(of(250.0, Some(400.0)), Some("compute-bound"));
         assert_eq!(of(150.0, None), Some("bandwidth-bound"));

@@ -24,6 +24,7 @@ pub mod traffic;
 pub mod waiting;
 
 use crate::engine::clock::Phase;
+use crate::engine::constraints::Impacts;
 use crate::engine::world::{HeldWorld, Probe, StepCounts};
 use crate::lab::study::interleave::median;
 use ceilings::{Buffer, Level, levels, multiply_adds};
@@ -104,6 +105,8 @@ pub struct Report {
     pub scene: String,
     /// Solver.
     pub solver: &'static str,
+    /// Treatment of impacts.
+    pub impacts: Impacts,
     /// Lanes.
     pub lanes: usize,
     /// Substeps of a step.
@@ -200,6 +203,7 @@ pub fn profile(frozen: &mut HeldWorld<'_>, probes: &[Probe], scene: &str, option
     Report {
         scene: scene.to_string(),
         solver: world.settings.solver.name,
+        impacts: world.settings.impacts,
         lanes: width.lanes(),
         substeps: world.settings.budget.substeps,
         bodies: world.bodies.len(),

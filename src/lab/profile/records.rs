@@ -34,6 +34,7 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
         "environment": Environment::current(),
         "scene": report.scene,
         "solver": report.solver,
+        "impacts": report.impacts.name(),
         "lanes": report.lanes,
         "substeps": report.substeps,
         "bodies": report.bodies,

@@ -1,38 +1,165 @@
-//! The study in a page: what to use on each scene, one ranking, what was left out.
+//! The study in a page: what to use and when, what speaks against it, what to use on each scene, who falls,
+//! what was left out.
 
 use super::environment::Environment;
 use super::table::{finish, table};
-use super::units::{digits, is_emulated, ratio, si};
+use super::units::{digits, is_emulated, si};
+use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
-use crate::lab::study::answer::{Answer, order};
+use crate::lab::scenes::holds::HORIZON;
+use crate::lab::scenes::tolerance::Accuracy;
+use crate::lab::study::answer::{Answer, order, same};
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
-use crate::lab::study::ranking::{CLOSE, ranking};
+use crate::lab::study::ranking::{Ranking, Standing, ranking};
 use crate::lab::study::{self, Record};
 
-/// Names in a line.
-const PER_LINE: usize = 10;
+/// Names in a line, solvers in the ranking, and notes on what falls later.
+const PER_LINE: usize = 12;
+const MOST_RANKED: usize = 8;
+const MOST_NOTES: usize = 7;
+
+/// Waits beyond this share of the time are worth a warning (1).
+const BUSY: f64 = 0.02;
 
 /// What the columns of the answer are.
 const LEGEND: &str = "\
-A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and three errors
-keep the tolerances of the scene (`simpulse scene NAME` lists them with their reasons): the greatest
-penetration; the contact-law residual, rms, in body weights; the distance to the scene's reference value
-(– none is known).  budget: substeps, and in each so many velocity, relaxation and position sweeps.
-µs/step: median, ± median deviation of a repeat.  runner-up: the cheapest setting of another solver;
-slower: how much longer its steps take, over paired blocks; tie: no difference can be told.
+A plausible run holds, stands for a minute where it has to rest, and keeps penetration (1 cm at bodies of a metre), residual (a tenth
+of what carries the lighter body), reference value and rest speed (`simpulse scene NAME`); a tight one keeps a tenth, an exact one a
+hundredth of each.  µs/step: mean over the run, its median, its longest step.  Errors in % of the plausible tolerance.
+next: the cheapest setting of another solver, and how much slower; tie: no difference can be told.
 ";
 
 /// The answer of a study, from its records alone; `steps` if runs were cut to so many.
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
-    let mut text = head(records, environment, scenes.len());
+    let ranking = ranking(records);
+    let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
+    text += &warnings(records, steps);
+    text += &head(records, environment, scenes.len());
+    text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
+    text += &fallen(records);
+    text += &format!("\n{}", accuracies(records));
+    text += &format!("\n{}", standings(&ranking, scenes.len()));
+    text += &waves(records);
+    text + &format!("\n{LEGEND}") + &left_out(records) + &differing(records)
+}
+
+/// What to use, in a sentence with its conditions; and where the default solver stands. Also for the page.
+pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
+    let standings = &ranking.standings;
+    let mut text = String::new();
     if let Some(steps) = steps {
-        text += &format!("Runs end after {steps} steps: what fails later is not seen.\n");
+        text += &format!("A look, no recommendation: runs end after {steps} steps. ");
     }
-    text += &format!("\n{LEGEND}\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
-    text += &format!("\n{}", standings(records, scenes.len()));
-    text + &left_out(records) + &differing(records)
+    let all: Vec<&Standing> = standings.iter().filter(|s| s.good[0] == scenes).collect();
+    let speed = |s: &Standing| format!("{:.0} % of the speed of each scene's fastest", 100.0 * s.score);
+    match (ranking.leader(), &all[..]) {
+        (Some(first), _) => {
+            text += &format!(
+                "{} {}: good enough on {} of {scenes} scenes, at {}; so with any scene left out and with half or twice the tolerances.",
+                if steps.is_some() { "First is" } else { "Use" },
+                first.solver,
+                first.good[0],
+                speed(first)
+            );
+            if let [only] = all[..]
+                && only.solver != first.solver
+            {
+                text += &format!(" Only {} is good enough on all of them, at {}.", only.solver, speed(only));
+            }
+        }
+        (None, [only]) => {
+            text += &format!(
+                "{} {} if one solver has to do for all {scenes} scenes: no other is good enough on every one; it has {}.",
+                if steps.is_some() { "First is" } else { "Use" },
+                only.solver,
+                speed(only)
+            );
+        }
+        (None, _) if ranking.first.is_empty() => text += "Nothing that ran is good enough anywhere.",
+        (None, _) => text += "No one solver will do: choose by scene.",
+    }
+    if ranking.leader().is_none() && ranking.first.len() > 1 {
+        text += &format!(
+            " By speed nobody leads: first is one of {}, depending on the scene that is left out and on the tolerances.",
+            ranking.first.join(", ")
+        );
+    }
+    if let Some(place) = standings.iter().position(|s| s.solver == DEFAULT) {
+        let own = &standings[place];
+        let where_not = match own.fails_on.len() {
+            0 => String::new(),
+            _ => format!(", not on {}", short_list(&own.fails_on, 4)),
+        };
+        text += &format!(
+            "\n{DEFAULT}, the default, is number {} of {} by score: good enough on {} of {scenes} scenes{where_not}.",
+            place + 1,
+            standings.len(),
+            own.good[0]
+        );
+    }
+    text + "\n"
+}
+
+/// Longest line of prose (characters).
+const WIDTH: usize = 150;
+
+/// The same with lines of [`WIDTH`] at most.
+fn wrapped(text: &str) -> String {
+    let mut wrapped = String::new();
+    for line in text.lines() {
+        let mut length = 0;
+        for word in line.split(' ') {
+            let count = word.chars().count();
+            let gap = match length {
+                0 => "",
+                _ if length + 1 + count > WIDTH => "\n",
+                _ => " ",
+            };
+            length = if gap == " " { length + 1 + count } else { count };
+            wrapped += &format!("{gap}{word}");
+        }
+        wrapped += "\n";
+    }
+    wrapped
+}
+
+/// The first few of a list.
+fn short_list(names: &[String], most: usize) -> String {
+    let shown = names.iter().take(most).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
+}
+
+/// What makes the figures worth less. Also for the page.
+pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
+    let mut text = String::new();
+    let samples = || records.iter().filter_map(|r| r.sample.as_ref());
+    let count = samples().count().max(1) as f64;
+    let waited = samples().map(|s| s.waited).sum::<f64>() / count;
+    if waited > BUSY {
+        text += &format!(
+            "WARNING  this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken out of the times,\n\
+             and differences up to it are shown as ties. Run again on an idle machine.\n",
+            100.0 * waited
+        );
+    }
+    let rounds = samples().map(|s| s.rounds).min().unwrap_or(0);
+    if rounds < 3 && count > 1.0 {
+        text += &format!(
+            "WARNING  {rounds} round{}: nobody can tell spikes of a solver from those of the machine; costs are medians.\n",
+            if rounds == 1 { "" } else { "s" }
+        );
+    }
+    if steps.is_some() && records.iter().all(|r| r.later.is_none()) {
+        text += "WARNING  what fails after the run was not looked for.\n";
+    }
+    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        for what in &scene[0].unchecked {
+            text += &format!("NOT CHECKED  {}: {what}\n", scene[0].scene);
+        }
+    }
+    text
 }
 
 /// What was tried, and where.
@@ -52,14 +179,20 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
         ways.push(format!("coloured order at {} lane{plural}{emulated}", list.join(", ")));
     }
     let holding = records.iter().filter(|r| r.holds()).count();
-    let good = records.iter().filter(|r| r.excess() <= 1.0).count();
+    let good = Accuracy::ALL.map(|a| records.iter().filter(|r| r.is_good(a)).count());
+    let rounds = records.iter().filter_map(|r| Some(r.sample.as_ref()?.rounds)).max().unwrap_or(0);
     format!(
-        "{scenes} scene{}, {} solver{}; {}\n{} settings: {holding} hold, {good} are good enough\n{}; {}: {} lanes per instruction\n",
+        "{scenes} scene{}, {} solver{}; {}; {rounds} round{} common to all settings\n\
+         {} settings: {holding} hold, {} are plausible, {} tight, {} exact · {}; {}: {} lanes per instruction\n",
         if scenes == 1 { "" } else { "s" },
         solvers_of(records).len(),
         if solvers_of(records).len() == 1 { "" } else { "s" },
         ways.join(", "),
+        if rounds == 1 { "" } else { "s" },
         records.len(),
+        good[0],
+        good[1],
+        good[2],
         environment.cpu,
         environment.instructions(),
         environment.native_lanes,
@@ -72,13 +205,14 @@ fn cheapest(scenes: &[Answer]) -> String {
         "scene",
         "solver",
         "budget",
-        "lanes",
         "µs/step",
-        "±",
-        "penetration",
+        "median",
+        "longest",
+        "penetr.",
         "residual",
         "reference",
-        "runner-up",
+        "rest",
+        "next",
         "slower",
     ]);
     let mut notes = String::new();
@@ -91,51 +225,73 @@ fn cheapest(scenes: &[Answer]) -> String {
                 rows.add_row(cells);
             }
             (None, Some(nearest)) => {
-                let [solver, budget, lanes, time, ..] = setting(nearest);
-                let (over, what) = worst(nearest);
+                let [solver, budget, time, ..] = setting(nearest);
                 notes += &format!(
-                    "{}: none is good enough; nearest is {solver}, {budget}, {lanes} lanes, {time} µs: \
-                     {over} times its tolerance of {what}\n",
-                    answer.scene
+                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {}\n",
+                    answer.scene,
+                    worst(nearest)
                 );
             }
             (None, None) => notes += &format!("{}: no setting holds\n", answer.scene),
         }
     }
-    let table = if scenes.iter().any(|a| a.best().is_some()) { finish(rows, 4) } else { String::new() };
+    let table = if scenes.iter().any(|a| a.best().is_some()) { finish(rows, 3) } else { String::new() };
     table + &notes
 }
 
-/// Solver, budget, lanes, time with its deviation, and the three errors.
-fn setting(record: &Record) -> [String; 8] {
+/// Solver, budget with lanes, mean, median and longest step, and the errors in their tolerances.
+fn setting(record: &Record) -> [String; 9] {
     let time = |ns: fn(&crate::lab::study::interleave::Sample) -> f64| {
         record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
     };
-    let error = |axis: ErrorAxis, show: &dyn Fn(f64) -> String| axis.of(record).map_or("–".to_string(), show);
+    let share = |axis: ErrorAxis| {
+        record.in_tolerance(axis).map_or("–".to_string(), |e| format!("{} %", percent(e)))
+    };
     [
         record.solver.to_string(),
-        record.budget_text.clone(),
-        match record.order {
-            Order::Natural => "natural".to_string(),
-            Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
-            Order::Colored => record.lanes.to_string(),
-        },
+        budget(record),
+        time(|sample| sample.mean_ns),
         time(|sample| sample.median_ns),
-        time(|sample| sample.spread_ns),
-        error(ErrorAxis::Penetration, &|e| si(e, "m")),
-        error(ErrorAxis::Law, &ratio),
-        error(ErrorAxis::Truth, &|e| si(e, record.truth.map_or("", |t| t.unit))),
+        time(|sample| sample.worst_ns),
+        share(ErrorAxis::Penetration),
+        share(ErrorAxis::Law),
+        share(ErrorAxis::Truth),
+        share(ErrorAxis::Rest),
     ]
 }
 
-/// The error that is farthest over its tolerance, and how far.
-fn worst(record: &Record) -> (String, &'static str) {
+/// `7 sub 1 vel 1 rel @8`, the number of lanes behind.
+fn budget(record: &Record) -> String {
+    let width = match record.order {
+        Order::Natural => "natural".to_string(),
+        Order::Colored if is_emulated(record.lanes) => format!("@{} emulated", record.lanes),
+        Order::Colored => format!("@{}", record.lanes),
+    };
+    format!("{} {width}", record.budget_text)
+}
+
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent > 0.0 && percent < 0.1 {
+        "0".to_string()
+    } else if percent < 10.0 {
+        format!("{percent:.1}")
+    } else {
+        format!("{percent:.0}")
+    }
+}
+
+/// What keeps a setting from being good enough.
+fn worst(record: &Record) -> String {
+    if let Some(why) = record.fails_later() {
+        return why;
+    }
     let over = |axis: &ErrorAxis| record.in_tolerance(*axis).unwrap_or(0.0);
-    let axis = ErrorAxis::ALL.into_iter().max_by(|a, b| over(a).total_cmp(&over(b)));
+    let axis = ErrorAxis::JUDGED.into_iter().max_by(|a, b| over(a).total_cmp(&over(b)));
     let axis = axis.unwrap_or(ErrorAxis::Penetration);
     match record.excess() {
-        excess if excess.is_finite() => (digits(excess), axis.name()),
-        _ => ("infinitely many".to_string(), ErrorAxis::Truth.name()),
+        excess if excess.is_finite() => format!("{} times its tolerance of {}", digits(excess), axis.name()),
+        _ => format!("it never came to its {}", ErrorAxis::Truth.name()),
     }
 }
 
@@ -152,7 +308,6 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     let Some(next) = answer.runner_up() else {
         return ["no other solver".to_string(), "–".to_string()];
     };
-    let name = format!("{}, {}", next.solver, next.budget_text);
     let ratio = next.sample.as_ref().zip(best.sample.as_ref()).and_then(|(next, best)| Ratio::of(next, best));
     let by = match ratio {
         _ if order(next, best).is_eq() => "tie".to_string(),
@@ -160,23 +315,96 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
         Some(ratio) => format!("{}×", digits(ratio.median)),
         None => "–".to_string(),
     };
-    [name, by]
+    [next.solver.to_string(), by]
+}
+
+/// Settings that look good in the run and fail later, once per setting.
+pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
+    let mut found: Vec<(&Record, String)> = Vec::new();
+    for record in records {
+        let Some(why) = record.fails_later() else { continue };
+        if !found.iter().any(|(other, _)| other.scene == record.scene && same(other, record)) {
+            found.push((record, why));
+        }
+    }
+    found
+}
+
+/// Who looks good and is not.
+fn fallen(records: &[Record]) -> String {
+    let found = fails_later(records);
+    let lines = found.iter().take(MOST_NOTES).map(|(r, why)| {
+        let time = digits(r.cost_ns() / 1e3);
+        format!(
+            "  ! {}: {}, {} ({time} µs) passes its run, and then {why}\n",
+            r.scene, r.solver, r.budget_text
+        )
+    });
+    let mut text: String = lines.collect();
+    if found.len() > MOST_NOTES {
+        text += &format!("  ! and {} more in tables.txt\n", found.len() - MOST_NOTES);
+    }
+    text
+}
+
+/// The cheapest for each accuracy beyond plausible.
+fn accuracies(records: &[Record]) -> String {
+    let mut rows =
+        table(&["scene", "tight: solver", "budget", "µs/step", "exact: solver", "budget", "µs/step"]);
+    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        let mut cells = vec![scene[0].scene.clone()];
+        for accuracy in [Accuracy::Tight, Accuracy::Exact] {
+            match Answer::at(scene, accuracy).and_then(|a| a.best()) {
+                Some(best) => {
+                    cells.extend([best.solver.into(), budget(best), digits(best.cost_ns() / 1e3)]);
+                }
+                None => cells.extend(["none".to_string(), "–".to_string(), "–".to_string()]),
+            }
+        }
+        rows.add_row(cells);
+    }
+    finish(rows, 3)
 }
 
 /// All solvers over all scenes.
-fn standings(records: &[Record], scenes: usize) -> String {
-    let close = format!("within {CLOSE}×");
-    let mut rows = table(&["solver", "score", "holds on", "good enough on", "fastest or tied", &close]);
-    for own in ranking(records) {
-        let mut cells = vec![own.solver.to_string(), format!("{:.2}", own.score)];
-        cells.extend([own.holds, own.good, own.fastest, own.close].map(|n| format!("{n} of {scenes}")));
+fn standings(ranking: &Ranking, scenes: usize) -> String {
+    let mut rows =
+        table(&["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"]);
+    for own in ranking.standings.iter().take(MOST_RANKED) {
+        let [low, high] = own.range;
+        let mut cells =
+            vec![own.solver.to_string(), format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")];
+        cells.extend(own.good.map(|n| format!("{n} of {scenes}")));
+        cells.push(format!("{} of {scenes}", own.fastest));
+        cells.push(if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 4) });
         rows.add_row(cells);
     }
+    let more = match ranking.standings.len().saturating_sub(MOST_RANKED) {
+        0 => String::new(),
+        more => format!("and {more} more in report.html\n"),
+    };
     format!(
-        "Ranking over all scenes.  score: mean speed of the cheapest good setting in that of the fastest solver's,\n\
-         0 where none is good enough; 1 would be the fastest on every scene\n{}",
+        "Ranking over all scenes.  score: a solver has, in the mean over scenes, this share of the speed of the fastest solver for the\n\
+         scene (0 where it is not good enough); range: with any scene left out, and with half and twice the tolerances\n{}{more}",
         finish(rows, 1)
     )
+}
+
+/// What waves of impacts gain and cost, in a line; nothing where both were not run.
+fn waves(records: &[Record]) -> String {
+    let found = study::impacts::gains(records);
+    if found.is_empty() {
+        return String::new();
+    }
+    let better = found.iter().filter(|g| g.reference.is_some_and(|r| r < 0.9) || g.residual < 0.9).count();
+    let mut costs: Vec<f64> = found.iter().filter_map(|g| g.time).collect();
+    costs.sort_by(f64::total_cmp);
+    let cost = costs.get(costs.len() / 2).map_or("–".to_string(), |c| digits(*c));
+    let text = format!(
+        "--impacts waves: of {} solver and scene pairs where something bounces, {better} become better by a tenth or more; in the median {cost} times the time (tables.txt)\n",
+        found.len()
+    );
+    wrapped(&text)
 }
 
 /// Solvers that the default list leaves out.
@@ -184,7 +412,7 @@ fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
         others => {
-            let mut text = "\nleft out (--solvers all runs every solver):".to_string();
+            let mut text = format!("left out, {} solvers (--solvers all runs every solver):", others.len());
             let lines: Vec<String> = others.chunks(PER_LINE).map(|line| line.join(", ")).collect();
             text += &format!("\n  {}\n", lines.join(",\n  "));
             text
@@ -200,10 +428,34 @@ fn differing(records: &[Record]) -> String {
     }
 }
 
+/// Everything that failed after its run, for `tables.txt`.
+pub fn later_table(records: &[Record]) -> String {
+    let mut rows = table(&["scene", "solver", "budget", "µs/step", "", "speed at rest"]);
+    let mut any = false;
+    let mut seen: Vec<&Record> = Vec::new();
+    for record in records.iter().filter(|r| r.later.is_some()) {
+        if seen.iter().any(|other| other.scene == record.scene && same(other, record)) {
+            continue;
+        }
+        seen.push(record);
+        any = true;
+        let why = record.fails_later().unwrap_or("stands".into());
+        let speed = record.later.and_then(|l| l.rest_speed_m_s).map_or("–".into(), |v| si(v, "m/s"));
+        let cells = [record.scene.clone(), record.solver.into(), record.budget_text.clone()];
+        rows.add_row(cells.into_iter().chain([digits(record.cost_ns() / 1e3), why, speed]));
+    }
+    if !any {
+        return String::new();
+    }
+    format!("Run on for {HORIZON} s, untimed\n{}\n", finish(rows, 3))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::engine::solvers::VARIANTS;
+    use crate::lab::scenes::holds::{Broken, Mark};
+    use crate::lab::study::record::Later;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     fn page(records: &[Record]) -> String {
@@ -220,11 +472,11 @@ mod tests {
             line.split_whitespace().collect::<Vec<_>>().join(" ")
         };
         // Narrow builds emulate eight lanes and say so.
-        let lanes = if is_emulated(8) { "8 emulated" } else { "8" };
-        let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 0.00 900 µm 0 – no other solver –");
+        let lanes = if is_emulated(8) { "@8 emulated" } else { "@8" };
+        let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 41.0 41.0 9.0 % 0.0 % – – no other solver –");
         assert_eq!(line(&records), expected);
         let with = |time| [&records[..], &[other(time)]].concat();
-        assert!(line(&with(61.5)).ends_with("soft_step, 4 sub 50 %"), "{}", line(&with(61.5)));
+        assert!(line(&with(61.5)).ends_with("soft_step 50 %"), "{}", line(&with(61.5)));
         assert!(line(&with(41.8)).ends_with(" soft_step tie"), "{}", line(&with(41.8)));
         assert!(line(&with(410.0)).ends_with(" 10.0×"), "{}", line(&with(410.0)));
     }
@@ -233,14 +485,65 @@ mod tests {
     fn a_scene_without_an_answer_says_why() {
         let over = page(&[record(1, 1, 20.0, 14e-3)]);
         assert!(
-            over.contains(
-                "stack:2: none is good enough; nearest is pgs, 1 sub, 1 lanes, 20.0 µs: 1.40 times its"
-            ),
+            over.contains("stack:2: none is good enough; nearest is pgs, 1 sub @1, 20.0 µs: 1.40 times its"),
             "{over}"
         );
         let text = page(&[failed(1), fell(8, 1, 1.0, 0.0)]);
         assert!(text.contains("stack:2: no setting holds\n"), "{text}");
-        assert!(text.contains("2 settings: 0 hold, 0 are good enough"), "{text}");
+        assert!(text.contains("2 settings: 0 hold, 0 are plausible"), "{text}");
+    }
+
+    #[test]
+    fn the_recommendation_comes_first_and_names_nobody_who_leads_by_one_scene() {
+        let on =
+            |scene: &str, solver, time| Record { scene: scene.into(), solver, ..record(8, 1, time, 1e-3) };
+        let steady = [
+            on("x", "shim", 10.0),
+            on("x", "soft_step", 15.0),
+            on("y", "shim", 5.0),
+            on("y", "soft_step", 9.0),
+        ];
+        let text = page(&steady);
+        assert!(text.starts_with("Use shim: good enough on 2 of 2 scenes"), "{text}");
+        assert!(text.contains("shim, the default, is number 1 of 2"), "{text}");
+        let mut torn = steady.clone();
+        torn[3] = on("y", "soft_step", 1.0);
+        let text = page(&torn);
+        assert!(
+            text.starts_with("No one solver will do") && text.contains("first is one of soft_step, shim"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn what_falls_later_stands_beside_the_winner_with_its_step() {
+        let later = |mark: bool| {
+            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 800 });
+            Some(Later { steps: 3600, seconds: 60.0, broken, rest_speed_m_s: None })
+        };
+        let records = [
+            Record { later: later(true), ..record(8, 1, 5.0, 1e-3) },
+            Record { later: later(false), ..record(8, 2, 9.0, 1e-3) },
+        ];
+        let text = page(&records);
+        assert!(
+            text.contains("! stack:2: pgs, 1 sub (5.00 µs) passes its run, and then fell at step 800"),
+            "{text}"
+        );
+        assert!(text.lines().any(|l| l.starts_with("stack:2") && l.contains("2 sub @8")), "{text}");
+        assert!(later_table(&records).contains("stands"));
+    }
+
+    #[test]
+    fn a_busy_machine_and_what_nobody_checked_are_said() {
+        let mut records = vec![record(8, 1, 5.0, 1e-3)];
+        records[0].sample.as_mut().unwrap().waited = 0.31;
+        records[0].unchecked = vec!["what must hold".into()];
+        let text = page(&records);
+        assert!(
+            text.contains("31 % of the time") && text.contains("NOT CHECKED  stack:2: what must hold"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Which machine and which compiler a result belongs to.
 
+use std::sync::OnceLock;
+
 /// Written beside every result.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Environment {
@@ -22,6 +24,8 @@ pub struct Environment {
     pub debug_assertions: bool,
     /// Version of this crate.
     pub version: String,
+    /// Commit that the program was built from, or `unknown`.
+    pub commit: String,
 }
 
 impl Environment {
@@ -30,13 +34,15 @@ impl Environment {
         Environment {
             cpu: cpu_model(),
             processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
-            compiler: compiler(),
+            // The whole program is searched for it, once.
+            compiler: COMPILER.get_or_init(compiler).clone(),
             architecture: std::env::consts::ARCH.into(),
             system: std::env::consts::OS.into(),
             target_features: target_features(),
             native_lanes: native_lanes(),
             debug_assertions: cfg!(debug_assertions),
             version: env!("CARGO_PKG_VERSION").into(),
+            commit: env!("SIMPULSE_COMMIT").into(),
         }
     }
 }
@@ -56,6 +62,8 @@ impl Environment {
         names.into_iter().find(|(feature, _)| has(feature)).map_or("no SIMD", |(_, name)| name)
     }
 }
+
+static COMPILER: OnceLock<String> = OnceLock::new();
 
 fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

@@ -1,20 +1,29 @@
 //! The study as `study.csv` and `study.json`.
 
+use super::columns::SCHEMA;
+use super::environment::Environment;
 use super::units::is_emulated;
+use crate::engine::clock::Phase;
 use crate::engine::params;
 use crate::engine::solvers::Uses;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
+use crate::lab::scenes::tolerance::Accuracy;
+use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::{Record, StudyPlan};
 use serde_json::{Value, json};
 
 /// One line of the table file; every number is finite, and what there is not is empty.
 #[derive(serde::Serialize)]
 struct Line<'a> {
+    schema_version: u32,
+    commit: &'a str,
+    cpu: &'a str,
+    native_lanes: usize,
     scene: &'a str,
     bodies: usize,
-    dt: f64,
+    dt_s: f64,
     solver: &'a str,
     order: Order,
     lanes: usize,
@@ -23,10 +32,17 @@ struct Line<'a> {
     velocity_iterations: u32,
     relax_iterations: u32,
     position_iterations: u32,
+    impacts: &'a str,
+    parameters: &'a str,
     swept: Option<&'a str>,
     swept_unit: Option<&'a str>,
     swept_value: Option<f64>,
-    median_us: Option<f64>,
+    mean_step_us: Option<f64>,
+    median_step_us: Option<f64>,
+    longest_step_us: Option<f64>,
+    rounds: Option<u32>,
+    waited_share: Option<f64>,
+    noise_share: Option<f64>,
     spread_us: Option<f64>,
     quartile_1_us: Option<f64>,
     quartile_3_us: Option<f64>,
@@ -34,24 +50,29 @@ struct Line<'a> {
     speed_up: Option<f64>,
     steps: Option<u64>,
     points: Option<u64>,
-    penetration_max: Option<f64>,
-    penetration_mean: Option<f64>,
-    penetration_rms: Option<f64>,
-    penetration_p99: Option<f64>,
+    penetration_judged_m: Option<f64>,
+    flight_depth_max_m: Option<f64>,
+    held_depth_p99_m: Option<f64>,
+    rest_depth_max_m: Option<f64>,
+    penetration_max_m: Option<f64>,
+    penetration_mean_m: Option<f64>,
+    penetration_rms_m: Option<f64>,
+    penetration_p99_m: Option<f64>,
     penetration_relative: Option<f64>,
-    penetration_excess: Option<f64>,
-    soft_floor: Option<f64>,
-    law_rms: Option<f64>,
-    law_rms_body: Option<f64>,
-    law_normal_rms: Option<f64>,
-    law_normal_max: Option<f64>,
-    law_tangent_rms: Option<f64>,
-    law_tangent_max: Option<f64>,
+    penetration_excess_m: Option<f64>,
+    soft_floor_m: Option<f64>,
+    residual_rms_lighter_weights: Option<f64>,
+    residual_rms_scene_weights: Option<f64>,
+    residual_rms_body_weights: Option<f64>,
+    residual_normal_rms: Option<f64>,
+    residual_normal_max: Option<f64>,
+    residual_tangent_rms: Option<f64>,
+    residual_tangent_max: Option<f64>,
     complementarity: Option<f64>,
     cone: Option<f64>,
     dissipation: Option<f64>,
-    own_rms: Option<f64>,
-    own_max: Option<f64>,
+    own_residual_rms: Option<f64>,
+    own_residual_max: Option<f64>,
     momentum: Option<f64>,
     angular_momentum: Option<f64>,
     energy_change: Option<f64>,
@@ -59,14 +80,14 @@ struct Line<'a> {
     friction_loss: Option<f64>,
     impact_loss: Option<f64>,
     energy_unexplained: Option<f64>,
-    rest_velocity: Option<f64>,
-    creep: Option<f64>,
-    creep_half_width: Option<f64>,
-    settled: Option<f64>,
-    truth: Option<&'a str>,
-    truth_unit: Option<&'a str>,
-    truth_expected: Option<f64>,
-    truth_error: Option<f64>,
+    rest_speed_m_s: Option<f64>,
+    creep_m_s: Option<f64>,
+    creep_half_width_m_s: Option<f64>,
+    settled_s: Option<f64>,
+    reference: Option<&'a str>,
+    reference_unit: Option<&'a str>,
+    reference_value: Option<f64>,
+    reference_error: Option<f64>,
     contacts: Option<f64>,
     rows: Option<f64>,
     sweeps: Option<f64>,
@@ -76,27 +97,38 @@ struct Line<'a> {
     bytes_per_contact: Option<f64>,
     bits_equal: Option<bool>,
     front_penetration: bool,
-    front_law: bool,
-    front_truth: bool,
-    mark: Option<&'static str>,
-    mark_step: Option<u64>,
-    tolerance_penetration: f64,
-    tolerance_residual: f64,
-    tolerance_truth: Option<f64>,
-    in_tolerance: bool,
+    front_residual: bool,
+    front_reference: bool,
+    holds: &'static str,
     failed_step: Option<u64>,
+    tolerance_penetration_m: f64,
+    tolerance_residual: f64,
+    tolerance_reference: Option<f64>,
+    tolerance_rest_speed_m_s: Option<f64>,
+    plausible: bool,
+    tight: bool,
+    exact: bool,
+    later_seconds: Option<f64>,
+    later_holds: Option<&'static str>,
+    later_failed_step: Option<u64>,
+    later_rest_speed_m_s: Option<f64>,
+    not_checked: String,
     failed_body: Option<usize>,
     failed_speed: Option<f32>,
 }
 
 impl<'a> Line<'a> {
-    fn of(r: &'a Record) -> Self {
+    fn of(r: &'a Record, environment: &'a Environment) -> Self {
         let (sample, errors, truth) = (r.sample.as_ref(), r.errors.as_ref(), r.truth.as_ref());
         let us = |ns: f64| ns / 1e3;
         Line {
+            schema_version: SCHEMA,
+            commit: &environment.commit,
+            cpu: &environment.cpu,
+            native_lanes: environment.native_lanes,
             scene: &r.scene,
             bodies: r.bodies,
-            dt: r.dt,
+            dt_s: r.dt,
             solver: r.solver,
             order: r.order,
             lanes: r.lanes,
@@ -105,10 +137,17 @@ impl<'a> Line<'a> {
             velocity_iterations: r.budget.velocity_iterations,
             relax_iterations: r.budget.relax_iterations,
             position_iterations: r.budget.position_iterations,
+            impacts: r.impacts.name(),
+            parameters: &r.parameters,
             swept: r.swept.map(|s| s.name),
             swept_unit: r.swept.map(|s| s.unit),
             swept_value: r.swept.map(|s| s.value),
-            median_us: sample.map(|l| us(l.median_ns)),
+            mean_step_us: sample.map(|l| us(l.mean_ns)),
+            longest_step_us: sample.map(|l| us(l.worst_ns)),
+            rounds: sample.map(|l| l.rounds),
+            waited_share: sample.map(|l| l.waited),
+            noise_share: sample.map(|l| l.noise),
+            median_step_us: sample.map(|l| us(l.median_ns)),
             spread_us: sample.map(|l| us(l.spread_ns)),
             quartile_1_us: sample.map(|l| us(l.quartiles_ns[0])),
             quartile_3_us: sample.map(|l| us(l.quartiles_ns[1])),
@@ -116,24 +155,29 @@ impl<'a> Line<'a> {
             speed_up: r.speed_up,
             steps: errors.map(|e| e.steps),
             points: errors.map(|e| e.points),
-            penetration_max: errors.map(|e| e.penetration_max),
-            penetration_mean: errors.map(|e| e.penetration_mean),
-            penetration_rms: errors.map(|e| e.penetration_rms),
-            penetration_p99: errors.map(|e| e.penetration_p99),
+            penetration_judged_m: ErrorAxis::Penetration.of(r),
+            flight_depth_max_m: errors.map(|e| e.flight_depth_max),
+            held_depth_p99_m: errors.map(|e| e.held_depth_p99),
+            rest_depth_max_m: errors.map(|e| e.rest_depth_max),
+            penetration_max_m: errors.map(|e| e.penetration_max),
+            penetration_mean_m: errors.map(|e| e.penetration_mean),
+            penetration_rms_m: errors.map(|e| e.penetration_rms),
+            penetration_p99_m: errors.map(|e| e.penetration_p99),
             penetration_relative: errors.map(|e| e.penetration_relative),
-            penetration_excess: errors.and_then(|e| e.penetration_excess),
-            soft_floor: errors.and_then(|e| e.soft_floor),
-            law_rms: errors.map(|e| e.law_rms),
-            law_rms_body: errors.map(|e| e.law_rms_body),
-            law_normal_rms: errors.map(|e| e.law_normal_rms),
-            law_normal_max: errors.map(|e| e.law_normal_max),
-            law_tangent_rms: errors.map(|e| e.law_tangent_rms),
-            law_tangent_max: errors.map(|e| e.law_tangent_max),
+            penetration_excess_m: errors.and_then(|e| e.penetration_excess),
+            soft_floor_m: errors.and_then(|e| e.soft_floor),
+            residual_rms_lighter_weights: errors.map(|e| e.law_rms_lighter),
+            residual_rms_scene_weights: errors.map(|e| e.law_rms),
+            residual_rms_body_weights: errors.map(|e| e.law_rms_body),
+            residual_normal_rms: errors.map(|e| e.law_normal_rms),
+            residual_normal_max: errors.map(|e| e.law_normal_max),
+            residual_tangent_rms: errors.map(|e| e.law_tangent_rms),
+            residual_tangent_max: errors.map(|e| e.law_tangent_max),
             complementarity: errors.map(|e| e.complementarity),
             cone: errors.map(|e| e.cone),
             dissipation: errors.map(|e| e.dissipation),
-            own_rms: errors.and_then(|e| e.own_rms),
-            own_max: errors.and_then(|e| e.own_max),
+            own_residual_rms: errors.and_then(|e| e.own_rms),
+            own_residual_max: errors.and_then(|e| e.own_max),
             momentum: errors.map(|e| e.momentum),
             angular_momentum: errors.map(|e| e.angular_momentum),
             energy_change: errors.map(|e| e.energy_change),
@@ -141,14 +185,14 @@ impl<'a> Line<'a> {
             friction_loss: errors.map(|e| e.friction_loss),
             impact_loss: errors.map(|e| e.impact_loss),
             energy_unexplained: errors.map(|e| e.energy_unexplained),
-            rest_velocity: errors.map(|e| e.rest_velocity),
-            creep: errors.map(|e| e.creep),
-            creep_half_width: errors.map(|e| e.creep_half_width),
-            settled: errors.and_then(|e| e.settled),
-            truth: truth.map(|t| t.quantity),
-            truth_unit: truth.map(|t| t.unit),
-            truth_expected: truth.map(|t| t.expected),
-            truth_error: truth.and_then(|t| t.error),
+            rest_speed_m_s: errors.map(|e| e.rest_velocity),
+            creep_m_s: errors.map(|e| e.creep),
+            creep_half_width_m_s: errors.map(|e| e.creep_half_width),
+            settled_s: errors.and_then(|e| e.settled),
+            reference: truth.map(|t| t.quantity),
+            reference_unit: truth.map(|t| t.unit),
+            reference_value: truth.map(|t| t.expected),
+            reference_error: truth.and_then(|t| t.error),
             contacts: sample.map(|l| l.load.contacts),
             rows: sample.map(|l| l.load.rows),
             sweeps: sample.map(|l| l.load.sweeps),
@@ -158,15 +202,22 @@ impl<'a> Line<'a> {
             bytes_per_contact: sample.map(|l| l.load.bytes_per_contact),
             bits_equal: r.bits_equal,
             front_penetration: r.front.penetration,
-            front_law: r.front.law,
-            front_truth: r.front.truth,
-            mark: r.mark().map(|m| m.word()),
-            mark_step: r.broken.map(|b| b.step).or(r.failure.map(|f| f.step)),
-            tolerance_penetration: r.tolerances.penetration.value,
+            front_residual: r.front.law,
+            front_reference: r.front.truth,
+            holds: r.mark().map_or("yes", |m| m.word()),
+            failed_step: r.broken.map(|b| b.step).or(r.failure.map(|f| f.step)),
+            tolerance_penetration_m: r.tolerances.penetration.value,
             tolerance_residual: r.tolerances.residual.value,
-            tolerance_truth: r.tolerances.truth.map(|t| t.value),
-            in_tolerance: r.excess() <= 1.0,
-            failed_step: r.failure.map(|f| f.step),
+            tolerance_reference: r.tolerances.truth.map(|t| t.value),
+            tolerance_rest_speed_m_s: r.tolerances.rest.map(|t| t.value),
+            plausible: r.is_good(Accuracy::Plausible),
+            tight: r.is_good(Accuracy::Tight),
+            exact: r.is_good(Accuracy::Exact),
+            later_seconds: r.later.map(|l| l.seconds),
+            later_holds: r.later.map(|l| l.broken.map_or("yes", |b| b.mark.word())),
+            later_failed_step: r.later.and_then(|l| l.broken).map(|b| b.step),
+            later_rest_speed_m_s: r.later.and_then(|l| l.rest_speed_m_s),
+            not_checked: r.unchecked.join("; "),
             failed_body: r.failure.map(|f| f.body),
             failed_speed: r.failure.and_then(|f| f.speed),
         }
@@ -174,10 +225,28 @@ impl<'a> Line<'a> {
 }
 
 /// `study.csv`: a line per record. Lengths in m, times in µs and ns, shares in 1.
-pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Error> {
+    let failed = |e: csv::Error| Error::invalid("study.csv", e.to_string());
+    // Columns of the line, and one for each phase: no writer takes both at once.
+    let mut line = csv::WriterBuilder::new().from_writer(Vec::new());
     for record in records {
-        writer.serialize(Line::of(record)).map_err(|e| Error::invalid("study.csv", e.to_string()))?;
+        line.serialize(Line::of(record, environment)).map_err(failed)?;
+    }
+    let lines = line.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))?;
+    let mut reader = csv::Reader::from_reader(&lines[..]);
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    if !records.is_empty() {
+        let mut header: Vec<String> = reader.headers().map_err(failed)?.iter().map(String::from).collect();
+        header.extend(Phase::ALL.map(|phase| format!("{}_ns", phase.name().replace(' ', "_"))));
+        writer.write_record(&header).map_err(failed)?;
+    }
+    for (row, record) in reader.records().zip(records) {
+        let mut row: Vec<String> = row.map_err(failed)?.iter().map(String::from).collect();
+        let ns = |phase: Phase| {
+            record.sample.as_ref().map_or(String::new(), |s| s.phase_ns[phase as usize].to_string())
+        };
+        row.extend(Phase::ALL.map(ns));
+        writer.write_record(&row).map_err(failed)?;
     }
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
@@ -218,6 +287,7 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
         "lanes": plan.widths.iter().map(|w| w.lanes()).collect::<Vec<_>>(),
         "orders": plan.orders,
+        "impacts": plan.impacts,
         "budgets": plan.budgets,
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,
@@ -246,9 +316,11 @@ mod tests {
 
     #[test]
     fn every_column_is_documented() {
-        let bytes = csv(&[record(8, 1, 1.0, 0.0)]).unwrap();
+        let bytes = csv(&[record(8, 1, 1.0, 0.0)], &Environment::current()).unwrap();
         let text = String::from_utf8(bytes).unwrap();
         let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
-        assert_eq!(header, STUDY.names());
+        assert!(STUDY.documents(&header), "{header:?}");
+        // Words for one thing: a line of another study stands beside it.
+        assert!(header.iter().all(|n| !n.contains("law") && !n.contains("truth") && !n.contains("mark")));
     }
 }

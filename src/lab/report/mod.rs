@@ -37,6 +37,8 @@ pub fn tables(records: &[Record]) -> String {
         text += &table::scene_table(scene);
         text += "\n";
     }
+    text += &answer::later_table(records);
+    text += &table::impacts_table(records);
     let (slices, profiles) = (profiles::slice_tables(records), profiles::profile_table(records));
     text + &slices + "\n" + &profiles
 }
@@ -50,7 +52,7 @@ pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Err
     let records = &study.records;
     let mut contents = vec![
         ("tables.txt", tables(records).into_bytes()),
-        ("study.csv", export::csv(records)?),
+        ("study.csv", export::csv(records, &study.environment)?),
         ("study.json", study.to_json()?),
     ];
     if sweep::is_sweep(records) {

@@ -1,5 +1,6 @@
 //! `study.json`: everything that a study chose and measured, written and read back.
 
+use super::columns::SCHEMA;
 use super::environment::Environment;
 use super::export::settings;
 use crate::lab::error::Error;
@@ -14,6 +15,8 @@ pub const NAME: &str = "study.json";
 /// A study: whole, cut short, or put together.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StudyFile {
+    /// [`SCHEMA`]
+    pub schema_version: u32,
     /// Where it ran; of a study that was put together, where its first part did.
     pub environment: Environment,
     /// Everything that was chosen.
@@ -41,6 +44,7 @@ impl StudyFile {
     /// A study that ran here, without some of its scenes.
     pub fn new(plan: &StudyPlan, records: Vec<Record>, missing_scenes: Vec<String>) -> Self {
         StudyFile {
+            schema_version: SCHEMA,
             environment: Environment::current(),
             settings: settings(plan),
             missing_scenes,
@@ -63,6 +67,7 @@ impl StudyFile {
         };
         let Some(first) = parts.first() else { return Err(Error::invalid("merge", "no parts given")) };
         let mut whole = StudyFile {
+            schema_version: SCHEMA,
             environment: first.environment.clone(),
             settings: first.settings.clone(),
             missing_scenes: Vec::new(),
@@ -140,6 +145,7 @@ impl StudyFile {
     pub fn to_json(&self) -> Result<Vec<u8>, Error> {
         let failed = |e: serde_json::Error| Error::invalid(NAME, e.to_string());
         let head = serde_json::to_string_pretty(&StudyFile {
+            schema_version: SCHEMA,
             environment: self.environment.clone(),
             settings: self.settings.clone(),
             missing_scenes: self.missing_scenes.clone(),
@@ -159,6 +165,23 @@ impl StudyFile {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let path: PathBuf = if path.is_dir() { path.join(NAME) } else { path.into() };
         let text = std::fs::read(&path).map_err(Error::io(&path))?;
+        #[derive(Deserialize)]
+        struct Head {
+            #[serde(default)]
+            schema_version: Option<u32>,
+            environment: Option<Value>,
+        }
+        if let Ok(Head { schema_version, environment }) = serde_json::from_slice(&text)
+            && schema_version != Some(SCHEMA)
+            && (schema_version.is_some() || environment.is_some())
+        {
+            let by = environment.as_ref().and_then(|e| e["version"].as_str()).unwrap_or("an unknown version");
+            let version = schema_version.unwrap_or(1);
+            let message = format!(
+                "a study of schema version {version} (written by simpulse {by}); this program reads version {SCHEMA}: run the study again"
+            );
+            return Err(Error::Format { path, message });
+        }
         serde_json::from_slice(&text).map_err(|e| Error::Format { path, message: e.to_string() })
     }
 }
@@ -236,5 +259,10 @@ mod tests {
         let message = StudyFile::read(&path).unwrap_err().to_string();
         assert!(message.contains("x.json") && message.contains("line 2"), "{message}");
         assert!(StudyFile::read(folder.path()).unwrap_err().to_string().contains(NAME));
+        // One of an older program: not where it fails, but what it is.
+        std::fs::write(&path, "{\"environment\": {\"version\": \"0.0.9\"}, \"records\": [{}]}").unwrap();
+        let message = StudyFile::read(&path).unwrap_err().to_string();
+        assert!(message.contains("schema version 1") && message.contains("0.0.9"), "{message}");
+        assert!(!message.contains("column"), "{message}");
     }
 }

@@ -3,7 +3,7 @@
 use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
-use crate::lab::study::{Fronts, Record, TruthError};
+use crate::lab::study::{self, Fronts, Record, TruthError};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 /// What the columns of [`scene_table`] are, once for the whole study.
@@ -11,10 +11,10 @@ pub const LEGEND: &str = "\
 budget: substeps, and in each so many velocity (vel), relaxation (rel) and position (pos) sweeps.
 lanes: natural is one contact after the other in natural order, numbers are lanes in coloured order; the
 errors are the same for all lane widths of a budget.
-µs/step: median, ± median deviation of a repeat.  ns/row: a sweep, per constraint row that it solves.
+µs/step: mean over the run, its median and its longest step, ± median deviation of a repeat.  ns/row: a sweep, per constraint row that it solves.
 speed-up: over 1 lane.  holds: yes, or what happened (fell, slid, tunnelled, blew up).
-penetration: greatest, and mean over contact points and steps.  residual: rms of the contact law, in the
-weight of the whole scene × step, and in the mean weight of a body × step.
+penetration: as judged (99 % of contact points, and the deepest at rest), and greatest.  residual: rms of the
+contact law, in the weight of the lighter body × step, and in the mean weight of a body × step.
 energy, momentum: gained or lost, relative.  rest speed: rms over the last second.
 reference: distance to the scene's reference value; missed if the run never came to it, – if none is known.
 sweeps: per step.  colours: of contacts.  occupancy: lanes that hold a contact.
@@ -57,13 +57,15 @@ pub fn scene_table(records: &[Record]) -> String {
         "budget",
         "lanes",
         "µs/step",
+        "median",
+        "longest",
         "±",
         "ns/row",
         "speed-up",
         "holds",
-        "penetration\nmax",
-        "\nmean",
-        "residual\nscene",
+        "penetration\njudged",
+        "\nmax",
+        "residual\nlighter",
         "\nbody",
         "energy",
         "momentum",
@@ -113,13 +115,15 @@ fn row(record: &Record) -> Vec<String> {
     const NOTHING: &str = "–";
     let mut cells = vec![record.solver.to_string(), record.budget_text.clone(), lanes(record)];
     let Some(sample) = &record.sample else {
-        cells.resize(7, NOTHING.to_string());
+        cells.resize(9, NOTHING.to_string());
         cells.push(record.mark().map_or("failed", |mark| mark.word()).to_string());
-        cells.resize(20, NOTHING.to_string());
+        cells.resize(22, NOTHING.to_string());
         return cells;
     };
     cells.extend([
+        digits(sample.mean_ns / 1e3),
         digits(sample.median_ns / 1e3),
+        digits(sample.worst_ns / 1e3),
         digits(sample.spread_ns / 1e3),
         digits(sample.row_sweep_ns),
         record.speed_up.map_or(NOTHING.to_string(), digits),
@@ -128,9 +132,9 @@ fn row(record: &Record) -> Vec<String> {
     let error = |show: &dyn Fn(&Errors) -> String| errors.map_or(NOTHING.to_string(), show);
     cells.extend([
         record.mark().map_or("yes", |mark| mark.word()).to_string(),
+        error(&|e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
         error(&|e| si(e.penetration_max, "m")),
-        error(&|e| si(e.penetration_mean, "m")),
-        error(&|e| ratio(e.law_rms)),
+        error(&|e| ratio(e.law_rms_lighter)),
         error(&|e| ratio(e.law_rms_body)),
         error(&|e| ratio(e.energy_change)),
         error(&|e| ratio(e.momentum)),
@@ -151,6 +155,26 @@ fn front(fronts: &Fronts) -> String {
     let marks = [(fronts.penetration, 'p'), (fronts.law, 'l'), (fronts.truth, 't')];
     let on: String = marks.iter().filter(|m| m.0).map(|m| m.1).collect();
     if on.is_empty() { "–".to_string() } else { on }
+}
+
+/// What waves of impacts gain and cost; empty where nothing ran with both treatments.
+pub fn impacts_table(records: &[Record]) -> String {
+    let found = study::impacts::gains(records);
+    if found.is_empty() {
+        return String::new();
+    }
+    let mut rows =
+        table(&["scene", "solver", "settings", "hold", "with waves", "residual", "reference", "time"]);
+    for g in found {
+        let times = |x: Option<f64>| x.map_or("–".to_string(), |x| format!("{}×", digits(x)));
+        let counts = [g.settings, g.holds[0], g.holds[1]].map(|n| n.to_string());
+        let ratios = [times(Some(g.residual)), times(g.reference), times(g.time)];
+        rows.add_row([g.scene, g.solver.into()].into_iter().chain(counts).chain(ratios));
+    }
+    format!(
+        "--impacts waves, in times the solver's own treatment (median over settings)\n{}\n",
+        finish(rows, 2)
+    )
 }
 
 /// The errors that stand beside a time, on one line.
@@ -178,9 +202,13 @@ pub fn error_list(errors: &Errors) -> String {
         ("penetration mean", Some(length(e.penetration_mean))),
         ("penetration rms", Some(length(e.penetration_rms))),
         ("penetration 99 %", Some(length(e.penetration_p99))),
+        ("penetration held, 99 %", Some(length(e.held_depth_p99))),
+        ("penetration at rest, max", Some(length(e.rest_depth_max))),
+        ("flown into before a contact, max", Some(length(e.flight_depth_max))),
         ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
         ("soft contacts give way, last second", e.soft_floor.map(length)),
         ("penetration beyond that", e.penetration_excess.map(length)),
+        ("law residual, rms, lighter weights", Some(ratio(e.law_rms_lighter))),
         ("law residual, rms, body weights", Some(ratio(e.law_rms_body))),
         ("law residual, rms, scene weights", Some(ratio(e.law_rms))),
         ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
@@ -220,14 +248,14 @@ mod tests {
         wrong.bits_equal = Some(false);
         let text = scene_table(&[record(1, 1, 20.0, 1.234e-3), wrong, failed(1), fell(8, 3, 5.0, 0.1)]);
         assert!(text.contains(" fell ") && text.contains(" yes "), "{text}");
-        assert_eq!(text.matches("1.23 mm").count(), 2, "{text}");
+        assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
         assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
         // No cell is blank.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();
-        assert_eq!(lines, [20; 4], "{text}");
+        assert_eq!(lines, [22; 4], "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 200), "{text}");
         assert!(scene_table(&[]).is_empty());
     }

@@ -51,9 +51,9 @@ pub(super) const ARCH: Entry = Entry::new("arch", "an arch of 17 stones with fou
     Scene::new("arch", bodies)
 })
 .known(|scene, _| stands(scene))
-.holds(&[Demand::Stands])
+.holds(&[Demand::Stands, Demand::Rests])
 // Eight joints up to the keystone, its own, and four boxes.
-.within(|_, _| Tolerances::standard().joints(13.0));
+.within(|scene, _| Tolerances::standard(scene).joints(13.0));
 
 /// The points are the stone's in the world; its body stands at the origin.
 fn stone(points: [[f64; 2]; 4]) -> SceneBody {

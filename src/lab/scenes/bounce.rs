@@ -28,7 +28,7 @@ pub(super) const BOUNCE: Entry =
     })
     .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)))
     .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, apex| tolerances(scene, 10.0, apex));
+    .within(tolerances);
 
 pub(super) const ELASTIC: Entry =
     Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces for ever", |_| {
@@ -37,13 +37,14 @@ pub(super) const ELASTIC: Entry =
     })
     .known(|scene, _| truth("apexes of twenty bounces", scene, 1.0, 1.0, 20))
     .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, apex| tolerances(scene, 1.0, apex));
+    .within(tolerances);
 
-/// From `height` (m), rising to `apex` (m) after the first impact.
-fn tolerances(scene: &Scene, height: f64, apex: f64) -> Tolerances {
-    Tolerances::impacts(scene, height)
-        .residual(2.0, "a rebound is compared with the approach at the step's start: up to 1 + e weights")
-        .truth((2.0 * G * apex).sqrt() * scene.dt, "a rebound that is a step early or late")
+/// Rising to `apex` (m) after the first impact.
+fn tolerances(scene: &Scene, apex: f64) -> Tolerances {
+    Tolerances::impacts(scene).fixed(
+        (2.0, "a rebound is compared with the approach at the step's start: up to 1 + e weights"),
+        ((2.0 * G * apex).sqrt() * scene.dt, "a rebound that is a step early or late"),
+    )
 }
 
 fn scene(name: &str, height: f64, restitution: f64) -> Scene {

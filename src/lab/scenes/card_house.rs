@@ -36,9 +36,9 @@ pub(super) const HOUSE: Entry = Entry::new("card_house", "a house of 40 cards, f
     Scene::new("card_house", bodies)
 })
 .known(|scene, _| stands(scene))
-.holds(&[Demand::Stands])
-.within(|_, _| {
-    Tolerances::standard()
+.holds(&[Demand::Stands, Demand::Rests])
+.within(|scene, _| {
+    Tolerances::standard(scene)
         .penetration(0.004, "a hundredth of a card's length")
         .truth(0.042, "2 mm in each of ten joints, and the 22 mm of air that the house is built with")
 });

@@ -55,6 +55,9 @@ impl Scene {
             let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);
             return Err(Error::invalid("steps", message));
         }
+        if let Some(expect) = &self.expect {
+            expect.validate(self).map_err(|e| e.within("expect"))?;
+        }
         if self.bodies.is_empty() {
             return Err(Error::invalid("bodies", "there are none: a scene needs at least one"));
         }

@@ -8,18 +8,10 @@ use rand_pcg::Pcg64Mcg;
 /// Cell of the grid in which the discs start (m).
 const CELL: f64 = 1.1;
 
-/// Share of the height of all cells by which the highest disc falls. The mean area of a disc is
-/// π (0.5³ − 0.3³)/(3 · 0.2) = 0.513 m² of a cell's 1.21 m²; piled at random, discs fill 0.82 of
-/// their space.
-const FALL: f64 = 1.0 - 0.513 / 1.21 / 0.82;
-
 pub(super) const PILE: Entry = Entry::new("circle_pile", "a box of discs at random", |count| pile(count, 1))
     .sized(1000, 1, 100_000, "discs")
     .seeded(pile)
-    .within(|scene, _| {
-        let rows = (scene.bodies.len() - 3) as f64;
-        Tolerances::impacts(scene, FALL * CELL * rows.sqrt().ceil())
-    });
+    .within(|scene, _| Tolerances::impacts(scene));
 
 /// A disc of radius 0.3 to 0.5 in each cell, up to 0.05 m off its middle: 0.55 m at
 /// most, half a cell, so that none touch. The box is a square of cells wide and

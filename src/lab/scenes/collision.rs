@@ -30,7 +30,7 @@ pub(super) const OBLIQUE: Entry =
         Truth::new("outgoing speeds, from 0.75 s on", "m/s", 0.8 * SPEED, truth)
     })
     .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, speed| Tolerances::fast(scene, SPEED).percent(speed));
+    .within(|scene, speed| Tolerances::impacts(scene).percent(speed));
 
 /// The worse of the two speeds.
 fn error(view: &View) -> f64 {

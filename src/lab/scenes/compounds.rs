@@ -31,7 +31,7 @@ pub(super) const COMPOUNDS: Entry =
     })
     .holds(&[Demand::Contains(Outside(below_floor))])
     // A body fills 1.5 m² of its 4.5, and half of what is left between piled ones: the rows sink by half.
-    .within(|scene, _| Tolerances::impacts(scene, 0.5 * 2.25 * 150.0).truth(0.5, "none"));
+    .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
 /// Leaning to the left for −1, to the right for 1.
 fn triangle(side: f64) -> SceneShape {

@@ -26,4 +26,4 @@ pub(super) const DOMINOES: Entry =
         Scene::new("double_domino", bodies)
     })
     // A domino's top falls from its height of a metre.
-    .within(|scene, _| Tolerances::impacts(scene, 1.0));
+    .within(|scene, _| Tolerances::impacts(scene));

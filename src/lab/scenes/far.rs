@@ -25,8 +25,8 @@ pub(super) const STACK: Entry =
         let twin = Twin { scene: moved(scene.clone(), [-x, -y]), shift: [x, y], world: None, worst: None };
         Truth::new("distance to the same stack at the origin, all steps", "m", 0.0, twin)
     })
-    .holds(&[Demand::Stands])
-    .within(|_, _| Tolerances::standard().joints(1.0));
+    .holds(&[Demand::Stands, Demand::Rests])
+    .within(|scene, _| Tolerances::standard(scene).joints(1.0));
 
 fn shift(exponent: u32) -> [f64; 2] {
     let distance = 10.0_f64.powi(exponent as i32);

@@ -4,6 +4,7 @@
 //! [`Scene::body_defs`] rounds geometry to `f32`. Writing a valid scene and
 //! reading it back therefore gives the same bits.
 
+use super::expect::Expect;
 use super::place::place_at;
 use crate::engine::bodies::BodyKind;
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
@@ -31,6 +32,9 @@ pub struct Scene {
     /// Number of steps of a run, ≥ 1.
     #[serde(default = "default_steps")]
     pub steps: u32,
+    /// What a run is held to; none: it is not checked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expect: Option<Expect>,
     /// In the order in which a world numbers them.
     pub bodies: Vec<SceneBody>,
 }
@@ -281,8 +285,10 @@ impl Scene {
         // Infallible: every map key is a string and nothing here can fail to serialise.
         let line = |value: serde_json::Result<String>| value.unwrap_or_default();
         let bodies: Vec<String> = self.bodies.iter().map(|b| line(serde_json::to_string(b))).collect();
+        let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));
+        let expect = expect.map_or(String::new(), |text| format!("\"expect\": {text}, "));
         format!(
-            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, \"bodies\": [\n{}\n]}}\n",
+            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {expect}\"bodies\": [\n{}\n]}}\n",
             line(serde_json::to_string(&self.name)),
             line(serde_json::to_string(&self.gravity)),
             line(serde_json::to_string(&self.dt)),

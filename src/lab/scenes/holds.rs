@@ -69,6 +69,12 @@ pub enum Demand {
     StaysWithin(f64),
     /// No body is outside.
     Contains(Outside),
+    /// No dynamic body's centre is outside of this box, given by its lowest and highest corner (m).
+    Inside([[f64; 2]; 2]),
+    /// What moves comes to rest. How much may move in the end is a tolerance
+    /// ([`Tolerances::rest`](super::tolerance::Tolerances::rest)); here it says that the scene has to stand for a
+    /// minute.
+    Rests,
     /// Kinetic and potential energy never exceed those of the start by more than [`GAIN`] of the
     /// largest kinetic energy so far.
     GainsNoEnergy,
@@ -86,6 +92,9 @@ pub const LEFT: f64 = 0.5;
 /// by up to m g h v/2, that is g h/v of it: 4 % at 4.5 m/s in steps of 1/60 s.
 pub const GAIN: f64 = 0.1;
 
+/// What comes to rest has to stand for so long (s).
+pub const HORIZON: f64 = 60.0;
+
 impl Demand {
     /// In words.
     pub fn meaning(&self) -> String {
@@ -94,6 +103,11 @@ impl Demand {
             Demand::StaysStacked => "the bodies end up one above the other (fell)".to_string(),
             Demand::StaysWithin(limit) => format!("no body leaves its place by more than {limit} m (slid)"),
             Demand::Contains(_) => "no body gets out (tunnelled)".to_string(),
+            Demand::Inside([low, high]) => format!(
+                "no body leaves the box from ({}, {}) to ({}, {}) m (tunnelled)",
+                low[0], low[1], high[0], high[1]
+            ),
+            Demand::Rests => format!("it comes to rest, and stands for {HORIZON} s"),
             Demand::GainsNoEnergy => "the energy does not grow (blew up)".to_string(),
         }
     }
@@ -102,8 +116,8 @@ impl Demand {
         match self {
             Demand::Stands | Demand::StaysStacked => Mark::Fell,
             Demand::StaysWithin(_) => Mark::Slid,
-            Demand::Contains(_) => Mark::Tunnelled,
-            Demand::GainsNoEnergy => Mark::BlewUp,
+            Demand::Contains(_) | Demand::Inside(_) => Mark::Tunnelled,
+            Demand::Rests | Demand::GainsNoEnergy => Mark::BlewUp,
         }
     }
 }
@@ -111,7 +125,7 @@ impl Demand {
 /// Watches a run from before its first step.
 #[derive(Clone, Debug)]
 pub struct Watch {
-    demands: &'static [Demand],
+    demands: Vec<Demand>,
     start: Vec<DVec2>,
     previous: Vec<DVec2>,
     /// From the centre of mass to the farthest point; infinite unless dynamic (m).
@@ -127,7 +141,8 @@ pub struct Watch {
 
 impl Watch {
     /// For a world that has not taken a step yet.
-    pub fn new(world: &World, demands: &'static [Demand]) -> Self {
+    pub fn new(world: &World, demands: impl Into<Vec<Demand>>) -> Self {
+        let demands = demands.into();
         let start = centers(world);
         let mut reach = vec![0.0_f64; world.bodies.len()];
         for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
@@ -213,6 +228,11 @@ impl Watch {
                 .filter(|&i| world.bodies.is_dynamic(i))
                 .all(|i| now[i].distance(self.start[i]) <= *limit),
             Demand::Contains(Outside(count)) => count(&View::of(world)) == 0,
+            Demand::Inside([low, high]) => (0..now.len()).filter(|&i| world.bodies.is_dynamic(i)).all(|i| {
+                let inside = |k: usize| (low[k]..=high[k]).contains(&now[i][k]);
+                inside(0) && inside(1)
+            }),
+            Demand::Rests => true,
             Demand::GainsNoEnergy => {
                 let [kinetic, potential] = energies(world);
                 kinetic + potential - self.energy[0] <= GAIN * self.energy[1].max(kinetic)
@@ -352,7 +372,7 @@ mod tests {
     }
 
     /// What is broken once body `i` is at `place`.
-    fn moved(name: &str, demands: &'static [Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
+    fn moved(name: &str, demands: &[Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
         let mut world = build(&load(name).unwrap().scene);
         let mut watch = Watch::new(&world, demands);
         watch.observe(&world);
@@ -382,6 +402,10 @@ mod tests {
         assert_eq!(moved("stack:1", &[], 1, [0.0, 0.01]), None);
         assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunnelled));
         assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunnelled));
+        let yard = &[Demand::Inside([[-1.0, 0.0], [1.0, 2.0]]), Demand::Rests];
+        assert_eq!(moved("stack:1", yard, 1, [0.9, 1.9]), None);
+        assert_eq!(moved("stack:1", yard, 1, [0.9, 2.1]), Some(Mark::Tunnelled));
+        assert_eq!(moved("stack:1", yard, 1, [f32::NAN, 1.0]), Some(Mark::Tunnelled));
         // Past the end of the ground.
         let outside = &[Demand::Contains(Outside(|view| usize::from(view.center(1)[0] > 1.0)))];
         assert_eq!(moved("stack:1", outside, 1, [2.0, 0.5]), Some(Mark::Tunnelled));
@@ -390,7 +414,7 @@ mod tests {
     #[test]
     fn energy_from_nowhere_is_a_blow_up() {
         let mut world = build(&load("bounce").unwrap().scene);
-        let mut watch = Watch::new(&world, &[Demand::GainsNoEnergy]);
+        let mut watch = Watch::new(&world, [Demand::GainsNoEnergy]);
         let fall = |world: &mut World, y: f32, v: f32| {
             (world.bodies.position_y[1], world.bodies.velocity_y[1]) = (y, v);
         };

@@ -21,28 +21,28 @@ pub(super) const STICK: Entry =
         scene("incline_stick", SceneShape::rectangle(0.5, 0.5), 0.26).steps(3600)
     })
     .known(|_, _| truth("drift down the slope, all steps", 0.0, 0.0))
-    .holds(&[Demand::StaysWithin(0.05)])
-    .within(|_, _| Tolerances::standard().joints(1.0));
+    .holds(&[Demand::StaysWithin(0.05), Demand::Rests])
+    .within(|scene, _| Tolerances::standard(scene).joints(1.0));
 
 pub(super) const SLIP: Entry =
     Entry::new("incline_slip", "a box on an incline, just too steep for it", |_| {
         scene("incline_slip", SceneShape::rectangle(0.5, 0.5), 0.24).steps(120)
     })
     .known(|scene, _| truth("distance slid, all steps", slipping(0.24), end_time(scene)))
-    .within(|_, way| Tolerances::standard().percent(way));
+    .within(|scene, way| Tolerances::standard(scene).percent(way));
 
 pub(super) const ROLL: Entry = Entry::new("rolling_incline", "a disc that rolls down an incline", |_| {
     scene("rolling_incline", SceneShape::disc(0.5), 0.6).steps(120)
 })
 .known(|scene, _| truth("distance rolled, all steps", 2.0 / 3.0 * G * SLOPE.sin(), end_time(scene)))
-.within(|_, way| Tolerances::standard().percent(way));
+.within(|scene, way| Tolerances::standard(scene).percent(way));
 
 pub(super) const SLIPPING_DISC: Entry =
     Entry::new("slipping_disc", "a disc on an incline with too little friction to roll", |_| {
         scene("slipping_disc", SceneShape::disc(0.5), 0.05).steps(120)
     })
     .known(|scene, _| truth("distance slid, all steps", slipping(0.05), end_time(scene)))
-    .within(|_, way| Tolerances::standard().percent(way));
+    .within(|scene, way| Tolerances::standard(scene).percent(way));
 
 /// m/s²
 const G: f64 = -DEFAULT_GRAVITY[1];

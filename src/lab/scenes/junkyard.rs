@@ -29,7 +29,7 @@ pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a 
 })
 .holds(&[Demand::Contains(Outside(below_floor))])
 // The highest row starts at 54 m.
-.within(|scene, _| Tolerances::impacts(scene, 54.0).truth(0.5, "none"));
+.within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
 /// Five points on a circle of radius 0.25 m, each a golden angle on from the last.
 fn pentagon() -> SceneShape {

@@ -13,6 +13,8 @@ mod collision;
 mod column;
 mod compounds;
 mod dominoes;
+pub mod expect;
+mod expected;
 mod far;
 mod format;
 mod free;
@@ -37,12 +39,15 @@ mod washer;
 pub const SCHEMA: &str = include_str!("scene.schema.json");
 
 pub use check::{MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
+pub use expect::Measure;
+pub use expected::loaded as expecting;
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };
 pub use truth::{Observer, Truth};
 
 use crate::lab::error::Error;
+use expect::Expect;
 use holds::Demand;
 use tolerance::Tolerances;
 
@@ -134,7 +139,7 @@ pub struct Outline {
 
 impl Entry {
     const fn new(name: &'static str, summary: &'static str, build: fn(u32) -> Scene) -> Self {
-        let tolerances = |_: &Scene, _| Tolerances::standard();
+        let tolerances = |scene: &Scene, _| Tolerances::standard(scene);
         let (size, seeded, truth, outline) = (None, None, None, None);
         Self { name, summary, size, build, seeded, truth, outline, demands: &[], tolerances }
     }
@@ -164,10 +169,14 @@ impl Entry {
     }
 
     /// A scene of this entry, with what is known about a run of its steps at its step.
-    pub fn loaded(&self, scene: Scene, size: u32) -> Loaded {
+    pub fn loaded(&self, mut scene: Scene, size: u32) -> Loaded {
         let truth = self.truth.map(|truth| truth(&scene, size));
-        let tolerances = (self.tolerances)(&scene, truth.as_ref().map_or(0.0, |t| t.expected));
-        Loaded { scene, truth, demands: self.demands, tolerances }
+        let mut tolerances = (self.tolerances)(&scene, truth.as_ref().map_or(0.0, |t| t.expected));
+        let rests = self.demands.iter().any(|d| matches!(d, Demand::Rests));
+        tolerances.rest = rests.then(|| Tolerances::resting(&scene));
+        let name = if self.size.is_some() { format!("{}:{size}", self.name) } else { self.name.to_string() };
+        scene.expect = Some(Expect::of(&name, self.demands, truth.as_ref(), &tolerances));
+        Loaded { scene, truth, demands: self.demands.to_vec(), tolerances, unchecked: Vec::new() }
     }
 
     /// The size of this text.
@@ -192,9 +201,18 @@ pub struct Loaded {
     /// None where nothing is known.
     pub truth: Option<Truth>,
     /// What a run has to meet.
-    pub demands: &'static [Demand],
+    pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,
+    /// What nobody checks, in words: a file need not say what must hold.
+    pub unchecked: Vec<String>,
+}
+
+impl Loaded {
+    /// Whether it is demanded that the scene comes to rest, so that it has to stand for a minute.
+    pub fn rests(&self) -> bool {
+        self.demands.iter().any(|d| matches!(d, Demand::Rests))
+    }
 }
 
 /// A scene by its name, with its size after a colon: `arch`, `stack`, `stack:40`.
@@ -250,15 +268,17 @@ pub struct Description {
     /// What the reference value is of, the value, its unit.
     pub reference: Option<(&'static str, f64, &'static str)>,
     /// What a run has to meet.
-    pub demands: &'static [Demand],
+    pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,
+    /// What nobody checks, in words.
+    pub unchecked: Vec<String>,
 }
 
 impl Description {
     /// Of a scene that is there.
     pub fn of(loaded: &Loaded) -> Self {
-        let Loaded { scene, truth, demands, tolerances } = loaded;
+        let Loaded { scene, truth, demands, tolerances, unchecked } = loaded;
         Description {
             name: scene.name.clone(),
             bodies: scene.bodies.len(),
@@ -266,8 +286,9 @@ impl Description {
             dt: scene.dt,
             gravity: scene.gravity,
             reference: truth.as_ref().map(|t| (t.quantity, t.expected, t.unit)),
-            demands,
+            demands: demands.clone(),
             tolerances: *tolerances,
+            unchecked: unchecked.clone(),
         }
     }
 }
@@ -283,8 +304,9 @@ pub fn describe(name: &str, seed: Option<u64>) -> Result<Description, Error> {
     };
     let Outline { bodies, reference } = outline(size);
     let smallest = (entry.build)(min);
-    let tolerances = (entry.tolerances)(&smallest, reference);
+    let mut tolerances = (entry.tolerances)(&smallest, reference);
     let common = Description::of(&entry.loaded(smallest, min));
+    tolerances.rest = common.tolerances.rest;
     Ok(Description {
         name: format!("{}:{size}", entry.name),
         bodies,

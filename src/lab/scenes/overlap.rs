@@ -19,6 +19,4 @@ pub(super) const RECOVERY: Entry =
         Scene::new("overlap_recovery", bodies)
     })
     .known(|scene, _| rests_on_ground(scene))
-    .within(|scene, load| {
-        Tolerances::impacts(scene, 0.25).penetration(0.26, "the quarter that they start with").percent(load)
-    });
+    .within(|scene, load| Tolerances::impacts(scene).percent(load));

@@ -8,7 +8,14 @@ use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAU
 impl Scene {
     /// A scene with default gravity, step and length.
     pub fn new(name: impl Into<String>, bodies: Vec<SceneBody>) -> Self {
-        Self { name: name.into(), gravity: DEFAULT_GRAVITY, dt: DEFAULT_DT, steps: DEFAULT_STEPS, bodies }
+        Self {
+            name: name.into(),
+            gravity: DEFAULT_GRAVITY,
+            dt: DEFAULT_DT,
+            steps: DEFAULT_STEPS,
+            expect: None,
+            bodies,
+        }
     }
 
     /// The same scene, run for `steps` steps.

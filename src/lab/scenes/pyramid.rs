@@ -16,14 +16,14 @@ pub(super) const PYRAMID: Entry = Entry::new("pyramid", "a pyramid of boxes", |b
         Outline { bodies: 1 + boxes, reference: boxes as f64 * BOX_WEIGHT }
     })
     .known(|scene, _| rests_on_ground(scene))
-    .holds(&[Demand::Stands])
-    .within(|_, load| Tolerances::standard().percent(load));
+    .holds(&[Demand::Stands, Demand::Rests])
+    .within(|scene, load| Tolerances::standard(scene).percent(load));
 
 pub(super) const LARGE: Entry =
     Entry::new("large_pyramid", "a pyramid of 5050 boxes", |_| scene("large_pyramid", 100).steps(500))
         .known(|scene, _| rests_on_ground(scene))
-        .holds(&[Demand::Stands])
-        .within(|_, load| Tolerances::standard().percent(load));
+        .holds(&[Demand::Stands, Demand::Rests])
+        .within(|scene, load| Tolerances::standard(scene).percent(load));
 
 pub(super) const MANY: Entry =
     Entry::new("many_pyramids", "floors with pyramids of 55 boxes, as many as there are floors", |floors| {
@@ -49,8 +49,8 @@ pub(super) const MANY: Entry =
         Outline { bodies: floors + boxes, reference: boxes as f64 * BOX_WEIGHT }
     })
     .known(|scene, _| rests_on_ground(scene))
-    .holds(&[Demand::Stands])
-    .within(|_, load| Tolerances::standard().percent(load));
+    .holds(&[Demand::Stands, Demand::Rests])
+    .within(|scene, load| Tolerances::standard(scene).percent(load));
 
 fn scene(name: &str, base: u32) -> Scene {
     let corner = [-0.5 * f64::from(base), 0.0];

@@ -12,4 +12,4 @@ pub(super) const DROP: Entry = Entry::new("single_box", "a box dropped from thre
     Scene::new("single_box", vec![ground, SceneBody::dynamic([0.0, 4.0], shape)])
 })
 .known(|scene, _| rests_at(scene, 1, 1.0))
-.within(|scene, _| Tolerances::impacts(scene, 3.0).joints(1.0));
+.within(|scene, _| Tolerances::impacts(scene).joints(1.0));

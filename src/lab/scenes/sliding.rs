@@ -22,7 +22,7 @@ pub(super) const STOP: Entry =
         let off = |view: &View| Some(view.center(1)[0] - slid(view));
         Truth::new("distance slid, all steps", "m", distance, Worst::from_step(1, off))
     })
-    .within(|_, way| Tolerances::standard().percent(way));
+    .within(|scene, way| Tolerances::standard(scene).percent(way));
 
 /// Friction takes µ g h per substep until less than that is left, then all of it:
 /// v_j = max(0, v0 − j µ g h). With m = min(n, ⌊v0/(µ g h)⌋) substeps of motion,
@@ -50,7 +50,7 @@ pub(super) const ROLL: Entry = Entry::new("slide_to_roll", "a disc that slides u
     let off = move |view: &View| Some(view.velocity(1)[0] - end);
     Truth::new("speed once it rolls, from 1 s on", "m/s", end, Worst::from_time(scene, 1.0, off))
 })
-.within(|_, speed| Tolerances::standard().percent(speed));
+.within(|scene, speed| Tolerances::standard(scene).percent(speed));
 
 fn scene(name: &str, shape: SceneShape, speed: f64, friction: f64) -> Scene {
     let mut ground = ground_line(50.0);

@@ -4,10 +4,11 @@
 //! is an answer, too, that none of those tried does.
 
 use super::format::Scene;
+use crate::engine::bodies::{BodyDef, BodyKind};
 use crate::engine::params::LINEAR_SLOP;
 use crate::lab::interned::{self, Name};
 
-/// The most that an error may be.
+/// The most that an error may be in a plausible run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerance {
     /// In the unit of the error.
@@ -15,17 +16,71 @@ pub struct Tolerance {
     /// Why this much.
     #[serde(deserialize_with = "interned::read")]
     pub reason: Name,
+    /// Whether it is what no solver can avoid, so that it is the same at every accuracy.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fixed: bool,
 }
 
-/// The tolerances of a scene.
+impl Tolerance {
+    /// One that shrinks with the accuracy.
+    pub const fn new(value: f64, reason: &'static str) -> Self {
+        Tolerance { value, reason, fixed: false }
+    }
+
+    /// At an accuracy.
+    pub fn at(&self, accuracy: Accuracy) -> f64 {
+        if self.fixed { self.value } else { self.value * accuracy.share() }
+    }
+}
+
+/// How right a run has to be. Each is ten times as strict as the one before it, in every error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Accuracy {
+    /// Nothing wrong is seen: a centimetre at bodies of a metre.
+    Plausible,
+    /// A millimetre.
+    Tight,
+    /// A tenth of a millimetre.
+    Exact,
+}
+
+impl Accuracy {
+    /// From the loosest on.
+    pub const ALL: [Accuracy; 3] = [Accuracy::Plausible, Accuracy::Tight, Accuracy::Exact];
+
+    /// For tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Accuracy::Plausible => "plausible",
+            Accuracy::Tight => "tight",
+            Accuracy::Exact => "exact",
+        }
+    }
+
+    /// Its tolerances in those of [`Accuracy::Plausible`] (1).
+    pub fn share(self) -> f64 {
+        match self {
+            Accuracy::Plausible => 1.0,
+            Accuracy::Tight => 0.1,
+            Accuracy::Exact => 0.01,
+        }
+    }
+}
+
+/// The tolerances of a scene, for a plausible run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerances {
-    /// Deepest penetration (m).
+    /// Penetration (m), see [`Errors::penetration`](crate::lab::metrics::Errors::penetration).
     pub penetration: Tolerance,
-    /// Contact-law residual, root mean square, in the mean weight of a body × step (1).
+    /// Contact-law residual, root mean square, in the weight of the lighter body × step (1).
     pub residual: Tolerance,
     /// Distance to what is known about the scene, in its unit; none where nothing is known.
+    #[serde(rename = "reference")]
     pub truth: Option<Tolerance>,
+    /// Speed that is left at the end (m/s); none where nothing has to come to rest.
+    #[serde(rename = "rest_speed")]
+    pub rest: Option<Tolerance>,
 }
 
 /// Tolerances that take the place of a scene's own.
@@ -37,65 +92,82 @@ pub struct GivenTolerances {
     pub residual: Option<f64>,
     /// In the unit of each scene's truth.
     pub truth: Option<f64>,
+    /// m/s
+    pub rest: Option<f64>,
 }
 
-/// Two slops (m): what solvers leave alone, and as much again.
-const SEEN: f64 = 2.0 * LINEAR_SLOP as f64;
+/// What is seen of a body, in its size (1): a centimetre at a metre.
+const SEEN: f64 = 0.01;
+
+/// What is seen to move at rest, in sizes of a body per second: half a centimetre at a metre, a twelfth of a
+/// millimetre in each of sixty pictures.
+const SEEN_MOVING: f64 = 0.005;
+
+/// Size of the bodies that move: the median of their mean extents (m), 1 where nothing moves.
+pub fn size(scene: &Scene) -> f64 {
+    let bodies = scene.body_defs().unwrap_or_default();
+    let extent = |body: &BodyDef| {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for part in &body.shapes {
+            let radius = f64::from(part.shape.radius());
+            let mut grow = |v: glam::Vec2| {
+                for (k, x) in v.to_array().into_iter().enumerate() {
+                    low[k] = low[k].min(f64::from(x) - radius);
+                    high[k] = high[k].max(f64::from(x) + radius);
+                }
+            };
+            part.shape.for_each_vertex(&mut grow);
+        }
+        0.5 * (high[0] - low[0] + high[1] - low[1])
+    };
+    let mut extents: Vec<f64> = bodies.iter().filter(|b| b.kind == BodyKind::Dynamic).map(extent).collect();
+    extents.sort_by(f64::total_cmp);
+    extents.get(extents.len() / 2).copied().unwrap_or(1.0)
+}
 
 impl Tolerances {
-    /// Those of bodies of about a metre that rest or slide; nothing is known.
-    pub fn standard() -> Self {
+    /// Those of bodies that rest or slide; nothing is known.
+    pub fn standard(scene: &Scene) -> Self {
         Tolerances {
-            penetration: Tolerance {
-                value: SEEN,
-                reason: "two slops: solvers leave one alone, and a hundredth of a metre begins to be seen",
-            },
-            residual: Tolerance {
-                value: 0.1,
-                reason: "a tenth of what carries a body: loads are good to a digit",
-            },
+            penetration: Tolerance::new(SEEN * size(scene), "a hundredth of a body begins to be seen"),
+            residual: Tolerance::new(
+                0.1,
+                "a tenth of what carries the lighter body: loads are good to a digit",
+            ),
             truth: None,
+            rest: None,
         }
     }
 
-    /// Those of a scene whose bodies fall by up to `height` (m) before they hit something.
+    /// Those of a scene whose bodies hit each other.
     ///
-    /// Without continuous collision a contact that is not known before a step is met somewhere on
-    /// the way of that step, √(2 g H) Δt. The impulse of an impact at v is v/(g Δt) times that of
-    /// the weight, 60 times at 10 m/s: a residual of 1 is some hundredths of it.
-    pub fn impacts(scene: &Scene, height: f64) -> Self {
-        let gravity = scene.gravity[0].hypot(scene.gravity[1]);
-        Self::fast(scene, (2.0 * gravity * height).sqrt())
+    /// The impulse of an impact at v is v/(g Δt) times that of the weight, 60 times at 10 m/s: a residual
+    /// of 1 is some hundredths of it. How deep bodies fly into each other before they are a contact is no
+    /// solver's error, and not in the penetration.
+    pub fn impacts(scene: &Scene) -> Self {
+        let reason = "the weight of a body: impacts take dozens of it, so some hundredths of an impact";
+        Tolerances { residual: Tolerance::new(1.0, reason), ..Self::standard(scene) }
     }
 
-    /// The same of a scene whose bodies hit each other at up to `speed` (m/s).
-    pub fn fast(scene: &Scene, speed: f64) -> Self {
-        Tolerances {
-            penetration: Tolerance {
-                value: SEEN + speed * scene.dt,
-                reason: "two slops, and the way of the fastest body in a step: nothing sees its contact sooner",
-            },
-            residual: Tolerance {
-                value: 1.0,
-                reason: "the weight of a body: impacts take dozens of it, so some hundredths of an impact",
-            },
-            truth: None,
-        }
+    /// What may be left of the motion of what comes to rest.
+    pub fn resting(scene: &Scene) -> Tolerance {
+        Tolerance::new(SEEN_MOVING * size(scene), "half a hundredth of a body per second begins to be seen")
     }
 
     /// The same, with this for the deepest penetration (m).
     pub fn penetration(self, value: f64, reason: &'static str) -> Self {
-        Self { penetration: Tolerance { value, reason }, ..self }
+        Self { penetration: Tolerance::new(value, reason), ..self }
     }
 
-    /// The same, with this for the residual.
-    pub fn residual(self, value: f64, reason: &'static str) -> Self {
-        Self { residual: Tolerance { value, reason }, ..self }
+    /// The same, with what no solver can avoid: a residual, and a distance to what is known.
+    pub fn fixed(self, residual: (f64, &'static str), truth: (f64, &'static str)) -> Self {
+        let fixed = |(value, reason)| Tolerance { value, reason, fixed: true };
+        Self { residual: fixed(residual), truth: Some(fixed(truth)), ..self }
     }
 
     /// The same, with this for what is known.
     pub fn truth(self, value: f64, reason: &'static str) -> Self {
-        Self { truth: Some(Tolerance { value, reason }), ..self }
+        Self { truth: Some(Tolerance::new(value, reason)), ..self }
     }
 
     /// A hundredth of a truth of this size.
@@ -110,13 +182,13 @@ impl Tolerances {
 
     /// With those that are given in the place of the scene's own.
     pub fn with(self, given: &GivenTolerances) -> Self {
-        let or = |own: Tolerance, given: Option<f64>| {
-            given.map_or(own, |value| Tolerance { value, reason: "given" })
-        };
+        let or =
+            |own: Tolerance, given: Option<f64>| given.map_or(own, |value| Tolerance::new(value, "given"));
         Tolerances {
             penetration: or(self.penetration, given.penetration),
             residual: or(self.residual, given.residual),
             truth: self.truth.map(|own| or(own, given.truth)),
+            rest: self.rest.map(|own| or(own, given.rest)),
         }
     }
 }
@@ -124,21 +196,29 @@ impl Tolerances {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::scenes::{SceneBody, SceneShape};
+
+    fn scene(half: f64) -> Scene {
+        let shape = SceneShape::rectangle(half, half);
+        Scene::new("x", vec![SceneBody::dynamic([0.0, 0.0], shape)])
+    }
 
     #[test]
-    fn impacts_allow_the_way_of_a_step() {
-        let scene = Scene::new("x", Vec::new());
-        // 20 m under 10 m/s²: 20 m/s, a third of a metre in 1/60 s.
-        let t = Tolerances::impacts(&scene, 20.0);
-        assert!((t.penetration.value - (0.01 + 20.0 / 60.0)).abs() < 1e-8, "{t:?}");
-        assert_eq!(t.truth, None);
+    fn what_is_seen_grows_with_the_bodies_and_shrinks_with_the_accuracy() {
+        assert_eq!((size(&scene(0.5)), size(&scene(2.0)), size(&Scene::new("x", vec![]))), (1.0, 4.0, 1.0));
+        let own = Tolerances::standard(&scene(0.5)).penetration;
+        let at = Accuracy::ALL.map(|a| own.at(a));
+        assert!(at.iter().zip([1e-2, 1e-3, 1e-4]).all(|(a, b)| (a - b).abs() < 1e-12), "{at:?}");
+        let bounce = Tolerances::impacts(&scene(0.5)).fixed((2.0, "a"), (0.3, "b"));
+        assert_eq!(Accuracy::ALL.map(|a| bounce.residual.at(a)), [2.0; 3]);
+        assert!((Tolerances::resting(&scene(0.5)).value - 5e-3).abs() < 1e-12);
     }
 
     #[test]
     fn what_is_given_takes_the_place_of_a_scenes_own() {
         let given = GivenTolerances { penetration: Some(1e-3), truth: Some(7.0), ..Default::default() };
-        let own = Tolerances::standard();
-        assert_eq!(own.with(&given).penetration, Tolerance { value: 1e-3, reason: "given" });
+        let own = Tolerances::standard(&scene(0.5));
+        assert_eq!(own.with(&given).penetration, Tolerance::new(1e-3, "given"));
         assert_eq!((own.with(&given).truth, own.with(&given).residual), (None, own.residual));
         assert_eq!(own.joints(20.0).with(&given).truth.map(|t| t.value), Some(7.0));
     }

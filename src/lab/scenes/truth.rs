@@ -6,6 +6,7 @@
 //! exactly, the observer compares with that, so that a correct solver's error is
 //! rounding, not discretisation.
 
+use super::expect::Measure;
 use super::format::Scene;
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::Contact;
@@ -29,6 +30,8 @@ pub struct Truth {
     pub unit: &'static str,
     /// The value that the exact rigid bodies have (in the limit of small steps).
     pub expected: f64,
+    /// What a scene file calls it, with the body that it is about; none where only the catalogue knows it.
+    pub measure: Option<(Measure, Option<usize>)>,
     /// Its error is the distance to the truth, in `unit`.
     pub observer: Box<dyn Observer>,
 }
@@ -40,7 +43,7 @@ impl Truth {
         expected: f64,
         observer: impl Observer + 'static,
     ) -> Self {
-        Self { quantity, unit, expected, observer: Box::new(observer) }
+        Self { quantity, unit, expected, measure: None, observer: Box::new(observer) }
     }
 }
 
@@ -198,26 +201,38 @@ pub(super) fn start_centers(scene: &Scene) -> Vec<[f64; 2]> {
 /// The sum rule of a pile at rest: momentum does not change, so the ground
 /// carries the weight, however the pile shares it out.
 pub(super) fn rests_on_ground(scene: &Scene) -> Truth {
-    let weight = weight(scene);
-    let off = move |view: &View| Some(ground_load(view)? - weight);
-    Truth::new("ground load, last second", "N", weight, Worst::last_second(scene, off))
+    load_on_ground(scene, weight(scene))
+}
+
+/// The ground carries `load` (N).
+pub(super) fn load_on_ground(scene: &Scene, load: f64) -> Truth {
+    let off = move |view: &View| Some(ground_load(view)? - load);
+    let truth = Truth::new("ground load, last second", "N", load, Worst::last_second(scene, off));
+    Truth { measure: Some((Measure::GroundLoad, None)), ..truth }
 }
 
 /// A body that ends at rest with its centre at `height` (m).
 pub(super) fn rests_at(scene: &Scene, body: usize, height: f64) -> Truth {
     let off = move |view: &View| Some(view.center(body)[1] - height);
-    Truth::new("resting height, last second", "m", height, Worst::last_second(scene, off))
+    let truth = Truth::new("resting height, last second", "m", height, Worst::last_second(scene, off));
+    Truth { measure: Some((Measure::RestingHeight, Some(body))), ..truth }
 }
 
 /// A structure that stands: nothing falls. The error is the greatest drop of any
 /// dynamic body's centre below its start, over the whole run.
 pub(super) fn stands(scene: &Scene) -> Truth {
-    let start = start_centers(scene);
-    let drop = move |view: &View| Some(greatest_drop(view, &start));
-    Truth::new("greatest drop of a body", "m", 0.0, Worst::from_step(1, drop))
+    greatest_drop(scene, 0.0)
 }
 
-fn greatest_drop(view: &View, start: &[[f64; 2]]) -> f64 {
+/// No body drops by more than `expected` (m), over the whole run.
+pub(super) fn greatest_drop(scene: &Scene, expected: f64) -> Truth {
+    let start = start_centers(scene);
+    let off = move |view: &View| Some(drop_of_any(view, &start) - expected);
+    let truth = Truth::new("greatest drop of a body", "m", expected, Worst::from_step(1, off));
+    Truth { measure: Some((Measure::GreatestDrop, None)), ..truth }
+}
+
+fn drop_of_any(view: &View, start: &[[f64; 2]]) -> f64 {
     let dynamic = (0..view.bodies.len()).filter(|&i| view.bodies.is_dynamic(i));
     largest(dynamic.map(|i| start[i][1] - view.center(i)[1]))
 }
@@ -320,9 +335,8 @@ mod tests {
     #[test]
     fn only_falling_is_a_drop() {
         let start = [[0.0, 1.0], [3.0, 2.0]];
-        let drop = |a: f32, b: f32| {
-            greatest_drop(&by_hand::view(&by_hand::bodies(&[[0.5, a], [3.0, b]]), 1), &start)
-        };
+        let drop =
+            |a: f32, b: f32| drop_of_any(&by_hand::view(&by_hand::bodies(&[[0.5, a], [3.0, b]]), 1), &start);
         assert_eq!(drop(1.0, 2.0), 0.0);
         assert_eq!(drop(1.5, 2.0), 0.0);
         assert_eq!(drop(1.5, 1.75), 0.25);

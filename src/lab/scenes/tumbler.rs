@@ -32,7 +32,7 @@ pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning
 })
 .holds(&[Demand::Contains(Outside(escaped))])
 // Across the drum.
-.within(|scene, _| Tolerances::impacts(scene, 2.0 * REACH).truth(0.5, "none"));
+.within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
 /// Bodies whose centre is beyond the middle of a wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {

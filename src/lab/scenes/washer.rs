@@ -35,7 +35,7 @@ pub(super) const WASHER: Entry = Entry::new("washer", "8100 boxes in a turning d
 })
 .holds(&[Demand::Contains(Outside(escaped))])
 // Across the drum.
-.within(|scene, _| Tolerances::impacts(scene, 2.0 * RADII[0]).truth(0.5, "none"));
+.within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
 /// The piece of a ring from 10 `index` to 10 (`index` + 1) degrees, `wider` degrees more on both sides.
 fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {

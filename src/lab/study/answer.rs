@@ -2,6 +2,7 @@
 
 use super::Record;
 use super::compare::compare;
+use crate::lab::scenes::tolerance::Accuracy;
 use std::cmp::Ordering;
 
 /// The settings of a scene that are worth naming. A setting is a solver, an order and a budget, at
@@ -17,31 +18,52 @@ pub struct Answer<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// Of the records of one scene; none without any.
+    /// Of the records of one scene for plausible runs; none without any.
     pub fn of(records: &'a [Record]) -> Option<Answer<'a>> {
+        Self::at(records, Accuracy::Plausible)
+    }
+
+    /// Of the records of one scene; none without any.
+    pub fn at(records: &'a [Record], accuracy: Accuracy) -> Option<Answer<'a>> {
         let scene = &records.first()?.scene;
         let timed: Vec<&Record> = records.iter().filter(|r| r.sample.is_some()).collect();
         let mut good: Vec<&Record> = Vec::new();
-        let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| r.excess() <= 1.0).collect();
-        sorted.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| r.is_good(accuracy)).collect();
+        sorted.sort_by(|a, b| a.cost_ns().total_cmp(&b.cost_ns()));
         for record in sorted {
             if !good.iter().any(|other| same(other, record)) {
                 good.push(record);
             }
         }
-        // By blocks of the same rounds another one may be faster than the one of the least median.
+        // By blocks of the same rounds another one may be faster than the one of the least cost.
         let faster = |a: &Record, b: &Record| order(a, b).is_lt();
         let best = (0..good.len()).reduce(|best, i| if faster(good[i], good[best]) { i } else { best });
         if let Some(best) = best {
             good[..=best].rotate_right(1);
         }
-        let others = timed.into_iter().filter(|r| r.holds() && r.excess() > 1.0);
-        let key = |r: &Record| (r.excess(), time(r));
+        let others = timed.into_iter().filter(|r| r.holds() && !r.is_good(accuracy));
+        let key = |r: &Record| (r.excess_at(accuracy), r.cost_ns());
         let nearest = others.min_by(|a, b| {
             let (a, b) = (key(a), key(b));
             a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
         });
         Some(Answer { scene, good, nearest })
+    }
+
+    /// Those that would be named and were never run on: the cheapest, and the cheapest of another solver.
+    pub fn untried(&self) -> impl Iterator<Item = &'a Record> {
+        [self.best(), self.runner_up()].into_iter().flatten().filter(|r| r.later.is_none())
+    }
+
+    /// The cheapest of each solver.
+    pub fn of_each_solver(&self) -> Vec<&'a Record> {
+        let mut first: Vec<&Record> = Vec::new();
+        for record in &self.good {
+            if first.iter().all(|r| r.solver != record.solver) {
+                first.push(record);
+            }
+        }
+        first
     }
 
     /// The cheapest, if any is good enough.
@@ -73,26 +95,6 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Settings this much slower than the fastest may still be the cheapest (1).
-const CLOSE: f64 = 1.1;
-
-/// Most records that are timed again.
-const MOST_FINALISTS: usize = 10;
-
-/// Places of the records that may turn out to be the cheapest, or the next: those that are good
-/// enough and close to the fastest of them, and the fastest of another setting.
-pub fn finalists(records: &[Record]) -> Vec<usize> {
-    let mut good: Vec<usize> = (0..records.len()).filter(|&i| records[i].excess() <= 1.0).collect();
-    good.sort_by(|&a, &b| time(&records[a]).total_cmp(&time(&records[b])));
-    let Some(&first) = good.first() else { return Vec::new() };
-    let limit = CLOSE * time(&records[first]);
-    let next = good.iter().copied().find(|&i| !same(&records[i], &records[first]));
-    let is_close = |&i: &usize| time(&records[i]) <= limit;
-    let mut chosen: Vec<usize> = good.iter().copied().filter(is_close).take(MOST_FINALISTS).collect();
-    chosen.extend(next.filter(|next| !chosen.contains(next)));
-    chosen
-}
-
 /// Which of two records is faster, if that can be told.
 pub fn order(a: &Record, b: &Record) -> Ordering {
     a.sample.as_ref().zip(b.sample.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
@@ -100,11 +102,7 @@ pub fn order(a: &Record, b: &Record) -> Ordering {
 
 /// Whether two records differ in their lane width at most.
 pub fn same(a: &Record, b: &Record) -> bool {
-    (a.solver, a.budget, a.order, a.swept) == (b.solver, b.budget, b.order, b.swept)
-}
-
-fn time(record: &Record) -> f64 {
-    record.sample.as_ref().map_or(f64::INFINITY, |sample| sample.median_ns)
+    a.setting() == b.setting()
 }
 
 #[cfg(test)]
@@ -113,16 +111,11 @@ mod tests {
     use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
-    fn finalists_are_close_to_the_fastest_or_the_next() {
-        let records = [
-            record(8, 1, 200.0, 1e-3),
-            record(1, 2, 109.0, 1e-3),
-            record(8, 2, 100.0, 1e-3),
-            record(8, 3, 10.0, 1.0),
-            record(8, 4, 150.0, 1e-3),
-        ];
-        assert_eq!(finalists(&records), [2, 1, 4]);
-        assert!(finalists(&records[3..4]).is_empty());
+    fn each_accuracy_has_its_own_cheapest() {
+        // 10, 1 and 0.1 mm are allowed.
+        let records = [record(8, 1, 5.0, 9e-3), record(8, 2, 10.0, 9e-4), record(8, 4, 20.0, 2e-4)];
+        let best = Accuracy::ALL.map(|a| Answer::at(&records, a).unwrap().best().map(|r| r.budget.substeps));
+        assert_eq!(best, [Some(1), Some(2), None]);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Which budgets a study tries, and which are impossible.
 
+use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
-use crate::engine::solvers::Variant;
+use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 
 /// Most that any field of a budget may be: a typo should not run for a year.
@@ -72,6 +73,28 @@ fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
     })
 }
 
+/// Refuses sweeps that none of `solvers` makes, and names the solvers that do. `option` is
+/// `velocity-iterations` or its like.
+pub fn check_used(option: &str, solvers: &[&'static Variant]) -> Result<(), Error> {
+    let uses = |v: &Variant| match option {
+        "velocity-iterations" => v.uses.velocity,
+        "relax-iterations" => v.uses.relax,
+        "position-iterations" => v.uses.position,
+        _ => true,
+    };
+    if solvers.iter().any(|v| uses(v)) {
+        return Ok(());
+    }
+    let names = |list: Vec<&str>| list.join(", ");
+    let message = format!(
+        "{} {} no such sweeps; solvers that have: {}",
+        names(solvers.iter().map(|v| v.name).collect()),
+        if solvers.len() == 1 { "has" } else { "have" },
+        names(VARIANTS.iter().filter(|v| uses(v)).map(|v| v.name).collect())
+    );
+    Err(Error::invalid(format!("--{option}"), message))
+}
+
 /// Refuses a budget that `variant` cannot work with.
 pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
     let fields = [
@@ -105,6 +128,15 @@ pub fn brief(budget: &Budget, variant: &Variant) -> String {
         }
     }
     text
+}
+
+/// The same with the treatment of impacts, where that is not the solver's own.
+pub fn with_impacts(text: String, impacts: Impacts) -> String {
+    match impacts {
+        Impacts::Own => text,
+        Impacts::Waves => text + " waves",
+        Impacts::None => text + " no impacts",
+    }
 }
 
 #[cfg(test)]

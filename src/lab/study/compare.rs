@@ -13,6 +13,9 @@ use std::cmp::Ordering;
 /// Times closer than this share are a tie (1): code that moved in memory changes them as much.
 pub const TIE: f64 = 0.03;
 
+/// Means that are further above their medians than another's by this share count (1).
+const SPIKES: f64 = 0.1;
+
 /// How often an interval may miss the true median. A study compares dozens of settings, and the
 /// fastest of them is taken: at 5 % some would win by luck.
 const MISS: f64 = 1e-3;
@@ -23,14 +26,17 @@ const Z: f64 = 3.291;
 /// The time of one setting in times that of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
-    /// Median over the pairs of blocks.
+    /// Median over the pairs of blocks, or of the means where spikes differ.
     pub median: f64,
     /// Interval of the true median; without bounds where there are too few pairs.
     pub interval: [f64; 2],
+    /// Distance from 1 up to which it is a tie (1): [`TIE`], and as much more as the thread had to wait.
+    pub tie: f64,
 }
 
 impl Ratio {
-    /// Of `one` in times `other`; none without a pair of blocks.
+    /// Of `one` in times `other`; none without a pair of blocks. Spikes are in few blocks, so that the median
+    /// does not see them: where one of the two has more of them by [`SPIKES`], the ratio is that of the means.
     pub fn of(one: &Sample, other: &Sample) -> Option<Ratio> {
         let pairs = one.blocks_ns.iter().flatten().zip(other.blocks_ns.iter().flatten());
         let mut ratios: Vec<f64> = pairs.map(|(a, b)| a / b).filter(|r| r.is_finite()).collect();
@@ -39,13 +45,19 @@ impl Ratio {
             0 => [0.0, f64::INFINITY],
             k => [ratios[k - 1], ratios[ratios.len() - k]],
         };
-        (!ratios.is_empty()).then(|| Ratio { median: median(&ratios), interval })
+        let spikes = one.spikes() / other.spikes();
+        let shape = if spikes.ln().abs() > SPIKES.ln_1p() { spikes } else { 1.0 };
+        (!ratios.is_empty()).then(|| Ratio {
+            median: shape * median(&ratios),
+            interval: interval.map(|bound| shape * bound),
+            tie: TIE + one.waited.max(other.waited),
+        })
     }
 
     /// Whether the two are alike as far as can be told.
     pub fn is_tie(&self) -> bool {
         let [low, high] = self.interval;
-        (low <= 1.0 && 1.0 <= high) || (self.median.ln()).abs() <= TIE.ln_1p()
+        (low <= 1.0 && 1.0 <= high) || (self.median.ln()).abs() <= self.tie.ln_1p()
     }
 }
 
@@ -103,6 +115,22 @@ mod tests {
         assert_eq!(compare(&of(1.031, 20), &of(1.0, 20)), Ordering::Greater);
         assert_eq!(compare(&of(1.0, 0), &of(1.0, 9)), Ordering::Equal);
         assert_eq!(Ratio::of(&of(1.0, 0), &of(1.0, 9)), None);
+    }
+
+    #[test]
+    fn spikes_that_come_back_count_and_waiting_widens_a_tie() {
+        let pass = |time: f64, spike: f64| {
+            let mut blocks = vec![time; 20];
+            blocks[5] = spike;
+            blocks
+        };
+        let (calm, spiky) = (sample(vec![pass(10.0, 10.0); 3]), sample(vec![pass(8.0, 200.0); 3]));
+        assert_eq!(compare(&spiky, &calm), Ordering::Greater);
+        // Seen once, it is the machine's.
+        let once = sample(vec![pass(8.0, 200.0), pass(8.0, 8.0), pass(8.0, 8.0)]);
+        assert_eq!(compare(&once, &calm), Ordering::Less);
+        let waiting = Sample { waited: 0.3, ..once };
+        assert_eq!(compare(&waiting, &calm), Ordering::Equal);
     }
 
     #[test]

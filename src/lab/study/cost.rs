@@ -6,10 +6,11 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::estimate::{self, Estimate};
+use crate::lab::scenes::holds::{Demand, HORIZON};
 use crate::lab::scenes::{self, Description};
 
-/// Finalists are a few of the settings, timed twice as often again.
-const FINALISTS: f64 = 0.1;
+/// Settings of a scene that are run on: winners and runners-up at three accuracies, and as many that fail.
+const RUN_ON: f64 = 8.0;
 
 /// Sweeps of a step.
 pub fn sweeps(budget: &Budget, variant: &Variant) -> u32 {
@@ -42,6 +43,7 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             let steps = f64::from(plan.steps.unwrap_or(scene.steps));
             let timed = f64::from(plan.timing_steps).min(steps);
             bodies = scene.bodies.max(bodies);
+            let mut work = (0.0, 0.0);
             for solver in &plan.solvers {
                 for budget in plan.budgets(solver, point)? {
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
@@ -53,11 +55,16 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
                         let widest = widths.iter().copied().max().unwrap_or(1);
                         let observed = one(widest) + estimate::errors(scene.bodies);
                         seconds += steps * observed / threads as f64;
-                        let passes = f64::from(plan.repeats) * (1.0 + 2.0 * FINALISTS);
+                        let passes = f64::from(plan.repeats);
+                        work = (work.0 + one(widest), work.1 + 1.0);
                         seconds += timed * passes * widths.iter().map(|&w| one(w)).sum::<f64>();
                         worlds += widths.len();
                     }
                 }
+            }
+            if plan.sweep.is_none() && scene.demands.iter().any(|d| matches!(d, Demand::Rests)) {
+                let mean = work.0 / f64::max(work.1, 1.0);
+                seconds += RUN_ON * (HORIZON / scene.dt) * mean / threads as f64;
             }
         }
         whole = whole.then(Estimate { seconds, bytes: estimate::memory(bodies, worlds, threads) });

@@ -3,6 +3,7 @@
 use super::Record;
 use crate::engine::params::Budget;
 use crate::engine::world::Order;
+use crate::lab::scenes::tolerance::{Tolerance, Tolerances};
 
 /// Errors below this count as this: a logarithm has no zero.
 pub const ERROR_FLOOR: f64 = 1e-8;
@@ -10,33 +11,55 @@ pub const ERROR_FLOOR: f64 = 1e-8;
 /// An error to weigh time against. Rankings differ between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorAxis {
-    /// The deepest penetration: what people see.
+    /// The penetration, as [`Errors::penetration`](crate::lab::metrics::Errors::penetration) has it: what people see.
     Penetration,
-    /// The contact-law residual, root mean square in body weights: the mathematics.
+    /// The contact-law residual, root mean square in weights of the lighter body: the mathematics.
     Law,
     /// The distance to the truth: the physics.
     Truth,
+    /// The speed that is left where a scene has to rest: jitter.
+    Rest,
 }
 
 impl ErrorAxis {
     /// All of them, in the order of tables and plots.
     pub const ALL: [ErrorAxis; 3] = [ErrorAxis::Penetration, ErrorAxis::Law, ErrorAxis::Truth];
 
+    /// All that a setting is judged by.
+    pub const JUDGED: [ErrorAxis; 4] =
+        [ErrorAxis::Penetration, ErrorAxis::Law, ErrorAxis::Truth, ErrorAxis::Rest];
+
+    /// The tolerance of it; none where it is not judged.
+    pub fn tolerance(self, tolerances: &Tolerances) -> Option<Tolerance> {
+        match self {
+            ErrorAxis::Penetration => Some(tolerances.penetration),
+            ErrorAxis::Law => Some(tolerances.residual),
+            ErrorAxis::Truth => tolerances.truth,
+            ErrorAxis::Rest => tolerances.rest,
+        }
+    }
+
     /// For headings.
     pub fn name(self) -> &'static str {
         match self {
-            ErrorAxis::Penetration => "greatest penetration",
+            ErrorAxis::Penetration => "penetration",
             ErrorAxis::Law => "contact-law residual",
             ErrorAxis::Truth => "distance to reference value",
+            ErrorAxis::Rest => "speed at rest",
         }
     }
 
     /// The error of a record; none if it failed, or where no truth is known or came to be seen.
     pub fn of(self, record: &Record) -> Option<f64> {
         match self {
-            ErrorAxis::Penetration => Some(record.errors?.penetration_max),
-            ErrorAxis::Law => Some(record.errors?.law_rms_body),
+            ErrorAxis::Penetration => Some(record.errors?.penetration(record.tolerances.rest.is_some())),
+            ErrorAxis::Law => Some(record.errors?.law_rms_lighter),
             ErrorAxis::Truth => record.truth?.error,
+            ErrorAxis::Rest => {
+                // A minute knows better than the seconds of the run; what never rests moves more with time.
+                let run = record.errors?.rest_velocity;
+                Some(record.later.and_then(|later| later.rest_speed_m_s).unwrap_or(run))
+            }
         }
     }
 
@@ -45,6 +68,7 @@ impl ErrorAxis {
         match self {
             ErrorAxis::Penetration => "m",
             ErrorAxis::Law => "",
+            ErrorAxis::Rest => "m/s",
             ErrorAxis::Truth => records.iter().find_map(|r| r.truth).map_or("", |t| t.unit),
         }
     }
@@ -107,7 +131,7 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
                 let widths = own().filter(|r| r.budget == *value && r.order == order);
                 let timed = widths.filter(|r| r.holds()).filter_map(|record| {
                     let (sample, error) = (record.sample.as_ref()?, axis.of(record)?);
-                    Some(Sample { record, budget, time: sample.median_ns, error: error.max(ERROR_FLOOR) })
+                    Some(Sample { record, budget, time: sample.cost_ns(), error: error.max(ERROR_FLOOR) })
                 });
                 samples.extend(timed.min_by(|a, b| a.time.total_cmp(&b.time)));
             }

@@ -8,11 +8,19 @@
 //!
 //! ```text
 //! block:  ○ ● ● ● ● ● ● ● ● ◐     ○ meets cold caches, not timed
-//!                                 ● timed together: two clock readings for all of them
+//!                                 ● timed, each step for itself
 //!                                 ◐ read phase by phase, which costs as much as a small step
 //! ```
+//!
+//! Blocks begin elsewhere in every pass, so that a step that one pass leaves out is timed by another; the first
+//! step of a run is always timed, because it is as cold in any program. The time of a step is the median over
+//! the passes: what only one of them saw is the machine's, what comes back is the solver's. Mean, median and
+//! longest step of the run are taken of these.
+//!
+//! Where the thread waited for a processor, the wait is subtracted from a long step, and a block of short ones is
+//! left out.
 
-use crate::engine::clock::Phase;
+use crate::engine::clock::{Phase, waited};
 use crate::engine::world::{Divergence, Settings, StepCounts, World};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
@@ -20,7 +28,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64;
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Most steps of a block.
 const BLOCK: u32 = 10;
@@ -31,29 +39,90 @@ const LEAST_BLOCKS: u32 = 12;
 /// Fewest steps of a block, one of each kind.
 const LEAST_BLOCK: u32 = 3;
 
+/// The blocks of a pass begin by so much of their length before those of the last one.
+const SHIFTS: u32 = 4;
+
+/// From here on (ns) the wait is read around every step: it takes some microseconds.
+const LONG_STEP: f64 = 2e5;
+
+/// A block of short steps is left out if the thread waited for more than this share of it (1).
+const WAITED: f64 = 0.01;
+
+/// Passes from which on the median over them knows what comes back.
+const REPEATED: u32 = 3;
+
 /// Times and counts of one setting.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Sample {
-    /// Median over the blocks (ns per step); a block's time is the median of its repeats.
+    /// Mean over the steps of the run (ns).
+    #[serde(rename = "mean_step_ns")]
+    pub mean_ns: f64,
+    /// Median over them (ns).
+    #[serde(rename = "median_step_ns")]
     pub median_ns: f64,
-    /// Median distance of a repeat from its block's median (ns); with one repeat, of a
-    /// block from the median block.
+    /// The longest of them (ns).
+    #[serde(rename = "longest_step_ns")]
+    pub worst_ns: f64,
+    /// Passes that it took part in.
+    pub rounds: u32,
+    /// Share of the time in which the thread waited for a processor (1); subtracted or left out.
+    #[serde(rename = "waited_share")]
+    pub waited: f64,
+    /// Median deviation of a repeat in its median (1); with one pass, of a step in the median step.
+    #[serde(rename = "noise_share")]
+    pub noise: f64,
+    /// Median deviation of a repeat (ns), see `noise`.
     pub spread_ns: f64,
-    /// Lower and upper quartile of the blocks (ns): how the scene's cost changes as it moves.
+    /// Lower and upper quartile of the steps (ns): how the scene's cost changes as it moves.
     pub quartiles_ns: [f64; 2],
     /// Median time of each phase (ns), in the order of [`Phase::ALL`].
+    #[serde(with = "phases")]
     pub phase_ns: [f64; Phase::ALL.len()],
     /// Median time of all sweeps over the rows that they solve (ns).
     pub row_sweep_ns: f64,
+    /// Median time of a fixed loop between the rounds (ns): what the machine was worth just then.
+    pub yardstick_ns: f64,
     /// Averages over the steps.
     pub load: Load,
     /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
-    /// the setting took no part.
+    /// the setting took no part, or waited.
     #[serde(with = "blocks")]
     pub blocks_ns: Vec<Vec<f64>>,
     /// Hash of the final state.
     #[serde(skip)]
     pub hash: u64,
+}
+
+impl Sample {
+    /// What a step costs (ns): the mean over the run, where enough passes tell spikes of the solver from those of
+    /// the machine, and else the median.
+    pub fn cost_ns(&self) -> f64 {
+        if self.rounds >= REPEATED { self.mean_ns } else { self.median_ns }
+    }
+
+    /// Mean over median: 1 without spikes, and where nobody can tell.
+    pub fn spikes(&self) -> f64 {
+        if self.median_ns > 0.0 { self.cost_ns() / self.median_ns } else { 1.0 }
+    }
+}
+
+/// Phases in files: by name.
+mod phases {
+    use crate::engine::clock::Phase;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::collections::BTreeMap;
+
+    pub fn serialize<S: Serializer>(ns: &[f64; Phase::ALL.len()], serializer: S) -> Result<S::Ok, S::Error> {
+        let named = Phase::ALL.iter().zip(ns).map(|(phase, ns)| (phase.name(), *ns));
+        named.collect::<BTreeMap<_, _>>().serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[f64; Phase::ALL.len()], D::Error> {
+        let named = BTreeMap::<String, f64>::deserialize(deserializer)?;
+        Ok(Phase::ALL.map(|phase| named.get(phase.name()).copied().unwrap_or(0.0)))
+    }
 }
 
 /// Blocks in files: tenths of nanoseconds, and what is not a number as null.
@@ -153,7 +222,9 @@ pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize
 pub struct Interleaved<'a> {
     /// Each with its scene: one for all, or variants of one.
     settings: Vec<(&'a Scene, Settings)>,
-    blocks: Vec<Range<u32>>,
+    steps: u32,
+    /// So far.
+    passes: u32,
     timings: Vec<Timing>,
     random: Pcg64,
 }
@@ -161,37 +232,42 @@ pub struct Interleaved<'a> {
 /// What is kept of one setting.
 #[derive(Clone, Default)]
 struct Timing {
+    /// `[pass][step]` (ns); not a number where a step was not timed.
+    steps: Vec<Vec<f64>>,
     /// `[pass][block]` (ns per step)
     blocks: Vec<Vec<f64>>,
+    /// Passes that it took part in.
+    rounds: u32,
+    /// Time in which the thread waited, and in which the steps ran (ns).
+    waited_and_ran: [f64; 2],
     phases: [Vec<f64>; Phase::ALL.len()],
     row_sweep: Vec<f64>,
+    yardstick: Vec<f64>,
     load: LoadSum,
     hash: u64,
     failure: Option<Divergence>,
 }
 
-/// The steps of a pass in blocks; what is left over is not run.
-fn blocks(steps: u32) -> Vec<Range<u32>> {
-    let length = (steps / LEAST_BLOCKS).clamp(LEAST_BLOCK, BLOCK).min(steps);
-    (0..steps / length.max(1)).map(|i| i * length..(i + 1) * length).collect()
-}
-
-/// How many of so many steps interleaved timing takes.
-pub fn whole_blocks(steps: u32) -> u32 {
-    blocks(steps).last().map_or(0, |block| block.end)
+/// The steps of a pass in blocks; all but the first and the last are of one length.
+fn blocks(steps: u32, pass: u32) -> Vec<Range<u32>> {
+    let length = (steps / LEAST_BLOCKS).clamp(LEAST_BLOCK, BLOCK).min(steps).max(1);
+    let first = length - pass * length.div_ceil(SHIFTS) % length;
+    let ends = (0..).map(|i| first + i * length).take_while(|&end| end < steps).chain([steps]);
+    let mut start = 0;
+    let ranges = ends.map(|end| std::mem::replace(&mut start, end)..end);
+    ranges.filter(|r| !r.is_empty()).collect()
 }
 
 impl<'a> Interleaved<'a> {
     /// Of the first `steps` steps; `seed` decides who begins.
     pub fn new(settings: Vec<(&'a Scene, Settings)>, steps: u32, seed: u64) -> Self {
         let timings = vec![Timing::default(); settings.len()];
-        Interleaved { settings, blocks: blocks(steps), timings, random: Pcg64::seed_from_u64(seed) }
+        Interleaved { settings, steps, passes: 0, timings, random: Pcg64::seed_from_u64(seed) }
     }
 
-    /// Goes through the steps so many times with those settings that `enter`; a world that diverges
-    /// drops out.
-    pub fn run(&mut self, passes: u32, enter: &[usize]) -> Result<(), Error> {
-        let mut names = enter.to_vec();
+    /// Goes through the steps so many times with all settings; a world that diverges drops out.
+    pub fn run(&mut self, passes: u32) -> Result<(), Error> {
+        let mut names: Vec<usize> = (0..self.settings.len()).collect();
         for _ in 0..passes {
             // Nobody's place in the list is a place in the order.
             names.shuffle(&mut self.random);
@@ -200,13 +276,24 @@ impl<'a> Interleaved<'a> {
                 let (scene, settings) = &self.settings[i];
                 worlds.push(scene.build(settings.clone())?);
             }
+            let blocks = blocks(self.steps, self.passes);
+            self.passes += 1;
             for timing in &mut self.timings {
-                timing.blocks.push(vec![f64::NAN; self.blocks.len()]);
+                timing.rounds += 1;
+                timing.steps.push(vec![f64::NAN; self.steps as usize]);
+                timing.blocks.push(vec![f64::NAN; blocks.len()]);
             }
-            let Interleaved { blocks, timings, .. } = self;
+            let timings = &mut self.timings;
+            let mut measured = Vec::new();
+            let mut last = None;
             take_turns(names.len(), blocks.len(), |place, round| {
+                if last != Some(round) {
+                    last = Some(round);
+                    measured.push(yardstick());
+                }
                 timings[names[place]].go(&mut worlds[place], blocks[round].clone(), round);
             });
+            timings.iter_mut().for_each(|timing| timing.yardstick.extend(&measured));
             for (&i, world) in names.iter().zip(&worlds) {
                 self.timings[i].hash = world.state_hash();
             }
@@ -228,61 +315,84 @@ pub fn time_in_turns(
     repeats: u32,
     seed: u64,
 ) -> Result<Vec<Result<Sample, Divergence>>, Error> {
-    let all: Vec<usize> = (0..settings.len()).collect();
-    let settings = settings.iter().map(|s| (scene, s.clone())).collect();
+    let settings: Vec<_> = settings.iter().map(|s| (scene, s.clone())).collect();
+    let count = settings.len();
     let mut interleaved = Interleaved::new(settings, steps, seed);
-    interleaved.run(repeats, &all)?;
-    Ok(all.into_iter().map(|i| interleaved.sample(i)).collect())
+    interleaved.run(repeats)?;
+    Ok((0..count).map(|i| interleaved.sample(i)).collect())
 }
 
 impl Timing {
     /// Goes one block, the last pass's number `round`.
     fn go(&mut self, world: &mut World, steps: Range<u32>, round: usize) {
-        if self.failure.is_some() {
+        // Of one step there is no cold one and none for the phases.
+        let whole = steps.len() >= LEAST_BLOCK as usize;
+        let before = waited();
+        let (mut times, mut taken) = (Vec::with_capacity(steps.len()), 0.0);
+        for step in steps.clone() {
+            if self.failure.is_some() {
+                return;
+            }
+            if whole && step + 1 == steps.end {
+                self.clocked(world);
+            } else {
+                let (ns, pause) = self.timed(world, times.last().is_some_and(|t| *t > LONG_STEP));
+                taken += pause;
+                let cold = whole && step == steps.start && step > 0;
+                times.push(if cold { f64::NAN } else { ns });
+            }
+        }
+        let ran = times.iter().filter(|t| t.is_finite()).sum::<f64>();
+        let waits = waited().zip(before).map_or(0.0, |(after, before)| nanos(after.saturating_sub(before)));
+        self.waited_and_ran = [self.waited_and_ran[0] + waits, self.waited_and_ran[1] + ran];
+        // What was not taken from a step is somewhere in the block.
+        if waits - taken > WAITED * ran {
             return;
         }
-        // Of one step there is no cold one and none for the phases.
-        let (cold, clocked) = if steps.len() >= 3 { (1, 1) } else { (0, 0) };
-        let timed = steps.len() - cold - clocked;
-        for _ in 0..cold {
-            self.step(world);
+        let timed: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();
+        if let (Some(pass), false) = (self.blocks.last_mut(), timed.is_empty()) {
+            pass[round] = timed.iter().sum::<f64>() / timed.len() as f64;
         }
-        let start = Instant::now();
-        for _ in 0..timed {
-            self.step(world);
-        }
-        let elapsed = start.elapsed().as_nanos() as f64 / timed.max(1) as f64;
-        world.settings.timed = true;
-        for _ in 0..clocked {
-            self.step(world);
-            for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
-                times.push(ns as f64);
-            }
-            if world.counts.row_updates > 0 {
-                let rows = world.counts.row_updates as f64;
-                self.row_sweep.push(world.timings.sweep_ns() as f64 / rows);
-            }
-        }
-        world.settings.timed = false;
-        if let Some(pass) = self.blocks.last_mut() {
-            pass[round] = elapsed;
+        if let Some(pass) = self.steps.last_mut() {
+            pass[steps.start as usize..][..times.len()].copy_from_slice(&times);
         }
     }
 
-    fn step(&mut self, world: &mut World) {
-        if self.failure.is_none() {
-            self.failure = world.step().err();
-            self.load.add(&world.counts);
+    /// One step; its time and the wait that was subtracted from it (ns).
+    fn timed(&mut self, world: &mut World, long: bool) -> (f64, f64) {
+        let before = if long { waited() } else { None };
+        let start = Instant::now();
+        self.failure = world.step().err();
+        let elapsed = start.elapsed();
+        let pause = match before {
+            Some(before) => waited().unwrap_or(before).saturating_sub(before).min(elapsed),
+            None => Duration::ZERO,
+        };
+        self.load.add(&world.counts);
+        (nanos(elapsed - pause), nanos(pause))
+    }
+
+    /// One step, phase by phase.
+    fn clocked(&mut self, world: &mut World) {
+        world.settings.timed = true;
+        self.failure = world.step().err();
+        self.load.add(&world.counts);
+        for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
+            times.push(ns as f64);
         }
+        if world.counts.row_updates > 0 {
+            self.row_sweep.push(world.timings.sweep_ns() as f64 / world.counts.row_updates as f64);
+        }
+        world.settings.timed = false;
     }
 
     fn sample(&self) -> Result<Sample, Divergence> {
         if let Some(divergence) = self.failure {
             return Err(divergence);
         }
-        let count = self.blocks.first().map_or(0, Vec::len);
-        let repeats = |block: usize| -> Vec<f64> {
-            self.blocks.iter().map(|pass| pass[block]).filter(|t| !t.is_nan()).collect()
+        let count = self.steps.first().map_or(0, Vec::len);
+        let repeats = |step: usize| -> Vec<f64> {
+            self.steps.iter().map(|pass| pass[step]).filter(|t| !t.is_nan()).collect()
         };
         let times: Vec<Vec<f64>> = (0..count).map(repeats).filter(|t| !t.is_empty()).collect();
         let medians: Vec<f64> = times.iter().map(|t| median(t)).collect();
@@ -294,17 +404,41 @@ impl Timing {
             .filter(|(t, _)| t.len() > 1 || !repeated)
             .flat_map(|(t, &own)| t.iter().map(move |t| (t - if repeated { own } else { middle }).abs()))
             .collect();
+        let spread_ns = median(&deviations);
+        let [waits, ran] = self.waited_and_ran;
         Ok(Sample {
+            mean_ns: medians.iter().sum::<f64>() / medians.len().max(1) as f64,
             median_ns: middle,
-            spread_ns: median(&deviations),
+            worst_ns: medians.iter().copied().fold(0.0, f64::max),
+            rounds: self.rounds,
+            waited: if waits > 0.0 { waits / (waits + ran) } else { 0.0 },
+            noise: if middle > 0.0 { spread_ns / middle } else { 0.0 },
+            spread_ns,
             quartiles_ns: [quantile(&medians, 0.25), quantile(&medians, 0.75)],
             phase_ns: self.phases.each_ref().map(|times| median(times)),
             row_sweep_ns: median(&self.row_sweep),
+            yardstick_ns: median(&self.yardstick),
             load: self.load.average(),
             blocks_ns: self.blocks.clone(),
             hash: self.hash,
         })
     }
+}
+
+/// Time of a chain of multiply-adds that nothing can shorten (ns): about 10 µs.
+fn yardstick() -> f64 {
+    const LINKS: u32 = 4000;
+    let start = Instant::now();
+    let mut x = std::hint::black_box(1.0_f32);
+    for _ in 0..LINKS {
+        x = x * 0.999 + 0.001;
+    }
+    std::hint::black_box(x);
+    nanos(start.elapsed())
+}
+
+fn nanos(duration: Duration) -> f64 {
+    duration.as_nanos() as f64
 }
 
 /// The median, 0 of nothing.
@@ -328,7 +462,8 @@ pub(crate) mod tests {
 
     /// A sample of these blocks (ns per step), `[pass][block]`.
     pub fn sample(blocks: Vec<Vec<f64>>) -> Sample {
-        Timing { blocks, ..Timing::default() }.sample().unwrap()
+        let rounds = blocks.len() as u32;
+        Timing { steps: blocks.clone(), blocks, rounds, ..Timing::default() }.sample().unwrap()
     }
 
     #[test]
@@ -365,14 +500,48 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn steps_are_cut_into_blocks() {
-        assert_eq!(blocks(200).len(), 20);
-        assert_eq!((blocks(40).len(), blocks(40)[1].clone()), (13, 3..6));
-        let ends = |n| blocks(n).iter().map(|b| [b.start, b.end]).collect::<Vec<_>>();
-        assert_eq!((ends(2), ends(1), ends(0)), (vec![[0, 2]], vec![[0, 1]], vec![]));
-        for steps in 0..300 {
-            assert_eq!(blocks(whole_blocks(steps)), blocks(steps));
+    fn blocks_cover_every_step_and_begin_elsewhere_in_every_pass() {
+        assert_eq!((blocks(200, 0).len(), blocks(40, 0)[1].clone()), (20, 3..6));
+        assert_eq!((blocks(200, 1)[0].clone(), blocks(200, 1)[1].clone()), (0..7, 7..17));
+        assert_eq!([blocks(2, 0).len(), blocks(1, 0).len(), blocks(0, 0).len()], [1, 1, 0]);
+        for (steps, pass) in (0..300).flat_map(|steps| (0..5).map(move |pass| (steps, pass))) {
+            let covered: Vec<u32> = blocks(steps, pass).into_iter().flatten().collect();
+            assert_eq!(covered, (0..steps).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn a_spike_that_comes_back_is_the_solvers_and_one_that_does_not_the_machines() {
+        let mut passes = vec![vec![10.0; 20]; 3];
+        passes[0][7] = 900.0;
+        let quiet = sample(passes.clone());
+        assert_eq!((quiet.mean_ns, quiet.median_ns, quiet.worst_ns), (10.0, 10.0, 10.0));
+        passes.iter_mut().for_each(|pass| pass[3] = 210.0);
+        let spiky = sample(passes);
+        assert_eq!(
+            (spiky.mean_ns, spiky.median_ns, spiky.worst_ns, spiky.spikes()),
+            (20.0, 10.0, 210.0, 2.0)
+        );
+        // One pass cannot tell.
+        let mut once = vec![10.0; 20];
+        once[3] = 900.0;
+        assert_eq!(sample(vec![once]).spikes(), 1.0);
+    }
+
+    #[test]
+    fn three_passes_time_every_step() {
+        let scene = crate::lab::scenes::load("stack:2").unwrap().scene;
+        let settings = Settings::new(crate::engine::solvers::find("pgs").unwrap());
+        let mut turns = Interleaved::new(vec![(&scene, settings)], 60, 1);
+        turns.run(3).unwrap();
+        let timing = &turns.timings[0];
+        for step in 0..60 {
+            // Blocks in which the thread waited are left out as a whole.
+            let whole = timing.blocks.iter().flatten().all(|t| t.is_finite());
+            assert!(!whole || timing.steps.iter().any(|pass| pass[step].is_finite()), "{step}");
+        }
+        let sample = turns.sample(0).unwrap();
+        assert!(sample.worst_ns >= sample.mean_ns && sample.rounds == 3);
     }
 
     #[test]

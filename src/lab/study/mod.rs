@@ -2,14 +2,18 @@
 //!
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
 //! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
-//! settings of a scene, alone on the machine; those that may be the cheapest are timed again. All
+//! settings of a scene in common rounds, alone on the machine. All
 //! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
+//! Settings that would be named are then [run on](horizon), untimed and on all cores, for as long as the scene
+//! deserves.
 
 pub mod answer;
 pub mod budget;
 pub mod compare;
 pub mod cost;
 pub mod curve;
+pub mod horizon;
+pub mod impacts;
 pub mod interleave;
 pub mod pareto;
 pub mod profile;
@@ -20,6 +24,7 @@ pub mod slices;
 pub mod sweep;
 pub mod telling;
 
+use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant, find};
@@ -28,7 +33,7 @@ use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::holds::{Broken, Watch};
-use crate::lab::scenes::tolerance::{GivenTolerances, Tolerances};
+use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use compare::Ratio;
@@ -84,6 +89,8 @@ pub struct StudyPlan {
     pub widths: Vec<LaneWidth>,
     /// Constraint orders; natural order has one lane.
     pub orders: Vec<Order>,
+    /// Treatments of impacts; on scenes where nothing bounces only the first of them.
+    pub impacts: Vec<Impacts>,
     /// Work per step.
     pub budgets: BudgetGrid,
     /// Parameters of solvers, by name.
@@ -109,12 +116,13 @@ impl Default for StudyPlan {
             solvers: default_solvers(),
             widths: widths(native_width()),
             orders: vec![Order::Natural, Order::Colored],
+            impacts: vec![Impacts::Own, Impacts::Waves],
             budgets: BudgetGrid::default(),
             overrides: Vec::new(),
             sweep: None,
             tolerances: GivenTolerances::default(),
             steps: None,
-            timing_steps: 200,
+            timing_steps: 300,
             repeats: 3,
             seed: 1,
         }
@@ -139,6 +147,7 @@ impl StudyPlan {
             ("solvers", self.solvers.is_empty()),
             ("lanes", self.widths.is_empty()),
             ("orders", self.orders.is_empty()),
+            ("impacts", self.impacts.is_empty()),
         ];
         if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
             return Err(Error::invalid(name, "none given"));
@@ -168,6 +177,12 @@ impl StudyPlan {
             names.push(scene.name);
         }
         Ok(())
+    }
+
+    /// The treatments of impacts that a scene runs with: where nothing bounces they are all the same.
+    fn impacts_on(&self, scene: &Scene) -> &[Impacts] {
+        let bounces = scene.bodies.iter().flat_map(|b| &b.shapes).any(|s| s.restitution > 0.0);
+        if bounces { &self.impacts } else { &self.impacts[..self.impacts.len().min(1)] }
     }
 
     fn open(&self, name: &str) -> Result<Loaded, Error> {
@@ -215,18 +230,16 @@ pub fn open_scene(
     steps: Option<u32>,
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
-    let mut loaded = if is_path(name) {
-        Loaded {
-            scene: Scene::from_file(name)?,
-            truth: None,
-            demands: &[],
-            tolerances: Tolerances::standard(),
-        }
-    } else {
-        match seed {
-            Some(seed) => scenes::load_with_seed(name, seed)?,
-            None => scenes::load(name)?,
-        }
+    if is_path(name) {
+        let mut scene = Scene::from_file(name)?;
+        scene.steps = steps.unwrap_or(scene.steps);
+        scene.dt = dt.unwrap_or(scene.dt);
+        scene.validate()?;
+        return scenes::expecting(scene);
+    }
+    let mut loaded = match seed {
+        Some(seed) => scenes::load_with_seed(name, seed)?,
+        None => scenes::load(name)?,
     };
     let scene = &mut loaded.scene;
     let (own_steps, own_dt) = (scene.steps, scene.dt);
@@ -234,7 +247,7 @@ pub fn open_scene(
     scene.dt = dt.unwrap_or(own_dt);
     scene.validate()?;
     let (stem, size) = name.split_once(':').unwrap_or((name, ""));
-    let entry = scenes::CATALOG.iter().find(|e| e.name == stem && !is_path(name));
+    let entry = scenes::CATALOG.iter().find(|e| e.name == stem);
     match entry {
         Some(entry) if (scene.steps, scene.dt) != (own_steps, own_dt) => {
             let size = size.parse().ok().or(entry.size.map(|s| s.default));
@@ -262,6 +275,7 @@ struct Cell<'a> {
     swept: Option<Swept>,
     name: &'a str,
     solver: &'static Variant,
+    impacts: Impacts,
     budget: Budget,
 }
 
@@ -290,35 +304,41 @@ pub fn run(
     plan.check()?;
     let points = plan.points();
     let mut cells = Vec::new();
-    let mut scenes: Vec<Vec<(Scene, Tolerances)>> = Vec::new();
+    let mut scenes: Vec<Vec<Loaded>> = Vec::new();
     for (i, name) in plan.scenes.iter().enumerate() {
         let mut variants = Vec::new();
         for (k, &swept) in points.iter().enumerate() {
-            let Loaded { scene, tolerances, .. } = plan.open_at(name, swept)?;
-            variants.push((scene, tolerances.with(&plan.tolerances)));
+            let mut loaded = plan.open_at(name, swept)?;
+            loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
             for &solver in &plan.solvers {
-                let budgets = plan.budgets(solver, swept)?.into_iter();
-                cells.extend(budgets.map(|budget| Cell { scene: [i, k], swept, name, solver, budget }));
+                for &impacts in plan.impacts_on(&loaded.scene) {
+                    let budgets = plan.budgets(solver, swept)?.into_iter();
+                    let cell = |budget| Cell { scene: [i, k], swept, name, solver, impacts, budget };
+                    cells.extend(budgets.map(cell));
+                }
             }
+            variants.push(loaded);
         }
         scenes.push(variants);
     }
     let done = AtomicUsize::new(0);
-    let finals = usize::from(plan.sweep.is_none());
-    let total = cells.len() * plan.orders.len() + scenes.len() * (plan.repeats as usize + finals);
+    let total = cells.len() * plan.orders.len() + scenes.len() * plan.repeats as usize;
     let tell = |what: String| progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
     let timed: Vec<u32> =
-        scenes.iter().map(|variants| timing_steps(plan, variants.iter().map(|v| &v.0))).collect();
+        scenes.iter().map(|variants| timing_steps(plan, variants.iter().map(|v| &v.scene))).collect();
     let outcomes = error_runs(plan, &cells, &timed, &tell)?;
     let mut records = Vec::new();
     for (i, variants) in scenes.iter().enumerate() {
         let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene[0] == i);
         let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
         let mut own = timed_records(plan, variants, timed[i], &rows, &tell)?;
-        mark_fronts(&mut own);
         if plan.steps.is_some() {
-            leave_out_unseen_truths(&mut own);
+            leave_out_unseen(&mut own, &variants[0].scene);
         }
+        if plan.sweep.is_none() && variants[0].rests() {
+            horizon::run_on(plan, plan.scenes[i].as_str(), &mut own, &tell)?;
+        }
+        mark_fronts(&mut own);
         finished(&own);
         records.extend(own);
     }
@@ -326,7 +346,11 @@ pub fn run(
 }
 
 /// What nobody came to see in a shortened run is not judged.
-fn leave_out_unseen_truths(records: &mut [Record]) {
+fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
+    if f64::from(scene.steps) * scene.dt < 2.0 * crate::lab::metrics::rest::REST_WINDOW {
+        // Rest is judged over the last second, and there has to be something before it.
+        records.iter_mut().for_each(|r| r.tolerances.rest = None);
+    }
     for scene in records.chunk_by_mut(|a, b| a.scene == b.scene) {
         if scene.iter().all(|r| r.truth.is_none_or(|t| t.error.is_none())) {
             scene.iter_mut().for_each(|r| r.tolerances.truth = None);
@@ -341,13 +365,18 @@ fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Se
         // Checked with the plan.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
     }
-    Settings { order, budget: cell.budget, parameters, ..Settings::new(cell.solver).exactly(width) }
+    Settings {
+        order,
+        budget: cell.budget,
+        impacts: cell.impacts,
+        parameters,
+        ..Settings::new(cell.solver).exactly(width)
+    }
 }
 
 /// Steps of a timing run of scenes that take turns.
 fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene>) -> u32 {
-    let shortest = scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min);
-    interleave::whole_blocks(shortest)
+    scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min)
 }
 
 /// Every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each scene.
@@ -447,14 +476,11 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
     rows
 }
 
-/// Finalists are timed so many times as often again.
-const FINAL: u32 = 2;
-
-/// Times in turns all settings of a scene that did not diverge, and those that may be the cheapest again; in
-/// a sweep all of them as often. `variants`: the scene at each value of the sweep.
+/// Times in common rounds all settings of a scene that did not diverge. `variants`: the scene at each value of
+/// the sweep.
 fn timed_records(
     plan: &StudyPlan,
-    variants: &[(Scene, Tolerances)],
+    variants: &[Loaded],
     steps: u32,
     rows: &[Row],
     tell: &dyn Fn(String),
@@ -463,14 +489,13 @@ fn timed_records(
     let variant = |row: &Row| &variants[row.cell.scene[1]];
     let chosen = running.iter().map(|&i| {
         let row = &rows[i];
-        (&variant(row).0, settings(plan, row.cell, row.order, row.width))
+        (&variant(row).scene, settings(plan, row.cell, row.order, row.width))
     });
     let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
-    let name = &variants[0].0.name;
-    let all: Vec<usize> = (0..running.len()).collect();
+    let name = &variants[0].scene.name;
     for pass in 1..=plan.repeats {
         tell(format!("times {name} · pass {pass}"));
-        interleaved.run(1, &all)?;
+        interleaved.run(1)?;
     }
     let place = |i: usize| running.binary_search(&i).ok();
     let untimed =
@@ -481,7 +506,8 @@ fn timed_records(
     };
     let record = |(i, row): (usize, &Row)| {
         let Row { cell, order, width, outcome } = row;
-        let (scene, tolerances) = variant(row);
+        let Loaded { scene, tolerances, unchecked, .. } = variant(row);
+        let parameters = settings(plan, cell, *order, *width).parameters;
         let sample = sample(&interleaved, i);
         let failure = sample.as_ref().err().map(|&d| Failure::from(d));
         let sample = sample.ok();
@@ -493,13 +519,17 @@ fn timed_records(
             order: *order,
             lanes: width.lanes(),
             budget: cell.budget,
-            budget_text: budget::brief(&cell.budget, cell.solver),
+            budget_text: budget::with_impacts(budget::brief(&cell.budget, cell.solver), cell.impacts),
+            impacts: cell.impacts,
+            parameters: overrides::words(cell.solver, &parameters),
             swept: cell.swept,
             speed_up: None,
             errors: outcome.errors.ok().filter(|_| failure.is_none()),
             truth: outcome.truth,
             tolerances: *tolerances,
             broken: outcome.broken,
+            unchecked: unchecked.clone(),
+            later: None,
             bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
             front: Fronts::default(),
             sample,
@@ -508,19 +538,13 @@ fn timed_records(
     };
     let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
 
-    if plan.sweep.is_none() {
-        tell(format!("times {name} · finalists"));
-        let finalists = answer::finalists(&records);
-        let entering: Vec<usize> = finalists.iter().filter_map(|&i| place(i)).collect();
-        interleaved.run(FINAL * plan.repeats, &entering)?;
-        for i in finalists {
-            records[i].sample = sample(&interleaved, i).ok();
-        }
-    }
     let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
     for i in 0..records.len() {
         let own = &records[i];
-        let budget = |r: &&Record| (r.solver, r.budget, r.swept) == (own.solver, own.budget, own.swept);
+        let budget = |r: &&Record| {
+            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.swept);
+            key(r) == key(own)
+        };
         let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
         let ratio = slow.zip(own.sample.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
         records[i].speed_up = ratio.map(|r| r.median);

@@ -24,14 +24,14 @@ pub fn times_of_fastest(
     solvers: &[&str],
     allowed: impl Fn(&Record) -> bool,
 ) -> Vec<Option<f64>> {
-    let less = |a: &&Sample, b: &&Sample| a.median_ns.total_cmp(&b.median_ns);
+    let less = |a: &&Sample, b: &&Sample| a.cost_ns().total_cmp(&b.cost_ns());
     let own = |solver: &&str| {
         let allowed = scene.iter().filter(|r| r.solver == *solver && allowed(r));
         allowed.filter_map(|r| r.sample.as_ref()).min_by(less)
     };
     let times: Vec<Option<&Sample>> = solvers.iter().map(own).collect();
     let Some(least) = times.iter().flatten().copied().min_by(less) else { return vec![None; solvers.len()] };
-    let ratio = |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.median_ns / least.median_ns };
+    let ratio = |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.cost_ns() / least.cost_ns() };
     times.into_iter().map(|time| time.map(ratio)).collect()
 }
 

@@ -1,14 +1,19 @@
-//! One ranking of the solvers over all scenes.
+//! The solvers over all scenes, and how much of it survives.
 //!
 //! On a scene, t(p) is the least time in which any setting of the solver p holds and keeps every
 //! tolerance of the scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest and for
 //! those that [tie](super::compare) with it, ½ for one that takes twice as long, 0 for one that is
 //! never good enough. The score of a solver is its mean speed over all scenes, and a scene that nobody
 //! solves lowers every score alike.
+//!
+//! Which scenes there are, and how strict they are, is somebody's choice. So every score has a range: over the
+//! studies that leave one scene out, and those with half and twice the tolerances. Who is not first in all of
+//! them does not [lead](Ranking::leader).
 
 use super::Record;
 use super::curve::solvers_of;
 use super::profile::times_of_fastest;
+use crate::lab::scenes::tolerance::Accuracy;
 
 /// A solver over all scenes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -17,41 +22,100 @@ pub struct Standing {
     pub solver: &'static str,
     /// Mean speed in that of the fastest, in [0, 1].
     pub score: f64,
+    /// Least and greatest score with one scene left out, or with other tolerances.
+    pub range: [f64; 2],
     /// Scenes on which some setting holds.
     pub holds: usize,
-    /// Scenes on which some setting holds and keeps all tolerances.
-    pub good: usize,
-    /// Of those, the ones on which it is the fastest, or ties with it.
+    /// Scenes on which some setting holds and keeps all tolerances, at each accuracy.
+    pub good: [usize; 3],
+    /// Of those of plausible runs, the ones on which it is the fastest, or ties with it.
     pub fastest: usize,
-    /// Of those, the ones on which it takes at most [`CLOSE`] times as long as the fastest.
+    /// Of those of plausible runs, the ones on which it takes at most [`CLOSE`] times as long as the fastest.
     pub close: usize,
+    /// Scenes on which none of its settings is good enough for a plausible run.
+    pub fails_on: Vec<String>,
+}
+
+/// All solvers, and who is first.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Ranking {
+    /// By their score, the best first; equal ones by name.
+    pub standings: Vec<Standing>,
+    /// Who is first with any scene left out, and with half and twice the tolerances; in the order of their scores.
+    pub first: Vec<&'static str>,
+}
+
+impl Ranking {
+    /// The solver that is first whatever is left out; none where that depends on it.
+    pub fn leader(&self) -> Option<&Standing> {
+        let [only] = self.first[..] else { return None };
+        self.standings.first().filter(|s| s.solver == only && s.score > 0.0)
+    }
 }
 
 /// What counts as close to the fastest (1).
 pub const CLOSE: f64 = 1.5;
 
-/// The solvers by their score, the best first; equal ones by name.
-pub fn ranking(records: &[Record]) -> Vec<Standing> {
+/// Tolerances that a score is tried with, in those of the scenes (1).
+const FACTORS: [f64; 2] = [0.5, 2.0];
+
+/// Speeds of the solvers on a scene, in that of the fastest; 0 where none of its settings is good enough.
+fn speeds(scene: &[Record], solvers: &[&'static str], tolerance: f64) -> Vec<f64> {
+    let times = times_of_fastest(scene, solvers, |r| r.excess() <= tolerance);
+    times.into_iter().map(|time| time.map_or(0.0, |t| 1.0 / t)).collect()
+}
+
+/// Mean over the scenes but one of each solver's speed.
+fn scores(speeds: &[Vec<f64>], without: Option<usize>) -> Vec<f64> {
+    let kept: Vec<&Vec<f64>> =
+        speeds.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, s)| s).collect();
+    let count = kept.first().map_or(0, |s| s.len());
+    (0..count).map(|k| kept.iter().map(|s| s[k]).sum::<f64>() / kept.len() as f64).collect()
+}
+
+/// The solvers over the scenes of `records`.
+pub fn ranking(records: &[Record]) -> Ranking {
     let solvers = solvers_of(records);
-    let standing =
-        |&solver: &&'static str| Standing { solver, score: 0.0, holds: 0, good: 0, fastest: 0, close: 0 };
-    let mut all: Vec<Standing> = solvers.iter().map(standing).collect();
-    let mut scenes = 0;
-    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
-        scenes += 1;
-        let times = times_of_fastest(scene, &solvers, |r| r.excess() <= 1.0);
-        for (own, time) in all.iter_mut().zip(times) {
-            own.holds += scene.iter().any(|r| r.solver == own.solver && r.holds()) as usize;
-            let Some(time) = time else { continue };
-            own.score += 1.0 / time;
-            own.good += 1;
-            own.fastest += (time <= 1.0) as usize;
-            own.close += (time <= CLOSE) as usize;
-        }
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let by_factor =
+        |factor: f64| -> Vec<Vec<f64>> { scenes.iter().map(|s| speeds(s, &solvers, factor)).collect() };
+    let own = by_factor(1.0);
+    let mut tried: Vec<Vec<f64>> = FACTORS.into_iter().map(|f| scores(&by_factor(f), None)).collect();
+    if scenes.len() > 1 {
+        tried.extend((0..scenes.len()).map(|i| scores(&own, Some(i))));
     }
-    all.iter_mut().for_each(|own| own.score /= f64::from(scenes.max(1)));
-    all.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
-    all
+    let whole = scores(&own, None);
+    tried.push(whole.clone());
+    let standing = |(k, &solver): (usize, &&'static str)| {
+        let times = own.iter().map(|s| s[k]);
+        let good = |accuracy: Accuracy| {
+            let is_good = |s: &&&[Record]| s.iter().any(|r| r.solver == solver && r.is_good(accuracy));
+            scenes.iter().filter(is_good).count()
+        };
+        let least = tried.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min);
+        let most = tried.iter().map(|t| t[k]).fold(0.0, f64::max);
+        let failing = scenes.iter().zip(&own).filter(|(_, speeds)| speeds[k] == 0.0);
+        Standing {
+            solver,
+            score: whole[k],
+            range: [least, most],
+            holds: scenes.iter().filter(|s| s.iter().any(|r| r.solver == solver && r.holds())).count(),
+            good: Accuracy::ALL.map(good),
+            fastest: times.clone().filter(|&speed| speed >= 1.0).count(),
+            close: times.filter(|&speed| speed * CLOSE >= 1.0).count(),
+            fails_on: failing.map(|(scene, _)| scene[0].scene.clone()).collect(),
+        }
+    };
+    let mut standings: Vec<Standing> = solvers.iter().enumerate().map(standing).collect();
+    standings.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
+    // All that share the first place are first.
+    let is_first = |k: usize| {
+        let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
+        tried.iter().any(|t| t[k] > 0.0 && t[k] >= best(t))
+    };
+    let first: Vec<&'static str> = (0..solvers.len()).filter(|&k| is_first(k)).map(|k| solvers[k]).collect();
+    let first = standings.iter().map(|s| s.solver).filter(|name| first.contains(name)).collect();
+    Ranking { standings, first }
 }
 
 #[cfg(test)]
@@ -67,12 +131,12 @@ mod tests {
     fn the_score_is_the_mean_speed_of_what_is_good_enough() {
         // 10 mm are allowed.
         let records = [
-            on("x", "b", 10.0, 1e-3),
-            on("x", "a", 40.0, 1e-3),
+            on("x", "b", 10.0, 9e-4),
+            on("x", "a", 40.0, 9e-4),
             on("x", "a", 1.0, 1.0),
             // Tied.
             on("y", "b", 10.1, 1e-3),
-            on("y", "a", 10.0, 1e-3),
+            on("y", "a", 10.0, 9e-5),
             // The faster one fell, the other one is too deep.
             Record { scene: "z".to_string(), solver: "b", ..fell(8, 1, 1.0, 0.0) },
             on("z", "a", 2.0, 1.0),
@@ -80,9 +144,33 @@ mod tests {
             Record { scene: "w".to_string(), solver: "a", ..failed(8) },
         ];
         let found = ranking(&records);
-        let b = Standing { solver: "b", score: 0.5, holds: 2, good: 2, fastest: 2, close: 2 };
-        let a = Standing { solver: "a", score: 1.25 / 4.0, holds: 3, good: 2, fastest: 1, close: 1 };
-        assert_eq!(found, [b, a]);
+        let [b, a] = &found.standings[..] else { panic!("{found:?}") };
+        assert_eq!((b.solver, b.score, b.holds, b.good), ("b", 0.5, 2, [2, 2, 0]));
+        assert_eq!((a.solver, a.score, a.holds, a.good), ("a", 1.25 / 4.0, 3, [2, 2, 1]));
+        assert_eq!(([b.fastest, b.close], [a.fastest, a.close]), ([2, 2], [1, 1]));
+        assert_eq!(a.fails_on, ["z", "w"]);
+        // Without x both have 1/3, without z or w two thirds.
+        assert_eq!((b.range, a.range), ([1.0 / 3.0, 2.0 / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
+        // They share the first place without x.
+        assert_eq!((found.first.clone(), found.leader()), (vec!["b", "a"], None));
+    }
+
+    #[test]
+    fn who_is_first_by_one_scene_alone_does_not_lead() {
+        let mut records = vec![
+            on("x", "a", 10.0, 1e-3),
+            on("x", "b", 90.0, 1e-3),
+            on("y", "a", 11.0, 1e-3),
+            on("y", "b", 10.0, 1e-3),
+        ];
+        let found = ranking(&records);
+        assert_eq!((found.standings[0].solver, found.leader()), ("a", None));
+        // First on every scene, at any tolerance.
+        records[2] = on("y", "a", 9.0, 1e-3);
+        assert_eq!(ranking(&records).leader().map(|s| s.solver), Some("a"));
+        // At half the tolerance it is not good enough any more.
+        (records[0], records[2]) = (on("x", "a", 10.0, 6e-3), on("y", "a", 9.0, 6e-3));
+        assert_eq!(ranking(&records).leader(), None);
     }
 
     #[test]
@@ -90,9 +178,9 @@ mod tests {
         let mut records = vec![on("x", "c", 10.0, 0.0), on("x", "a", 10.1, 0.0), on("x", "b", 9.9, 0.0)];
         for _ in 0..3 {
             records.rotate_left(1);
-            let names: Vec<_> = ranking(&records).into_iter().map(|s| s.solver).collect();
+            let names: Vec<_> = ranking(&records).standings.into_iter().map(|s| s.solver).collect();
             assert_eq!(names, ["a", "b", "c"]);
         }
-        assert!(ranking(&[]).is_empty());
+        assert!(ranking(&[]).standings.is_empty() && ranking(&[]).leader().is_none());
     }
 }

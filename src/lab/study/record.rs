@@ -4,13 +4,15 @@ use super::curve::ErrorAxis;
 use super::interleave::Sample;
 use super::pareto::{self, Point};
 use super::sweep::Swept;
+use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
 use crate::engine::world::{Criterion, Divergence, Order, Quantity};
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::Truth;
 use crate::lab::scenes::holds::{Broken, Mark};
-use crate::lab::scenes::tolerance::Tolerances;
+use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
+use crate::lab::units::si;
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -32,6 +34,12 @@ pub struct Record {
     pub budget: Budget,
     /// The same, for tables.
     pub budget_text: String,
+    /// What happens where bodies hit each other.
+    #[serde(default)]
+    pub impacts: Impacts,
+    /// Parameters of the solver, `name=value` by blanks.
+    #[serde(default)]
+    pub parameters: String,
     /// What a sweep set; none without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swept: Option<Swept>,
@@ -43,11 +51,19 @@ pub struct Record {
     /// Errors, the same for all widths; none if the run failed.
     pub errors: Option<Errors>,
     /// Distance to what is known about the scene.
+    #[serde(rename = "reference")]
     pub truth: Option<TruthError>,
     /// How wrong the scene may be.
     pub tolerances: Tolerances,
     /// The first demand of the scene that was not met.
+    #[serde(rename = "holds", with = "holding")]
     pub broken: Option<Broken>,
+    /// What nobody checked, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unchecked: Vec<String>,
+    /// What happened when it was run on, for as long as the scene deserves; none if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub later: Option<Later>,
     /// Whether this width ended in the same bits as the error run.
     pub bits_equal: Option<bool>,
     /// Fronts that the setting is on; only its fastest width is.
@@ -56,7 +72,71 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
+/// What holds is `"yes"` in files; what does not has its word and its step.
+mod holding {
+    use super::Broken;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Holds {
+        Yes(String),
+        No(Broken),
+    }
+
+    pub fn serialize<S: Serializer>(broken: &Option<Broken>, serializer: S) -> Result<S::Ok, S::Error> {
+        broken.map_or(Holds::Yes("yes".into()), Holds::No).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Broken>, D::Error> {
+        match Holds::deserialize(deserializer)? {
+            Holds::Yes(_) => Ok(None),
+            Holds::No(broken) => Ok(Some(broken)),
+        }
+    }
+}
+
+/// A run to the horizon of its scene.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Later {
+    /// Steps of the run, if nothing ended it.
+    pub steps: u64,
+    /// The same (s).
+    pub seconds: f64,
+    /// The first demand that was not met.
+    #[serde(rename = "holds", with = "holding")]
+    pub broken: Option<Broken>,
+    /// Root mean square of the speed over the last second (m/s); none where nothing has to rest.
+    pub rest_speed_m_s: Option<f64>,
+}
+
 impl Record {
+    /// What two widths of one setting have in common, beside the scene.
+    pub fn setting(&self) -> (&'static str, Budget, Order, Impacts, Option<Swept>, &str) {
+        (self.solver, self.budget, self.order, self.impacts, self.swept, &self.parameters)
+    }
+
+    /// What a step costs (ns); infinite without a time.
+    pub fn cost_ns(&self) -> f64 {
+        self.sample.as_ref().map_or(f64::INFINITY, Sample::cost_ns)
+    }
+
+    /// What went wrong after the end of the run, in words; none if nothing did, or nobody looked.
+    pub fn fails_later(&self) -> Option<String> {
+        let later = self.later?;
+        if let Some(broken) = later.broken {
+            return Some(broken.to_string());
+        }
+        let limit = self.tolerances.rest?.value;
+        let speed = later.rest_speed_m_s?;
+        (speed > limit).then(|| format!("moves at {} after {:.0} s", si(speed, "m/s"), later.seconds))
+    }
+
+    /// Whether it is within all tolerances at this accuracy, as far as is known: that it fails later counts.
+    pub fn is_good(&self, accuracy: Accuracy) -> bool {
+        self.excess_at(accuracy) <= 1.0
+    }
+
     /// The word for a run that does not hold; none if it does.
     pub fn mark(&self) -> Option<Mark> {
         self.broken.map(|b| b.mark).or(self.failure.map(|_| Mark::BlewUp))
@@ -69,22 +149,32 @@ impl Record {
 
     /// The error along an axis in its tolerance; none where there is no such error.
     pub fn in_tolerance(&self, axis: ErrorAxis) -> Option<f64> {
-        let tolerance = match axis {
-            ErrorAxis::Penetration => self.tolerances.penetration,
-            ErrorAxis::Law => self.tolerances.residual,
-            ErrorAxis::Truth => self.tolerances.truth?,
-        };
+        self.in_tolerance_at(axis, Accuracy::Plausible)
+    }
+
+    /// The same, in the tolerance at an accuracy.
+    pub fn in_tolerance_at(&self, axis: ErrorAxis, accuracy: Accuracy) -> Option<f64> {
+        let tolerance = axis.tolerance(&self.tolerances)?.at(accuracy);
         let error = axis.of(self)?;
-        Some(if error > 0.0 { error / tolerance.value } else { 0.0 })
+        Some(if error > 0.0 { error / tolerance } else { 0.0 })
+    }
+
+    /// The largest of the errors in their tolerances for a plausible run, see [`Self::excess_at`].
+    pub fn excess(&self) -> f64 {
+        self.excess_at(Accuracy::Plausible)
     }
 
     /// The largest of the errors in their tolerances: up to 1 is within all of them. Infinite for a
     /// run that does not hold, or that never came to what is known.
-    pub fn excess(&self) -> f64 {
-        let known = self.truth.is_some() && self.tolerances.truth.is_some();
-        let judged = ErrorAxis::ALL.into_iter().filter(|&axis| axis != ErrorAxis::Truth || known);
-        let worst = judged.map(|axis| self.in_tolerance(axis).unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
-        if self.holds() { worst } else { f64::INFINITY }
+    pub fn excess_at(&self, accuracy: Accuracy) -> f64 {
+        let known = |axis: &ErrorAxis| match axis {
+            ErrorAxis::Truth => self.truth.is_some() && self.tolerances.truth.is_some(),
+            axis => axis.tolerance(&self.tolerances).is_some(),
+        };
+        let judged = ErrorAxis::JUDGED.into_iter().filter(known);
+        let worst = judged.map(|axis| self.in_tolerance_at(axis, accuracy).unwrap_or(f64::INFINITY));
+        let fell = self.later.is_some_and(|later| later.broken.is_some());
+        if self.holds() && !fell { worst.fold(0.0, f64::max) } else { f64::INFINITY }
     }
 }
 
@@ -117,8 +207,10 @@ pub struct Fronts {
     /// Against the deepest penetration.
     pub penetration: bool,
     /// Against the contact-law residual (root mean square).
+    #[serde(rename = "residual")]
     pub law: bool,
     /// Against the distance to the truth.
+    #[serde(rename = "reference")]
     pub truth: bool,
 }
 
@@ -172,34 +264,41 @@ pub fn mark_fronts(records: &mut [Record]) {
                 *flag(&mut group[i].front) = on_front;
             }
         };
-        mark(|r| Some(r.errors?.penetration_max), |f| &mut f.penetration);
-        mark(|r| Some(r.errors?.law_rms_body), |f| &mut f.law);
-        mark(|r| r.truth?.error, |f| &mut f.truth);
+        mark(|r| ErrorAxis::Penetration.of(r), |f| &mut f.penetration);
+        mark(|r| ErrorAxis::Law.of(r), |f| &mut f.law);
+        mark(|r| ErrorAxis::Truth.of(r), |f| &mut f.truth);
     }
 }
 
 /// Whether no width of the same setting is faster than record `i`.
 fn is_fastest(group: &[Record], i: usize) -> bool {
     let own = &group[i];
-    let time = |r: &Record| r.sample.as_ref().map(|sample| sample.median_ns);
+    let time = |r: &Record| r.sample.as_ref().map(Sample::cost_ns);
     let Some(own_time) = time(own) else { return false };
-    let same = |r: &Record| (r.solver, r.budget, r.order) == (own.solver, own.budget, own.order);
+    let same = |r: &Record| r.setting() == own.setting();
     !group.iter().any(|r| same(r) && time(r).is_some_and(|t| t < own_time))
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::lab::scenes::{Scene, SceneBody, SceneShape};
     use crate::lab::study::interleave::Load;
 
     /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
         let sample = Sample {
+            mean_ns: 1e3 * time,
             median_ns: 1e3 * time,
+            worst_ns: 1e3 * time,
+            rounds: 1,
+            waited: 0.0,
+            noise: 0.0,
             spread_ns: 0.0,
             quartiles_ns: [0.0; 2],
             phase_ns: Default::default(),
             row_sweep_ns: 1.0,
+            yardstick_ns: 1e4,
             load: Load::default(),
             blocks_ns: vec![vec![1e3 * time; 20]],
             hash: 0,
@@ -213,17 +312,31 @@ pub(crate) mod tests {
             lanes,
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
             budget_text: format!("{substeps} sub"),
+            impacts: Impacts::Own,
+            parameters: String::new(),
             swept: None,
             sample: Some(sample),
             speed_up: None,
-            errors: Some(Errors { penetration_max: penetration, ..Errors::default() }),
+            errors: Some(Errors {
+                penetration_max: penetration,
+                held_depth_p99: penetration,
+                ..Errors::default()
+            }),
             truth: None,
-            tolerances: Tolerances::standard(),
+            tolerances: tolerances(),
             broken: None,
+            unchecked: Vec::new(),
+            later: None,
             bits_equal: Some(true),
             front: Fronts::default(),
             failure: None,
         }
+    }
+
+    /// Those of a box of a metre that nobody said has to rest.
+    pub fn tolerances() -> Tolerances {
+        let body = SceneBody::dynamic([0.0, 0.0], SceneShape::rectangle(0.5, 0.5));
+        Tolerances::standard(&Scene::new("x", vec![body]))
     }
 
     pub fn failed(lanes: usize) -> Record {
@@ -246,7 +359,7 @@ pub(crate) mod tests {
     #[test]
     fn an_error_is_judged_in_the_tolerance_of_its_scene() {
         let mut good = record(8, 1, 10.0, 5e-3);
-        assert_eq!((good.in_tolerance(ErrorAxis::Truth), good.excess()), (None, 0.5 * 1e-2 / SLOPS));
+        assert_eq!((good.in_tolerance(ErrorAxis::Truth), good.excess()), (None, 0.5));
         let truth = TruthError { quantity: "", unit: "N", expected: 50.0, error: Some(2.0) };
         (good.truth, good.tolerances) = (Some(truth), good.tolerances.percent(50.0));
         assert_eq!(good.excess(), 4.0);
@@ -259,8 +372,24 @@ pub(crate) mod tests {
         assert_eq!(failed(8).mark(), Some(Mark::BlewUp));
     }
 
-    /// Two slops (m), as `f32` has them.
-    const SLOPS: f64 = 2.0 * crate::engine::params::LINEAR_SLOP as f64;
+    #[test]
+    fn what_falls_or_moves_later_is_not_good() {
+        let mut record = record(8, 1, 10.0, 0.9e-3);
+        let good = |r: &Record| Accuracy::ALL.map(|a| r.is_good(a));
+        assert_eq!((good(&record), record.fails_later()), ([true, true, false], None));
+        record.tolerances.rest = Some(crate::lab::scenes::tolerance::Tolerance::new(5e-3, "x"));
+        record.errors.as_mut().unwrap().rest_velocity = 1e-3;
+        assert_eq!(good(&record), [true, false, false]);
+        let later = Later { steps: 3600, seconds: 60.0, broken: None, rest_speed_m_s: Some(36e-3) };
+        record.later = Some(later);
+        assert_eq!(
+            (good(&record), record.fails_later()),
+            ([false; 3], Some("moves at 36.0 mm/s after 60 s".into()))
+        );
+        let broken = Some(Broken { mark: Mark::Fell, step: 800 });
+        record.later = Some(Later { broken, rest_speed_m_s: Some(0.0), ..later });
+        assert_eq!((good(&record), record.fails_later()), ([false; 3], Some("fell at step 800".into())));
+    }
 
     #[test]
     fn only_the_fastest_width_of_a_setting_is_on_a_front() {

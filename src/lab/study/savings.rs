@@ -75,7 +75,9 @@ pub fn savings(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result
         for scene in &scenes {
             progress(Progress { done, total, what: format!("{} · {}", scene.name, solver.name) });
             done += 1;
-            savings.extend(of_scene(plan, scene, Settings::new(solver).exactly(width))?);
+            let impacts = plan.impacts.first().copied().unwrap_or_default();
+            let base = Settings { impacts, ..Settings::new(solver).exactly(width) };
+            savings.extend(of_scene(plan, scene, base)?);
         }
     }
     Ok(savings)

@@ -81,7 +81,8 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
-    let cell = Cell { scene: [0; 2], swept: None, name, solver, budget: record.budget };
+    let cell =
+        Cell { scene: [0; 2], swept: None, name, solver, impacts: record.impacts, budget: record.budget };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;

@@ -130,8 +130,8 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         "overview",
         "Speed against error over all scenes",
         "Small marks: every solver and budget on every scene, in colours, at its fastest lane width. Large marks: \
-         the geometric mean of a budget over the scenes on which it holds, from the smallest budget to the \
-         largest. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
+         the geometric mean of a budget, from the smallest to the largest; hollow ones leave out scenes on which it \
+         does not hold, and their names say how many. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
         overview::overview(records),
     );
     if !recordings.is_empty() {
@@ -221,7 +221,7 @@ fn machine(study: &StudyFile) -> String {
         ("compiler", e.compiler.clone()),
         ("instructions", e.target_features.join(" ")),
         ("native lanes", e.native_lanes.to_string()),
-        ("version", e.version.clone()),
+        ("version", format!("{}, commit {}", e.version, e.commit)),
         ("command", command(&study.settings)),
     ];
     let mut text = String::from("<table class=\"facts\"><tbody>\n");
@@ -256,6 +256,7 @@ fn command(settings: &Value) -> String {
     option("solvers", solvers);
     option("lanes", list(&settings["lanes"]));
     option("orders", list(&settings["orders"]));
+    option("impacts", list(&settings["impacts"]));
     for name in ["substeps", "velocity_iterations", "relax_iterations", "position_iterations"] {
         option(&name.replace('_', "-"), list(&settings["budgets"][name]));
     }
@@ -269,8 +270,12 @@ fn command(settings: &Value) -> String {
         let values: Vec<String> = values.map(|v| v.to_string()).collect();
         option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
     }
-    let options =
-        [("penetration", "penetration", "m"), ("residual", "residual", ""), ("truth", "reference", "")];
+    let options = [
+        ("penetration", "penetration", "m"),
+        ("residual", "residual", ""),
+        ("truth", "reference", ""),
+        ("rest", "rest-speed", "m/s"),
+    ];
     let given = |(name, option, unit): &(&str, &str, &str)| {
         settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))
     };
@@ -288,8 +293,7 @@ fn command(settings: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::tolerance::Tolerances;
-    use crate::lab::study::record::tests::{failed, fell, record};
+    use crate::lab::study::record::tests::{failed, fell, record, tolerances};
     use crate::lab::study::{Record, StudyPlan, TruthError, mark_fronts};
 
     fn records() -> Vec<Record> {
@@ -298,7 +302,7 @@ mod tests {
             solver: "soft_step",
             truth: Some(truth),
             speed_up: Some(3.0),
-            tolerances: Tolerances::standard().percent(1e7),
+            tolerances: tolerances().percent(1e7),
             ..record(8, substeps, time, error)
         };
         let mut records = vec![
@@ -358,14 +362,14 @@ mod tests {
         let page = page(&study, None, &[]);
         for part in [
             "PARTIAL: without arch",
-            "ranks first: it is good enough on",
+            "fails on",
             "fell at step 100",
             "blew up at step 7",
             "performance profiles",
             "lanes filled",
             "time per phase",
             "sweeps of a step",
-            "deepest penetration",
+            "penetration, 99 % or at rest",
             "load of &lt;ground&gt;",
             "2 kN",
             "simpulse study --quick --scenes",

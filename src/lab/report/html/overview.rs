@@ -106,15 +106,19 @@ pub fn overview(records: &[Record]) -> String {
                 number(mean(&xs)),
                 number(mean(&ys))
             );
-            line.push((panel.at(mean(&xs), mean(&ys)), title, format!("{solver} {held_on}/{of}")));
+            let name = match held_on == of {
+                true => solver.to_string(),
+                false => format!("{solver}, fails on {} of {of}", of - held_on),
+            };
+            line.push((panel.at(mean(&xs), mean(&ys)), title, name, held_on == of));
         }
         let at: Vec<[f64; 2]> = line.iter().map(|l| l.0).collect();
         panel.line(&at, "curve", Style::of(solver).color);
-        for (i, (at, title, _)) in line.iter().enumerate() {
+        for (i, (at, title, _, whole)) in line.iter().enumerate() {
             labels.block(*at, 6.0 + 1.5 * i as f64);
-            panel.marker(*at, 6.0 + 1.5 * i as f64, solver, false, false, title);
+            panel.marker(*at, 6.0 + 1.5 * i as f64, solver, !whole, false, title);
         }
-        names.extend(line.pop().map(|(at, _, name)| (at, name)));
+        names.extend(line.pop().map(|(at, _, name, _)| (at, name)));
     }
     for (at, name) in names {
         if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides())

@@ -12,8 +12,9 @@ use crate::lab::units::{digits, lanes, si};
 /// Name and unit of an error on a scene.
 pub fn name(scene: &[Record], axis: Axis) -> Option<(String, String)> {
     match axis {
-        Axis::Penetration => Some(("deepest penetration".into(), "m".into())),
-        Axis::Law => Some(("contact-law residual (body weights, rms)".into(), String::new())),
+        Axis::Penetration => Some(("penetration, 99 % or at rest".into(), "m".into())),
+        Axis::Law => Some(("contact-law residual (weights of the lighter body, rms)".into(), String::new())),
+        Axis::Rest => Some(("speed at rest".into(), "m/s".into())),
         Axis::Truth => {
             let truth = scene.iter().find_map(|e| e.truth.as_ref())?;
             Some((format!("error of {}", truth.quantity), truth.unit.to_string()))

@@ -29,7 +29,7 @@ pub trait Setting {
 
 impl Setting for Record {
     fn time(&self) -> Option<f64> {
-        self.sample.as_ref().map(|sample| 1e-9 * sample.median_ns)
+        self.sample.as_ref().map(|sample| 1e-9 * sample.cost_ns())
     }
 
     fn drawn(&self, axis: ErrorAxis) -> Option<f64> {
@@ -37,11 +37,7 @@ impl Setting for Record {
     }
 
     fn tolerance(&self, axis: ErrorAxis) -> Option<f64> {
-        match axis {
-            ErrorAxis::Penetration => Some(self.tolerances.penetration.value),
-            ErrorAxis::Law => Some(self.tolerances.residual.value),
-            ErrorAxis::Truth => self.tolerances.truth.as_ref().map(|t| t.value),
-        }
+        axis.tolerance(&self.tolerances).map(|t| t.value)
     }
 
     fn on_front(&self, axis: ErrorAxis) -> bool {
@@ -49,6 +45,7 @@ impl Setting for Record {
             ErrorAxis::Penetration => self.front.penetration,
             ErrorAxis::Law => self.front.law,
             ErrorAxis::Truth => self.front.truth,
+            ErrorAxis::Rest => false,
         }
     }
 

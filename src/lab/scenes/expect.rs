@@ -1,0 +1,110 @@
+//! What a scene file says of a run: what must hold, and what is known.
+//!
+//! Scenes of the catalogue write it with [`Scene::to_json`], so that a file that was printed is checked as the
+//! scene that it came from. Observers of the catalogue that no number describes (the twin of a far stack, the
+//! apexes of a bounce) go by its name, and only as long as the bodies are its own.
+
+use super::Scene;
+use crate::engine::bodies::BodyKind;
+use crate::lab::error::Error;
+use serde::{Deserialize, Serialize};
+
+/// `"expect"` of a scene file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expect {
+    /// Scene of the catalogue whose tolerances, and whose observers that nothing else here describes, hold for
+    /// this one as long as its bodies are the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub catalogue: Option<String>,
+    /// [`Demand::Rests`](super::holds::Demand::Rests)
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub rests: bool,
+    /// [`Demand::Stands`](super::holds::Demand::Stands)
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stands: bool,
+    /// [`Demand::StaysStacked`](super::holds::Demand::StaysStacked)
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stays_stacked: bool,
+    /// [`Demand::GainsNoEnergy`](super::holds::Demand::GainsNoEnergy)
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub gains_no_energy: bool,
+    /// [`Demand::StaysWithin`](super::holds::Demand::StaysWithin) (m)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stays_within: Option<f64>,
+    /// [`Demand::Inside`](super::holds::Demand::Inside) (m)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stays_inside: Option<[[f64; 2]; 2]>,
+    /// What is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Reference>,
+}
+
+/// A number that is known about the last second of a run, or about all of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// What is measured.
+    pub measure: Measure,
+    /// Whose height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<usize>,
+    /// In the unit of the measure.
+    pub value: f64,
+    /// The most that a plausible run may be off, in the same unit; > 0.
+    pub tolerance: f64,
+}
+
+/// What a file can know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// Height of a body's centre over the last second (m).
+    RestingHeight,
+    /// Load of all static bodies over the last second (N).
+    GroundLoad,
+    /// Greatest drop of a body's centre over the run (m).
+    GreatestDrop,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+impl Expect {
+    /// Refuses what no run can be held to. Errors name places within `expect`.
+    pub(super) fn validate(&self, scene: &Scene) -> Result<(), Error> {
+        let positive = |place: &str, value: f64| match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => Err(Error::invalid(place, format!("must be positive and finite, is {value}"))),
+        };
+        if let Some(limit) = self.stays_within {
+            positive("stays_within", limit)?;
+        }
+        if let Some([low, high]) = self.stays_inside
+            && !(0..2).all(|k| low[k] < high[k] && low[k].is_finite() && high[k].is_finite())
+        {
+            let message = format!("the first corner must be below and left of the second: {low:?}, {high:?}");
+            return Err(Error::invalid("stays_inside", message));
+        }
+        let Some(Reference { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
+        positive("reference.tolerance", *tolerance)?;
+        if !value.is_finite() {
+            return Err(Error::invalid("reference.value", format!("must be finite, is {value}")));
+        }
+        let is_dynamic = |i: &usize| scene.bodies.get(*i).is_some_and(|body| body.kind == BodyKind::Dynamic);
+        match (measure, body) {
+            (Measure::RestingHeight, Some(i)) if is_dynamic(i) => Ok(()),
+            (Measure::RestingHeight, Some(i)) => {
+                Err(Error::invalid("reference.body", format!("{i} is no dynamic body of the scene")))
+            }
+            (Measure::RestingHeight, None) => {
+                Err(Error::invalid("reference.body", "missing: whose height is known"))
+            }
+            (_, Some(i)) => {
+                Err(Error::invalid("reference.body", format!("{i}, where the measure is of no body")))
+            }
+            (_, None) => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Runs to the horizon of a scene: whether what would be named stands for a minute.
+//!
+//! A stack that stands for the five seconds of a run may fall in the thirteenth. Nobody wants it, however cheap
+//! it is, and nobody would find out from a run that ends before. So the settings that an [`Answer`] would name
+//! are run on, untimed and on all cores, and those that fail make place for the next.
+
+use super::answer::{Answer, same};
+use super::record::Later;
+use super::{Record, StudyPlan};
+use crate::engine::lanes::LaneWidth;
+use crate::engine::solvers::find;
+use crate::engine::world::Settings;
+use crate::lab::error::Error;
+use crate::lab::metrics::Observation;
+use crate::lab::metrics::rest::REST_WINDOW;
+use crate::lab::overrides;
+use crate::lab::scenes::Loaded;
+use crate::lab::scenes::holds::{Broken, HORIZON, Mark, Watch};
+use crate::lab::scenes::tolerance::Accuracy;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Runs a scene that has to rest for [`HORIZON`], or for its own steps if they are more.
+///
+/// Errors: a scene that cannot be built.
+pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
+    let scene = &loaded.scene;
+    let steps = ((HORIZON / scene.dt).ceil() as u64).max(u64::from(scene.steps));
+    let observed = (REST_WINDOW / scene.dt).round().max(1.0) as u64;
+    let seconds = steps as f64 * scene.dt;
+    let mut later = Later { steps, seconds, broken: None, rest_speed_m_s: None };
+    let mut world = scene.build(Settings { record_impulses: false, timed: false, ..settings })?;
+    let mut watch = Watch::new(&world, loaded.demands.clone());
+    let mut observation = None;
+    for step in 0..steps {
+        if step + observed >= steps {
+            observation.get_or_insert_with(|| Observation::new(&world));
+        }
+        if let Err(divergence) = world.step() {
+            later.broken = Some(Broken { mark: Mark::BlewUp, step: divergence.step });
+            return Ok(later);
+        }
+        watch.observe(&world);
+        if let Some(broken) = watch.broken() {
+            later.broken = Some(broken);
+            return Ok(later);
+        }
+        if let Some(observation) = &mut observation {
+            observation.observe(&world);
+        }
+    }
+    later.rest_speed_m_s = observation.map(|o| o.errors().rest_velocity);
+    Ok(later)
+}
+
+/// What to do with each of a list, on all cores; results in the order of the list.
+pub fn in_parallel<T: Sync, R: Send>(
+    list: &[T],
+    work: impl Fn(&T) -> Result<R, Error> + Sync,
+) -> Result<Vec<R>, Error> {
+    let next = AtomicUsize::new(0);
+    let slots: Vec<Mutex<Option<Result<R, Error>>>> = list.iter().map(|_| Mutex::new(None)).collect();
+    let go = || {
+        while let Some((item, slot)) = {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            list.get(i).zip(slots.get(i))
+        } {
+            let result = work(item);
+            if let Ok(mut slot) = slot.lock() {
+                *slot = Some(result);
+            }
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(list.len());
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(go);
+        }
+        go();
+    });
+    slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
+}
+
+/// Runs on the settings of a scene that an answer at some accuracy would name, until all of them are known to
+/// stand, or to be the last.
+///
+/// Errors: as [`later`].
+pub fn run_on(
+    plan: &StudyPlan,
+    name: &str,
+    records: &mut [Record],
+    tell: &dyn Fn(String),
+) -> Result<(), Error> {
+    loop {
+        let mut untried: Vec<&Record> = Vec::new();
+        for accuracy in Accuracy::ALL {
+            let Some(answer) = Answer::at(records, accuracy) else { return Ok(()) };
+            // What a solver is good for is said of plausible runs: there each has to stand.
+            let each = if accuracy == Accuracy::Plausible { answer.of_each_solver() } else { Vec::new() };
+            for record in answer.untried().chain(each.into_iter().filter(|r| r.later.is_none())) {
+                if untried.iter().all(|other| !same(other, record)) {
+                    untried.push(record);
+                }
+            }
+        }
+        if untried.is_empty() {
+            return Ok(());
+        }
+        tell(format!("a minute of {name}: {} settings", untried.len()));
+        let jobs: Vec<(Record, Settings)> =
+            untried.into_iter().map(|r| Ok((r.clone(), settings(plan, r)?))).collect::<Result<_, Error>>()?;
+        let found = in_parallel(&jobs, |(_, settings)| later(&plan.open(name)?, settings.clone()))?;
+        for ((record, _), later) in jobs.iter().zip(found) {
+            records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.later = Some(later));
+        }
+    }
+}
+
+/// The settings of a record of `plan`.
+fn settings(plan: &StudyPlan, record: &Record) -> Result<Settings, Error> {
+    let solver = find(record.solver)?;
+    let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
+    Ok(Settings {
+        order: record.order,
+        budget: record.budget,
+        impacts: record.impacts,
+        parameters: overrides::values(solver, &plan.overrides)?,
+        ..Settings::new(solver).exactly(width)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes;
+
+    #[test]
+    fn what_falls_in_a_minute_is_found_with_its_step() {
+        let run = |solver: &str, velocity_iterations: u32| {
+            let solver = find(solver).unwrap();
+            let mut settings = Settings::new(solver);
+            settings.budget.velocity_iterations = velocity_iterations;
+            later(&scenes::load("stack:20").unwrap(), settings).unwrap()
+        };
+        // Eight sweeps do not carry twenty boxes.
+        let fallen = run("pgs", 8);
+        assert_eq!(fallen.broken.map(|b| b.mark), Some(Mark::Fell), "{fallen:?}");
+        assert!(fallen.broken.is_some_and(|b| b.step > 0 && b.step < fallen.steps));
+        let stands = run("shim", 1);
+        assert_eq!((stands.broken, stands.steps), (None, 3600));
+        assert!(stands.rest_speed_m_s.is_some_and(|speed| speed < 5e-3), "{stands:?}");
+    }
+
+    #[test]
+    fn results_keep_the_order_of_the_list() {
+        let list: Vec<u32> = (0..50).collect();
+        assert_eq!(
+            in_parallel(&list, |&n| Ok(n * n)).unwrap(),
+            list.iter().map(|n| n * n).collect::<Vec<_>>()
+        );
+        let failed = in_parallel(&list, |&n| if n == 7 { Err(Error::invalid("n", "7")) } else { Ok(n) });
+        assert!(failed.is_err());
+    }
+}

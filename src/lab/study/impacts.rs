@@ -1,0 +1,96 @@
+//! What waves of impacts gain each solver, and what they cost: settings that ran with both treatments.
+
+use super::Record;
+use super::compare::Ratio;
+use super::curve::ErrorAxis;
+use crate::engine::constraints::Impacts;
+
+/// One solver on one scene, over its settings: with waves in times that with its own treatment.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Gain {
+    /// Name with size.
+    pub scene: String,
+    /// Its name.
+    pub solver: &'static str,
+    /// Settings that ran with both, and hold with its own and with waves.
+    pub settings: usize,
+    /// Of them.
+    pub holds: [usize; 2],
+    /// Median ratio of the contact-law residuals (1).
+    pub residual: f64,
+    /// Median ratio of the distances to the reference value (1); none where none is known.
+    pub reference: Option<f64>,
+    /// Median ratio of the times (1); none without times.
+    pub time: Option<f64>,
+}
+
+/// Ratios to errors below this are those to this: nothing is infinitely better.
+const NOTHING: f64 = 1e-9;
+
+/// A line per scene and solver that ran with both treatments.
+pub fn gains(records: &[Record]) -> Vec<Gain> {
+    let mut found: Vec<Gain> = Vec::new();
+    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        for solver in super::curve::solvers_of(scene) {
+            let own = scene.iter().filter(|r| r.solver == solver && r.impacts == Impacts::Own);
+            let pairs: Vec<[&Record; 2]> = own
+                .filter_map(|one| {
+                    let key = |r: &Record| (r.budget, r.order, r.lanes, r.swept, r.parameters.clone());
+                    let is_twin =
+                        |r: &&Record| r.solver == solver && r.impacts == Impacts::Waves && key(r) == key(one);
+                    Some([one, scene.iter().find(is_twin)?])
+                })
+                .collect();
+            if pairs.is_empty() {
+                continue;
+            }
+            let error = |axis: ErrorAxis| {
+                let ratio = |[one, other]: &[&Record; 2]| {
+                    Some(axis.of(other)?.max(NOTHING) / axis.of(one)?.max(NOTHING))
+                };
+                median(pairs.iter().filter_map(ratio).collect())
+            };
+            let time = |[one, other]: &[&Record; 2]| {
+                Some(Ratio::of(other.sample.as_ref()?, one.sample.as_ref()?)?.median)
+            };
+            let holds = [0, 1].map(|k| pairs.iter().filter(|p| p[k].holds()).count());
+            found.push(Gain {
+                scene: scene[0].scene.clone(),
+                solver,
+                settings: pairs.len(),
+                holds,
+                residual: error(ErrorAxis::Law).unwrap_or(1.0),
+                reference: error(ErrorAxis::Truth),
+                time: median(pairs.iter().filter_map(time).collect()),
+            });
+        }
+    }
+    found
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::metrics::Errors;
+    use crate::lab::study::record::tests::record;
+
+    #[test]
+    fn a_gain_is_of_settings_that_ran_with_both() {
+        let with = |impacts, substeps, time, residual| {
+            let mut own = Record { impacts, ..record(8, substeps, time, 1e-3) };
+            own.errors = Some(Errors { law_rms_lighter: residual, ..Errors::default() });
+            own
+        };
+        let (own, waves) = (Impacts::Own, Impacts::Waves);
+        let records = [with(own, 1, 10.0, 0.4), with(waves, 1, 15.0, 0.1), with(own, 2, 20.0, 0.4)];
+        let found = gains(&records);
+        assert_eq!((found.len(), found[0].settings, found[0].reference), (1, 1, None));
+        assert_eq!((found[0].residual, found[0].time, found[0].holds), (0.25, Some(1.5), [1, 1]));
+        assert!(gains(&records[2..]).is_empty());
+    }
+}
