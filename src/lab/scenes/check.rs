@@ -55,15 +55,15 @@ impl Scene {
             let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);
             return Err(Error::invalid("steps", message));
         }
-        if let Some(expect) = &self.expect {
-            expect.validate(self).map_err(|e| e.within("expect"))?;
-        }
         if self.bodies.is_empty() {
             return Err(Error::invalid("bodies", "there are none: a scene needs at least one"));
         }
         if self.bodies.len() > MAX_BODIES {
             let message = format!("{} bodies, where at most {MAX_BODIES} are possible", self.bodies.len());
             return Err(Error::invalid("bodies", message));
+        }
+        if let Some(expect) = &self.expect {
+            expect.validate(self).map_err(|e| e.within("expect"))?;
         }
         Ok(())
     }
