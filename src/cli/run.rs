@@ -349,7 +349,6 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "reference": value(&found.truth)?,
         "holds": found.broken.map_or("yes".to_string(), |b| b.to_string()),
         "not_checked": found.unchecked,
-        "islands_answered_by": world.answers().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     }))
 }
 
@@ -378,14 +377,8 @@ fn head(world: &World, scene: &Scene) -> String {
 
 fn counts(world: &World) -> String {
     let c = &world.counts;
-    let each = |(method, islands): &(&str, u64)| format!("{method} {islands}");
-    let by_method: Vec<String> = world.answers().iter().map(each).collect();
-    let answers = match by_method.is_empty() {
-        true => String::new(),
-        false => format!("\nislands answered by: {}\n", by_method.join(", ")),
-    };
     format!(
-        "{answers}\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
+        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
          {:.0} % of lanes filled, {} bytes of records\n",
         c.pairs,
         c.contacts,

@@ -58,7 +58,9 @@ impl Continuous {
     /// Takes in all bodies of a world, each by whether it is dynamic and the shapes that it has, none if it was removed. `shapes`:
     /// those of all bodies, in their order.
     pub fn build(&mut self, bodies: impl Iterator<Item = (bool, Range<u32>)>, shapes: &[Shape]) {
-        (self.safe_squared.clear(), self.first_shape.clear(), self.fixed.clear());
+        self.safe_squared.clear();
+        self.first_shape.clear();
+        self.fixed.clear();
         self.first_shape.push(0);
         for (is_dynamic, own) in bodies {
             let half = shapes[own.start as usize..own.end as usize].iter().map(Shape::min_half_extent);

@@ -50,7 +50,6 @@ pub mod pgs_substeps;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
-pub mod sap;
 pub mod shim;
 pub mod shock;
 pub mod soft_step;
@@ -63,7 +62,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 29] = [
+pub static VARIANTS: [&Variant; 28] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -79,7 +78,6 @@ pub static VARIANTS: [&Variant; 29] = [
     &apgd::SOLVER,
     &admm::SOLVER,
     &direct::SOLVER,
-    &sap::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,

@@ -24,7 +24,6 @@ use events::Events;
 use std::fmt;
 use traits::Traits;
 
-mod answers;
 mod candidates;
 mod collide;
 mod counts;

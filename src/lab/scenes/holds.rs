@@ -451,7 +451,7 @@ mod tests {
         let door = SceneBody::new(BodyKind::Kinematic, [0.0, 0.0], SceneShape::rectangle(0.5, 5.0));
         let ball = SceneBody::dynamic([2.0, 0.0], SceneShape::disc(0.1));
         let mut world = build(&Scene::new("x", vec![door, ball]));
-        let mut watch = Watch::new(&world, &[]);
+        let mut watch = Watch::new(&world, []);
         let mut observe = |door: f32, ball: f32| {
             (world.bodies.position_x[0], world.bodies.position_x[1]) = (door, ball);
             watch.observe(&world);

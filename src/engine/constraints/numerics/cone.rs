@@ -17,31 +17,6 @@ pub fn project<L: Lanes>([normal, tangent]: [L; 2], friction: L) -> [L; 2] {
     [outside.select_positive(along, normal), outside.select_positive(side, tangent)]
 }
 
-/// Where the nearest point of the cone is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Nearest {
-    /// The point itself.
-    Inside,
-    /// On the side of this sign of λt.
-    Side(f64),
-    /// At the tip.
-    Tip,
-}
-
-/// As [`project`], of one point in `f64`, and where it is.
-pub fn nearest([normal, tangent]: [f64; 2], friction: f64) -> ([f64; 2], Nearest) {
-    let slide = tangent.abs();
-    if normal >= 0.0 && slide <= friction * normal {
-        return ([normal, tangent], Nearest::Inside);
-    }
-    let along = (normal + friction * slide) / (1.0 + friction * friction);
-    if along <= 0.0 {
-        return ([0.0; 2], Nearest::Tip);
-    }
-    let sign = 1.0_f64.copysign(tangent);
-    ([along, sign * friction * along], Nearest::Side(sign))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,9 +27,7 @@ mod tests {
             for point in
                 [[1.0, 0.2], [1.0, -4.0], [-1.0, 0.5], [-0.1, 3.0], [0.0, 0.0], [-2.0, -1.0], [-1.0, 0.0]]
             {
-                let (alone, _) = super::nearest(point.map(f64::from), f64::from(friction));
                 let nearest = project(point, friction);
-                assert!((0..2).all(|k| (alone[k] - f64::from(nearest[k])).abs() < 1e-6));
                 assert!(nearest[0] >= 0.0 && nearest[1].abs() <= friction * nearest[0]);
                 let distance = |to: [f32; 2]| (to[0] - point[0]).hypot(to[1] - point[1]);
                 for i in 0..200 {

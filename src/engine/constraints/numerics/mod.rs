@@ -1,6 +1,5 @@
 //! Pure mathematics: no body, no contact.
 
-pub mod block_lu;
 pub mod cone;
 pub mod coulomb_lcp;
 pub mod lemke;

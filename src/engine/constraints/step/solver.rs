@@ -37,11 +37,6 @@ pub trait Solver: fmt::Debug + Send {
     fn held_bytes(&self) -> usize {
         0
     }
-
-    /// Where several methods may answer, how many islands of bodies each has answered since the solver was made.
-    fn answers(&self) -> Vec<(&'static str, u64)> {
-        Vec::new()
-    }
 }
 
 impl Clone for Box<dyn Solver> {

@@ -379,19 +379,19 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f
 #[inline(never)]
 fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>) {
     let records: &[L] = bytemuck::cast_slice(records);
-    let kept = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
+    let mut kept = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
     let (zero, reach) = (L::zero(), L::splat(REACH));
     let bodies = ends.own.list().batches().zip(ends.other.list().batches());
     let batches = ends.contact.list().batches().zip(bodies);
     for (record, (contact, (own, other))) in records.chunks_exact(RECORD).zip(batches) {
         let (x, o) = (moved::<L>(on.rows, own), moved::<L>(on.rows, other));
-        for p in 0..2 {
-            let forces = L::gather_quads::<2, 0>(kept[p], contact);
+        for (p, kept) in kept.iter_mut().enumerate() {
+            let forces = L::gather_quads::<2, 0>(kept, contact);
             // With α = 0 the tangential error is the drift.
             let drift = rows(record, p, x, o, forces, zero).error[1];
             let slack = record[2] * forces[NORMAL] - forces[TANGENT].max(-forces[TANGENT]);
             let near = (reach - drift.max(-drift)).select_positive(drift, zero);
-            L::scatter_quads::<2, 1>(kept[p], contact, [slack.select_positive(near, zero), zero, zero, zero]);
+            L::scatter_quads::<2, 1>(kept, contact, [slack.select_positive(near, zero), zero, zero, zero]);
         }
     }
 }
