@@ -348,6 +348,7 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
         "holds": found.broken.map_or("yes".to_string(), |b| b.to_string()),
+        "broken": value(&found.broken)?,
         "not_checked": found.unchecked,
     }))
 }

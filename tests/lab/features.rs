@@ -50,7 +50,6 @@ fn needs_are_read_off_the_scene() {
 fn the_specialised_and_the_full_kernel_give_the_same_bits() {
     for (name, _) in scenes() {
         for variant in &VARIANTS {
-            // Under waves every need has side records.
             let mut settings = crate::common::settings(variant);
             settings.impacts = Impacts::Waves;
             let mut special = scene(name).build(settings.clone()).unwrap();
@@ -63,7 +62,9 @@ fn the_specialised_and_the_full_kernel_give_the_same_bits() {
             }
             assert!(special.counts.contacts > 4, "{name}: only {} contacts", special.counts.contacts);
             let bytes = (special.counts.constraint_bytes, full.counts.constraint_bytes);
-            assert!(bytes.0 < bytes.1, "{name} {}: {bytes:?}", variant.name);
+            // Restitution alone adds nothing: impacts before the step have no records of their own.
+            let has_all = Features { restitution: true, ..special.features() } == Features::FULL;
+            assert!(bytes.0 < bytes.1 || has_all && bytes.0 == bytes.1, "{name} {}: {bytes:?}", variant.name);
         }
     }
 }

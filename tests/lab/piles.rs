@@ -76,7 +76,7 @@ fn a_pile_knows_nothing_of_another() {
     };
     let (one, two) = (run(alone.clone()), run(both));
     for body in 0..alone.len() {
-        let [p, q] = [&one, &two].map(|world| Vec2::from(world.bodies.pose(body).position));
+        let [p, q] = [&one, &two].map(|world| world.bodies.pose(body).position);
         assert!((p - q).length() < 1e-6, "body {body}: {p} alone, {q} beside others");
     }
 }

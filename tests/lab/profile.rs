@@ -6,7 +6,7 @@ use simpulse::engine::constraints::{Features, Layout, OppositeKind};
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::{LaneWidth, Operations};
 use simpulse::engine::solvers::{DEFAULT, VARIANTS, find};
-use simpulse::engine::world::{HeldWorld, Order, Probe, Settings, World};
+use simpulse::engine::world::{Component, HeldWorld, Order, Probe, Settings, World};
 use simpulse::lab::profile::traffic;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -234,7 +234,7 @@ fn each_solver_has_the_phases_of_its_schedule() {
         let budget = world.settings.budget;
         assert_eq!(passes(Phase::Solve), budget.substeps * budget.velocity_iterations, "{solver}");
     }
-    let mut world = settled("bounce", settings(find(DEFAULT).unwrap()), 3);
+    let mut world = settled("bounce", settings(find("box2d").unwrap()), 3);
     assert!(world.hold().probes().iter().any(|p| p.phase == Phase::Restitution && p.passes == 1));
 }
 
@@ -242,7 +242,9 @@ fn each_solver_has_the_phases_of_its_schedule() {
 fn memory_is_what_arrays_hold() {
     let world = settled("pyramid:10", settings(find(DEFAULT).unwrap()), 3);
     let memory = world.memory();
-    assert!(memory.components.iter().all(|c| c.used <= c.held && c.used > 0), "{memory:?}");
+    // Continuous collision is a choice of the run.
+    let has = |c: &Component| c.used > 0 || c.name == "continuous collision";
+    assert!(memory.components.iter().all(|c| c.used <= c.held && has(c)), "{memory:?}");
     let contact = size_of::<Contact>();
     assert!(memory.of("contacts").used >= world.counts.contacts * contact);
     assert!(memory.of("records").used >= world.counts.constraint_bytes);

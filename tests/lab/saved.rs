@@ -42,7 +42,8 @@ fn what_does_not_fit_together_is_refused() {
         serde_json::from_value::<World>(value).map(drop).map_err(|e| e.to_string())
     };
     assert_eq!(read(&|_| {}), Ok(()));
-    let cases: [(&dyn Fn(&mut serde_json::Value), &str); 7] = [
+    type Change = dyn Fn(&mut serde_json::Value);
+    let cases: [(&Change, &str); 7] = [
         (&|v| v["settings"]["solver"] = "nobody".into(), "unknown solver 'nobody'"),
         (&|v| v["settings"]["lanes"] = 5.into(), "5 lanes"),
         (&|v| v["group"] = serde_json::json!([1]), "other lengths"),

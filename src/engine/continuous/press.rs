@@ -66,7 +66,8 @@ mod tests {
             hold(&bodies, &[contact], &safe, &mut rows);
             (rows[2].delta[1], rows[2].velocity[1], rows[2].delta[0])
         };
-        assert_eq!(way(0, -0.45, -0.04), (-0.04, -2.4, 1.0));
+        let (y, v, x) = way(0, -0.45, -0.04);
+        assert!((y, x) == (-0.04, 1.0) && (v + 2.4).abs() < 1e-6);
         let (y, v, x) = way(0, -0.45, -0.2);
         assert!((y + 0.05).abs() < 1e-6 && v == 0.0 && x == 1.0);
         // Beyond it already: no deeper, and free to leave.

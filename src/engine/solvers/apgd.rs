@@ -20,8 +20,7 @@
 //! λ⁺ = Π(y − D g(y)/L),   θ⁺ = (√(θ⁴ + 4θ²) − θ²)/2,   y⁺ = λ⁺ + θ(1 − θ)/(θ² + θ⁺) (λ⁺ − λ)
 //! ```
 //!
-//! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. L goes on from step to step, as the
-//! problem hardly changes; the source estimates it anew. Where
+//! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. Where
 //! g·(λ⁺ − λ) > 0 momentum is dropped.
 
 use super::{Law, Variant};
@@ -30,7 +29,7 @@ use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::records::point_vector::{
     Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
 };
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, System, numerics::cone};
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -45,7 +44,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "gradients spread a load more slowly than sweeps"),
     ],
     impacts: ImpactLaw::None,
-    make: || Box::new(Apgd { steepness: 1.0 }),
+    make: || Schedule::boxed(step),
     ..Variant::BASE
 };
 
@@ -54,24 +53,7 @@ const FORGET: f64 = 0.9;
 /// Doublings of L in one iteration.
 const DOUBLINGS: usize = 20;
 
-/// What it keeps.
-#[derive(Clone, Debug)]
-struct Apgd {
-    /// L (1).
-    steepness: f64,
-}
-
-impl Solver for Apgd {
-    fn step(&mut self, passes: &mut Passes<'_>) {
-        step(passes, &mut self.steepness);
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
-}
-
-fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
+fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
     for substep in 0..budget.substeps {
@@ -89,11 +71,11 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
             y.clone_from(&now);
             g_y.clone_from(&g_now);
         });
-        let mut theta = 1.0_f64;
+        let (mut theta, mut steepness) = (1.0_f64, 1.0_f64);
         for _ in 0..budget.velocity_iterations {
             passes.with_system(Phase::Solve, |system| {
                 for _ in 0..DOUBLINGS {
-                    let shorter = Wide::splat(1.0 / *steepness as f32);
+                    let shorter = Wide::splat(1.0 / steepness as f32);
                     update(
                         [&mut next, &mut step],
                         [&y, &g_y, &mass, &bias, &now],
@@ -112,13 +94,13 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
                         let d = difference(next, y);
                         [d, quotient(d, mass)]
                     });
-                    if curve <= *steepness * length * (1.0 + 1e-5) {
+                    if curve <= steepness * length * (1.0 + 1e-5) {
                         break;
                     }
                     // Velocities back to those of `now`.
                     update([&mut step], [], |[s], []| [scaled(-1.0, s)]);
                     system.push_lanes(&mut step);
-                    *steepness *= 2.0;
+                    steepness *= 2.0;
                     next.clone_from(&now);
                     g_next.clone_from(&g_now);
                 }
@@ -140,7 +122,7 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
                 );
                 std::mem::swap(&mut now, &mut next);
                 std::mem::swap(&mut g_now, &mut g_next);
-                *steepness *= FORGET;
+                steepness *= FORGET;
                 system.set_lane_impulses(&mut now);
             });
             passes.count_sweep(2);

@@ -8,7 +8,7 @@
 //! times more residual on five of six frozen problems.
 //!
 //! **Cost.** That of [`super::pgs`]; between iterations impulses are
-//! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 2790 B per contact.
+//! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 4134 B per contact.
 //!
 //! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
 //! left is Gauss–Seidel.

@@ -31,6 +31,7 @@
 //! (B23.release), and what bears hundreds of times its mass sinks (B23.rolling).
 
 mod frames;
+mod jams;
 mod rest;
 
 use super::{Law, Uses, Variant};
@@ -47,6 +48,7 @@ use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Parameter};
 use frames::Roll;
 use glam::Vec2;
+use jams::Jams;
 use rest::hand_down::HandDown;
 use rest::shorten::LEFT;
 use rest::{LEAD, LESS, PER_CONTACT, PLACED};
@@ -91,6 +93,7 @@ pub static SOLVER: Variant = Variant {
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: HandDown,
+    jams: Jams,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -113,6 +116,10 @@ impl Solver for Shim {
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         self.contacts_changed = scene.contacts_changed;
+        // Two bodies of one shape each have one contact.
+        if scene.shapes > scene.bodies.len() {
+            self.jams.release(scene.contacts);
+        }
         self.place(scene);
         if scene.contacts_changed || scene.gravity != self.gravity {
             self.gravity = scene.gravity;
@@ -165,7 +172,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + held(&self.fields)
+        self.hand_down.held_bytes() + self.jams.held_bytes() + held(&self.fields)
     }
 }
 

@@ -66,7 +66,7 @@ pub enum Criterion {
 /// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
 /// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
 /// let divergence = world.step().unwrap_err();
-/// assert_eq!(divergence.to_string(), "diverged at step 1: body 0 moves at 2.000e5 m/s");
+/// assert!(divergence.to_string().starts_with("diverged at step 1: body 0 moves at 2.000e5 m/s"));
 /// # Ok::<(), simpulse::engine::error::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@
 use super::Scene;
 use crate::engine::bodies::BodyKind;
 use crate::lab::error::Error;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// `"expect"` of a scene file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct Expect {
     /// Scene of the catalogue whose tolerances, and whose observers that nothing else here describes, hold for
     /// this one as long as its bodies are the same.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub catalogue: Option<String>,
     /// [`Demand::Rests`](super::holds::Demand::Rests)
     #[serde(default, skip_serializing_if = "is_false")]
@@ -30,13 +30,13 @@ pub struct Expect {
     #[serde(default, skip_serializing_if = "is_false")]
     pub gains_no_energy: bool,
     /// [`Demand::StaysWithin`](super::holds::Demand::StaysWithin) (m)
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub stays_within: Option<f64>,
     /// [`Demand::Inside`](super::holds::Demand::Inside) (m)
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub stays_inside: Option<[[f64; 2]; 2]>,
     /// What is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub reference: Option<Reference>,
 }
 
@@ -47,7 +47,7 @@ pub struct Reference {
     /// What is measured.
     pub measure: Measure,
     /// Whose height.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub body: Option<usize>,
     /// In the unit of the measure.
     pub value: f64,
@@ -67,6 +67,11 @@ pub enum Measure {
     GreatestDrop,
 }
 
+/// What is there is a value: null is none.
+fn some<'de, T: Deserialize<'de>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(from).map(Some)
+}
+
 fn is_false(value: &bool) -> bool {
     !value
 }
@@ -74,7 +79,7 @@ fn is_false(value: &bool) -> bool {
 impl Expect {
     /// Refuses what no run can be held to. Errors name places within `expect`.
     pub(super) fn validate(&self, scene: &Scene) -> Result<(), Error> {
-        let positive = |place: &str, value: f64| match value > 0.0 && value.is_finite() {
+        let positive = |place: &str, value: f64| match value > 0.0 && (value as f32).is_finite() {
             true => Ok(()),
             false => Err(Error::invalid(place, format!("must be positive and finite, is {value}"))),
         };

@@ -144,8 +144,8 @@ impl Spread {
                 self.hit.push((root, lane));
             }
         }
-        // Islands in the order of their first lanes would do as well; lanes of an island stay in order.
-        self.hit.sort_by_key(|&(root, _)| root);
+        // Lanes of an island stay in order.
+        self.hit.sort_unstable();
         let (mut begin, mut cut) = (0, 0);
         while begin < self.hit.len() {
             let root = self.hit[begin].0;

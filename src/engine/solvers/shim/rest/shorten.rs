@@ -7,6 +7,12 @@
 //! What is found in the first step of one of its bodies begins with all of its sag taken away, and leaves that overlap within a second: piles
 //! that begin at rest would else sink by it within a step, and rebound.
 //!
+//! # Contacts that roll
+//!
+//! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
+//! swells and settles without an end. So a contact of one point keeps what it was shortened by while that is at least half of what its
+//! load calls for, and no more than that and a tenth.
+//!
 //! # Overlap that was placed
 //!
 //! Bodies may be put into a world where they overlap. No load has made that overlap, and springs that see it throw bodies apart
@@ -29,7 +35,7 @@
 //! the depth from which the push speed u is all they give, and more as they bear a load. So what is
 //! thrown into another body is not thrown back.
 
-use super::{LESS, PLACED};
+use super::{HELD, LESS, PLACED};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
@@ -59,6 +65,12 @@ const GIVING: f32 = 1.0;
 
 /// Largest sag that is taken away (m).
 const LARGEST: f32 = 5.0 * SPECULATIVE_DISTANCE;
+
+/// Least and most that a contact of one point keeps of what its load calls for (1).
+const LEAST: f32 = 0.5;
+
+/// See [`LEAST`].
+const MOST: f32 = 1.1;
 
 /// Depth that springs see beyond that of the push speed, per sag (1).
 const EARNED: f32 = 20.0;
@@ -111,7 +123,12 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [mut placed, mut less, ..]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [mut placed, mut less, held, _]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let is_single = if layout.points == 2 {
+            record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
+        } else {
+            one
+        };
         if (-placed - less).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
@@ -128,7 +145,19 @@ fn shorten<L: Lanes>(
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
             let sag = (compliance * loads[2 * p].max(zero) / mass).min(L::splat(LARGEST));
-            let shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT) + less);
+            let mut shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT) + less);
+            if p == 0 && is_single.any_positive() {
+                let kept = held.max(L::splat(LEAST) * shorter).min(L::splat(MOST) * shorter);
+                let kept = held.select_positive(kept, shorter);
+                shorter = is_single.select_positive(kept, shorter);
+                let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
+                let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
+                for (lane, &contact) in
+                    filled.iter().enumerate().filter(|&(lane, _)| of(&is_single, lane) > 0.0)
+                {
+                    quads[2 * contact as usize + 1].0[HELD - 4] = of(&shorter, lane);
+                }
+            }
             let at = layout.at(p, layout.normal_impulse);
             let impulse = loads[2 * p].max(zero).mul_add(h_lanes, record[at]).max(zero);
             record[at] = impulse;
