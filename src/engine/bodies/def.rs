@@ -246,7 +246,10 @@ pub(crate) fn finite(place: &str, value: f64) -> Result<(), Error> {
 }
 
 pub(crate) fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
-    (0..2).try_for_each(|k| finite(&format!("{place}[{k}]"), value[k]))
+    match (0..2).find(|&k| !(value[k] as f32).is_finite()) {
+        Some(k) => finite(&format!("{place}[{k}]"), value[k]),
+        None => Ok(()),
+    }
 }
 
 fn not_negative(place: &str, value: f64) -> Result<(), Error> {

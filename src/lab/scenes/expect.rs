@@ -87,14 +87,15 @@ impl Expect {
             positive("stays_within", limit)?;
         }
         if let Some([low, high]) = self.stays_inside
-            && !(0..2).all(|k| low[k] < high[k] && low[k].is_finite() && high[k].is_finite())
+            && !(0..2)
+                .all(|k| low[k] < high[k] && (low[k] as f32).is_finite() && (high[k] as f32).is_finite())
         {
             let message = format!("the first corner must be below and left of the second: {low:?}, {high:?}");
             return Err(Error::invalid("stays_inside", message));
         }
         let Some(Reference { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
         positive("reference.tolerance", *tolerance)?;
-        if !value.is_finite() {
+        if !(*value as f32).is_finite() {
             return Err(Error::invalid("reference.value", format!("must be finite, is {value}")));
         }
         let is_dynamic = |i: &usize| scene.bodies.get(*i).is_some_and(|body| body.kind == BodyKind::Dynamic);
