@@ -1,34 +1,27 @@
-//! Soft contacts that do not sag: each contact is shimmed by what its springs give way under the load it
-//! bears, so that they are stiff enough to move with and rigid to stand on.
+//! Soft contacts that do not sag: springs are shortened by what they give way under the loads that statics says they bear, so that they are
+//! stiff enough to move with and rigid to stand on.
 //!
 //! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
 //!
 //! **Departures.** Springs are as stiff as the substep rate allows, a fixed part of it, and bear a load however deep
-//! their contact is. What goes beyond [`super::soft_step`], each in a file of its own in `shim/`:
+//! their contact is. What goes beyond [`super::soft_step`], in `shim/`:
 //!
-//! * `preload.rs`: each contact has a preload that follows its load, as fast as the slowest mode of the pile allows;
-//! * `piles/`: contacts at rest begin with what statics says they bear, each point with the preload of its own load, and a
-//!   column that would buckle gets stiffer springs and the sweeps that these need;
+//! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
-//! * `plastic/`: what comes in without restitution is stopped before the step; the rest bounces there
-//!   ([`crate::engine::constraints::impacts::waves`], at the time of the impact).
+//! * `jams.rs`: two bodies that are caught in each other at several shapes begin without impulses;
+//! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them. Where contacts have come or
 //! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago. Relaxing takes
 //! the angular momentum that pushing bodies apart has made from their spins
 //! ([`crate::engine::constraints::kernels::velocity::block::Parting`]).
 //!
-//! **Cost.** Per step 1 warm start, 1 pass that shortens springs and, if something moves, 1 pass that looks for
-//! impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. In
-//! steps in which contacts come or go 1 rigid sweep more, and at most every 32 steps, if they have, a search of the
-//! contact graph. Sweeps of a step request 5736 B per contact.
+//! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light ones over their loads, 1 that shortens springs and, if
+//! something moves, 1 that looks for impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and
+//! `relax_iterations` rigid ones. In steps in which contacts come or go 1 rigid sweep more. Sweeps of a step request 5736 B per contact.
 //!
-//! **Fails when** a column needs more than `column_sweeps`: 100 unit boxes stand for a minute, 150 do not. Where bodies
-//! slide past each other, angular momentum is conserved to rounding only in impacts that are seen before the step: arms
-//! are those of its beginning, which matters to impacts within it. And where impacts without restitution are many: only
-//! 32 contacts at once are followed, and the sweeps of a substep spread what is left by two bodies each. A load that
-//! goes or wanders to a new contact within a step is followed by one sweep more: what stood on it comes apart a little
-//! (B23.release), and what bears hundreds of times its mass sinks (B23.rolling).
+//! **Fails when** an impact takes more visits than its bound (B23.heavy), a load goes or wanders within a step (B23.release, B23.rolling), or a heavy
+//! body rocks on others: it goes on for long.
 
 mod frames;
 mod jams;

@@ -85,7 +85,7 @@ pub struct TimeChange {
 pub struct Noise {
     /// Time of the fixed loop after, in that before (1); all times are divided by it.
     pub machine: f64,
-    /// Scatter of the settings around their common ratio; 0 of fewer than [`FEWEST`].
+    /// Scatter of the settings around their common ratio; 0 of too few.
     pub scatter: f64,
     /// Share of the time that threads waited, in the busier of the two (1).
     pub waited: f64,

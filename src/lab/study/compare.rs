@@ -36,7 +36,7 @@ pub struct Ratio {
 
 impl Ratio {
     /// Of `one` in times `other`; none without a pair of blocks. Spikes are in few blocks, so that the median
-    /// does not see them: where one of the two has more of them by [`SPIKES`], the ratio is that of the means.
+    /// does not see them: where one of the two has more of them by a margin, the ratio is that of the means.
     pub fn of(one: &Sample, other: &Sample) -> Option<Ratio> {
         let pairs = one.blocks_ns.iter().flatten().zip(other.blocks_ns.iter().flatten());
         let mut ratios: Vec<f64> = pairs.map(|(a, b)| a / b).filter(|r| r.is_finite()).collect();

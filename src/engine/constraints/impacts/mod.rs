@@ -5,7 +5,7 @@
 //! | [`ImpactLaw::None`] | nothing bounces, whatever the surfaces say |
 //! | [`ImpactLaw::Bias`] | the speed at which a point is to leave is the target of its row ([`bias`]) |
 //! | [`ImpactLaw::EndPass`] | one pass at the end of the step gives points that speed ([`restitution`]) |
-//! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave ([`spread`]) |
+//! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave (`spread`) |
 //! | [`ImpactLaw::Solver`] | the solver's schedule does it |
 
 use crate::engine::constraints::records::bounces::Bounces;
