@@ -1,5 +1,6 @@
 //! The command line: commands and their options.
 
+use super::ablate::AblateArgs;
 use super::advise::AdviseArgs;
 use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
@@ -68,6 +69,7 @@ pub enum Command {
     Capture(CaptureArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
+    Ablate(AblateArgs),
     Torture(TortureArgs),
     Profile(ProfileArgs),
     Growth(GrowthArgs),

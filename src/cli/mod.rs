@@ -3,6 +3,7 @@
 //! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
 //! that cannot be met, 130 a signal.
 
+pub mod ablate;
 pub mod advise;
 pub mod args;
 pub mod capture;
@@ -86,6 +87,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
+        Some(Command::Ablate(args)) => ablate::run(&args),
         Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),

@@ -2,7 +2,7 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
-use super::values::Solvers;
+use super::values::{Solvers, WithoutArgs};
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
@@ -57,6 +57,9 @@ pub struct TortureArgs {
     /// Stop fast bodies at what they would pass: continuous collision [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
+    /// Mechanisms
+    #[command(flatten)]
+    pub without: WithoutArgs,
     /// Write every scene that fails, minimised, into this folder
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
@@ -75,18 +78,23 @@ pub struct TortureArgs {
 }
 
 impl TortureArgs {
-    fn settings(&self, solver: &'static Variant) -> Settings {
-        let own = Settings::new(solver);
-        Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own }
+    fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
+        let (own, without) = (Settings::new(solver), self.without.of(solver)?);
+        Ok(Settings { continuous: self.continuous.unwrap_or(own.continuous), without, ..own })
     }
 
     /// What a solver is called in rows: with what is not its default.
     fn name(&self, solver: &Variant) -> String {
+        let mut name = solver.name.to_string();
         match self.continuous {
-            Some(true) if !solver.continuous => format!("{}, continuous", solver.name),
-            Some(false) if solver.continuous => format!("{}, not continuous", solver.name),
-            _ => solver.name.to_string(),
+            Some(true) if !solver.continuous => name += ", continuous",
+            Some(false) if solver.continuous => name += ", not continuous",
+            _ => {}
         }
+        if !self.without.without.is_empty() {
+            name += &format!(", without {}", self.without.without.join(" "));
+        }
+        name
     }
 }
 
@@ -221,7 +229,7 @@ fn one(
     solver: &'static Variant,
 ) -> Result<Row, Error> {
     let case = family.case(args.seed, number);
-    let settings = args.settings(solver);
+    let settings = args.settings(solver)?;
     let outcome = run_solver(&case, &settings)?;
     if let (Some(folder), Some(fault)) = (&args.keep, outcome.faults.first()) {
         let mut least = minimise(&case, fault.verdict, |case| run_solver(case, &settings))?;

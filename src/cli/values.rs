@@ -3,7 +3,7 @@
 
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
@@ -11,7 +11,7 @@ use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// A member of `--solvers`.
 #[derive(Clone, Debug)]
@@ -133,6 +133,21 @@ pub struct ImpactArgs {
     pub impacts: Impacts,
 }
 
+/// `--without` of commands that run a solver.
+#[derive(Args, Clone, Debug, Default)]
+pub struct WithoutArgs {
+    /// Mechanisms of the solver to leave out (`simpulse ablate` shows what each is for)
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = NonEmptyStringValueParser::new())]
+    pub without: Vec<String>,
+}
+
+impl WithoutArgs {
+    /// Those of `solver`. Errors: a mechanism that it does not have.
+    pub fn of(&self, solver: &Variant) -> Result<Without, Error> {
+        self.without.iter().try_fold(Without::default(), |all, name| Ok(all.and(solver.mechanism(name)?)))
+    }
+}
+
 /// Each width once, from the narrowest; `own` where none are given.
 pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
     if given.is_empty() {
@@ -168,6 +183,9 @@ pub struct SettingArgs {
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
+    /// Mechanisms
+    #[command(flatten)]
+    pub without: WithoutArgs,
 }
 
 impl SettingArgs {
@@ -182,6 +200,7 @@ impl SettingArgs {
             position_iterations: none,
             set: Vec::new(),
             impacts: ImpactArgs::default(),
+            without: WithoutArgs::default(),
         })
     }
 
@@ -189,7 +208,8 @@ impl SettingArgs {
     /// [`Self::parameters`].
     pub fn settings(&self) -> Result<Settings, Error> {
         let (budget, parameters) = (self.budget()?, self.parameters()?);
-        Ok(Settings { budget, parameters, impacts: self.impacts.impacts, ..Settings::new(self.solver) })
+        let (impacts, without) = (self.impacts.impacts, self.without.of(self.solver)?);
+        Ok(Settings { budget, parameters, impacts, without, ..Settings::new(self.solver) })
     }
 
     /// The budget. Errors: one that the solver cannot work with; sweeps that it does not make.

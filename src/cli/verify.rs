@@ -2,7 +2,7 @@
 
 use super::output::{self, finite, print_json};
 use super::progress::Bar;
-use super::values::{self, ImpactArgs, Solvers};
+use super::values::{self, ImpactArgs, Solvers, WithoutArgs};
 use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
@@ -14,6 +14,7 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use std::process::ExitCode;
 
 /// Run the hard test cases with known analytic answers
@@ -41,6 +42,9 @@ pub struct VerifyArgs {
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
+    /// Mechanisms
+    #[command(flatten)]
+    pub without: WithoutArgs,
     /// Print JSON instead of text: everything that was measured
     #[arg(long)]
     pub json: bool,
@@ -68,7 +72,12 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let bar = Bar::new();
     let impacts = args.impacts.impacts;
     let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
-    let matrix = verify::run(cases, solvers, args.threads.into(), |v| Lab::new(v).impacts(impacts), &tell);
+    let without = solvers
+        .iter()
+        .map(|v| Ok((v.name, args.without.of(v)?)))
+        .collect::<Result<HashMap<_, _>, Error>>()?;
+    let lab = |v: &'static Variant| Lab::new(v).impacts(impacts).without(without[v.name]);
+    let matrix = verify::run(cases, solvers, args.threads.into(), lab, &tell);
     drop(bar);
     if args.json {
         print_json(&json(&matrix, impacts))?;

@@ -96,6 +96,55 @@ pub struct Parameter {
     pub trials: &'static [f32],
 }
 
+/// A mechanism of a solver that a run can leave out, to see what it is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mechanism {
+    /// Name for settings, records and the command line, in `snake_case`.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub meaning: &'static str,
+    /// A case of `simpulse verify` that fails without it.
+    pub case: &'static str,
+    /// Lines of code in files of its own, see [`lines_of`].
+    pub lines: u32,
+}
+
+/// Lines of a text that are neither blank nor comments.
+pub const fn lines_of(text: &str) -> u32 {
+    let (text, mut i, mut count) = (text.as_bytes(), 0, 0);
+    while i < text.len() {
+        while i < text.len() && text[i] == b' ' {
+            i += 1;
+        }
+        let is_comment = i + 1 < text.len() && text[i] == b'/' && text[i + 1] == b'/';
+        if i < text.len() && text[i] != b'\n' && !is_comment {
+            count += 1;
+        }
+        while i < text.len() && text[i] != b'\n' {
+            i += 1;
+        }
+        i += 1;
+    }
+    count
+}
+
+/// The mechanisms of a solver that a run leaves out, by their places in its table; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Without(u32);
+
+impl Without {
+    /// These, and the one at `place`.
+    #[must_use]
+    pub const fn and(self, place: usize) -> Self {
+        Without(self.0 | 1 << place)
+    }
+
+    /// Whether the one at `place` is left out.
+    pub const fn leaves_out(self, place: usize) -> bool {
+        self.0 >> place & 1 == 1
+    }
+}
+
 /// What several solvers can be given.
 impl Parameter {
     /// Share of the overlap that Baumgarte stabilisation removes.

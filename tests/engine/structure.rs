@@ -85,7 +85,7 @@ const LAB: &[&[&str]] = &[
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["profile", "compare", "torture"],
+    &["ablate", "profile", "compare", "torture"],
 ];
 
 #[test]

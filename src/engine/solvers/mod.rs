@@ -30,7 +30,7 @@ use crate::engine::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput,
 use crate::engine::contacts::Contact;
 use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, MAX_PARAMETERS, Parameter, Parameters};
+use crate::engine::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
 
 pub mod admm;
 pub mod anderson;
@@ -171,6 +171,8 @@ pub struct Variant {
     pub iterations: fn(standard: Budget, k: u32) -> Budget,
     /// Its own parameters, [`MAX_PARAMETERS`] at most.
     pub parameters: &'static [Parameter],
+    /// Its mechanisms that a run can leave out, see [`Variant::mechanism`]; 32 at most.
+    pub mechanisms: &'static [Mechanism],
     /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
     /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
     /// such a contact gives way, and metrics tell that from error.
@@ -204,6 +206,7 @@ impl Variant {
         uses: Uses { velocity: true, relax: false, position: false },
         iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, ..standard },
         parameters: &[],
+        mechanisms: &[],
         softness: None,
         impacts: ImpactLaw::Bias,
         continuous: false,
@@ -246,6 +249,17 @@ impl Variant {
         }
         values[place] = value;
         Ok(())
+    }
+
+    /// Place of the mechanism called `name`, for [`crate::engine::params::Without`]; hyphens count as underscores. Errors: no such
+    /// mechanism.
+    pub fn mechanism(&self, name: &str) -> Result<usize, Error> {
+        let plain = name.replace('-', "_");
+        self.mechanisms.iter().position(|m| m.name == plain).ok_or_else(|| Error::Unknown {
+            kind: "mechanism",
+            name: name.into(),
+            known: self.mechanisms.iter().map(|m| m.name).collect(),
+        })
     }
 
     /// Whether it promises `law`.

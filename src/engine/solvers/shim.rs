@@ -8,13 +8,10 @@
 //!
 //! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
-//! * `jams.rs`: two bodies that are caught in each other at several shapes begin without impulses;
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them. Where contacts have come or
-//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago. Relaxing takes
-//! the angular momentum that pushing bodies apart has made from their spins
-//! ([`crate::engine::constraints::kernels::velocity::block::Parting`]).
+//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago.
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light ones over their loads, 1 that shortens springs and, if
 //! something moves, 1 that looks for impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and
@@ -24,27 +21,22 @@
 //! body rocks on others: it goes on for long.
 
 mod frames;
-mod jams;
 mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::block::Parting;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, Scene};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
+use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::batch::Kind;
 use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::params::{Budget, Parameter};
+use crate::engine::params::{Budget, Mechanism, Parameter, lines_of};
 use frames::Roll;
 use glam::Vec2;
-use jams::Jams;
 use rest::hand_down::HandDown;
-use rest::shorten::LEFT;
-use rest::{LEAD, LESS, PER_CONTACT, PLACED};
+use rest::{LEAD, PER_CONTACT, PLACED};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -75,6 +67,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
+    mechanisms: &MECHANISMS,
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
@@ -82,11 +75,97 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
+/// Places in [`MECHANISMS`].
+mod part {
+    pub const STATICS: usize = 0;
+    pub const HAND_DOWN: usize = 1;
+    pub const HELD: usize = 2;
+    pub const PLACED: usize = 3;
+    pub const DEPTH: usize = 4;
+    pub const BEARING: usize = 5;
+    pub const FRAMES: usize = 6;
+    pub const SETTLING: usize = 7;
+    pub const IMPACTS: usize = 8;
+    pub const MOMENT: usize = 9;
+    pub const RELEASE: usize = 10;
+}
+
+/// What a run can leave out, and what fails then.
+const MECHANISMS: [Mechanism; 11] = [
+    Mechanism {
+        name: "statics",
+        meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
+        case: "B24.bricks",
+        lines: lines_of(include_str!("shim/rest/mod.rs"))
+            + lines_of(include_str!("shim/rest/closed.rs"))
+            + lines_of(include_str!("shim/rest/loads.rs"))
+            + lines_of(include_str!("shim/rest/shorten.rs")),
+    },
+    Mechanism {
+        name: "hand_down",
+        meaning: "loads go down from body to body",
+        case: "B5.height",
+        lines: lines_of(include_str!("shim/rest/hand_down.rs")),
+    },
+    Mechanism {
+        name: "held",
+        meaning: "contacts of one point keep what they are shortened by, within bounds",
+        case: "",
+        lines: 0,
+    },
+    Mechanism {
+        name: "placed",
+        meaning: "overlap that bodies are placed with goes slowly",
+        case: "B3.pile",
+        lines: 0,
+    },
+    Mechanism { name: "depth", meaning: "springs see no deeper than their load earns", case: "", lines: 0 },
+    Mechanism {
+        name: "bearing",
+        meaning: "springs bear a load however deep their contact is",
+        case: "B4.heavy",
+        lines: 0,
+    },
+    Mechanism {
+        name: "frames",
+        meaning: "what rolls has the frame of the middle of the step",
+        case: "A26.plank",
+        lines: lines_of(include_str!("shim/frames.rs")),
+    },
+    Mechanism {
+        name: "settling",
+        meaning: "one relaxing sweep more where contacts have come or gone",
+        case: "",
+        lines: 0,
+    },
+    Mechanism {
+        name: "impacts",
+        meaning: "what comes in bounces or stops before the step",
+        case: "A17.billiards",
+        lines: lines_of(include_str!("../constraints/impacts/spread/mod.rs"))
+            + lines_of(include_str!("../constraints/impacts/spread/find.rs"))
+            + lines_of(include_str!("../constraints/impacts/spread/law.rs"))
+            + lines_of(include_str!("../constraints/impacts/spread/point.rs"))
+            + lines_of(include_str!("../constraints/impacts/touch.rs")),
+    },
+    Mechanism {
+        name: "moment",
+        meaning: "impacts happen at their time in the step",
+        case: "A27.oblique",
+        lines: 0,
+    },
+    Mechanism {
+        name: "release",
+        meaning: "points that an impact releases have borne their body until then",
+        case: "A26.block",
+        lines: 0,
+    },
+];
+
 /// What it keeps.
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: HandDown,
-    jams: Jams,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -100,8 +179,10 @@ struct Shim {
 }
 
 impl Solver for Shim {
-    fn before_collision(&mut self, _scene: &mut Scene<'_>, collision: &mut Collision) {
-        collision.rolling = Some(Rolling { limit: frames::STEADY });
+    fn before_collision(&mut self, scene: &mut Scene<'_>, collision: &mut Collision) {
+        if !scene.without.leaves_out(part::FRAMES) {
+            collision.rolling = Some(Rolling { limit: frames::STEADY });
+        }
     }
 
     fn after_collision(&mut self, scene: &mut Scene<'_>) {
@@ -109,10 +190,6 @@ impl Solver for Shim {
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         self.contacts_changed = scene.contacts_changed;
-        // Two bodies of one shape each have one contact.
-        if scene.shapes > scene.bodies.len() {
-            self.jams.release(scene.contacts);
-        }
         self.place(scene);
         if scene.contacts_changed || scene.gravity != self.gravity {
             self.gravity = scene.gravity;
@@ -126,12 +203,12 @@ impl Solver for Shim {
         let omega = TAU * stiffness / h;
         let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
         let rigid = Rigid::new(h);
-        if self.rolls {
+        if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
             passes.run(Phase::Prepare, &mut Roll { middle, dt });
         }
         self.impacts(passes);
-        if passes.runs(Phase::Prepare) {
+        if passes.runs(Phase::Prepare) && passes.has(part::STATICS) {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
@@ -143,17 +220,18 @@ impl Solver for Shim {
                 passes.integrate_and_warm_start();
             }
             for _ in 0..budget.velocity_iterations {
-                passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
+                if passes.has(part::BEARING) {
+                    passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
+                } else {
+                    passes.block_sweep_normal_first(Phase::Solve, springs);
+                }
                 passes.iteration_done();
             }
             passes.integrate_positions();
             // Impulses of the step before meet contacts that came, or miss some that went: one sweep more.
-            let settling = u32::from(substep == 0 && self.contacts_changed);
+            let settling = u32::from(substep == 0 && self.contacts_changed && passes.has(part::SETTLING));
             for _ in 0..budget.relax_iterations + settling {
-                let left = budget.substeps - substep;
-                if passes.run(Phase::Relax, &mut Parting::new(rigid, h, budget.substeps, left)) {
-                    passes.solved(&Sweep(rigid));
-                }
+                passes.block_sweep_normal_first(Phase::Relax, rigid);
             }
             passes.end_substep(substep);
         }
@@ -165,7 +243,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + self.jams.held_bytes() + held(&self.fields)
+        self.hand_down.held_bytes() + held(&self.fields)
     }
 }
 
@@ -179,16 +257,21 @@ impl Shim {
         for (i, contact) in scene.contacts.iter().enumerate() {
             if contact.body_a.max(contact.body_b) >= stepped {
                 let least = contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                let kept = scene.kept.contact(i);
-                (kept[PLACED], kept[LESS]) = (least, if least < -LEFT { 0.0 } else { -LEFT });
+                let is_placed = !scene.without.leaves_out(part::PLACED);
+                scene.kept.contact(i)[PLACED] = if is_placed { least } else { 0.0 };
             }
         }
     }
 
     /// What comes in bounces or stops, before the step.
     fn impacts(&mut self, passes: &mut Passes<'_>) {
-        if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) {
-            passes.spread_impacts(true, true, Some(LEAD));
+        if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) && passes.has(part::IMPACTS) {
+            passes.spread_impacts(Spreading {
+                timed: passes.has(part::MOMENT),
+                stops: true,
+                lead: Some(LEAD),
+                releases: passes.has(part::RELEASE),
+            });
             passes.parts().clock.lap(Phase::Prepare);
         }
     }

@@ -281,6 +281,7 @@ impl World {
             budget: s.budget,
             h: s.h(),
             parameters: s.parameters,
+            without: s.without,
             phases,
             record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),

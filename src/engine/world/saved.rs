@@ -14,7 +14,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::{Features, Impacts};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::shapes::{MassProperties, Shape};
 use crate::engine::solvers;
 use glam::Vec2;
@@ -31,6 +31,9 @@ struct SavedSettings {
     gravity: [f32; 2],
     dt: f32,
     parameters: Parameters,
+    /// Names of mechanisms that are left out.
+    #[serde(default)]
+    without: Vec<String>,
     impacts: Impacts,
     record_impulses: bool,
     contact_events: bool,
@@ -55,6 +58,10 @@ impl Serialize for Settings {
             gravity: s.gravity,
             dt: s.dt,
             parameters: s.parameters,
+            without: {
+                let names = s.solver.mechanisms.iter().enumerate();
+                names.filter(|(i, _)| s.without.leaves_out(*i)).map(|(_, m)| m.name.into()).collect()
+            },
             impacts: s.impacts,
             record_impulses: s.record_impulses,
             contact_events: s.contact_events,
@@ -77,8 +84,13 @@ impl<'de> Deserialize<'de> for Settings {
         let error = serde::de::Error::custom::<String>;
         let lanes =
             |n: usize| LaneWidth::from_lanes(n).ok_or_else(|| error(format!("{n} lanes: 1, 4, 8 or 16")));
+        let solver = solvers::find(&s.solver).map_err(|e| error(e.to_string()))?;
+        let without = s.without.iter().try_fold(Without::default(), |all, name| {
+            solver.mechanism(name).map(|place| all.and(place)).map_err(|e| error(e.to_string()))
+        })?;
         Ok(Settings {
-            solver: solvers::find(&s.solver).map_err(|e| error(e.to_string()))?,
+            solver,
+            without,
             width: lanes(s.lanes)?,
             narrowest: lanes(s.narrowest_lanes)?,
             order: s.order,

@@ -4,7 +4,7 @@ use crate::engine::broadphase::BroadPhaseKind;
 use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
 use crate::engine::constraints::{Features, ImpactLaw, Impacts};
 use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::Variant;
 
 /// The order in which constraints are solved.
@@ -53,6 +53,8 @@ pub struct Settings {
     pub dt: f32,
     /// The solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
+    /// Mechanisms of the solver that are left out, see [`Variant::mechanism`].
+    pub without: Without,
     /// Where bodies hit each other.
     pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
@@ -88,6 +90,7 @@ impl Settings {
             gravity: [0.0, -10.0],
             dt: 1.0 / 60.0,
             parameters: solver.defaults(),
+            without: Without::default(),
             impacts: Impacts::Own,
             record_impulses: false,
             contact_events: false,

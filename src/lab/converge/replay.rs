@@ -15,7 +15,7 @@ use crate::engine::constraints::records::kept::{Kept, KeptSize};
 use crate::engine::constraints::{ImpactLaw, OppositeKind, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
 use crate::lab::reference::residual::OwnRow;
@@ -143,6 +143,7 @@ impl<'a> Replay<'a> {
             budget,
             h,
             parameters,
+            without: Without::default(),
             phases,
             record_impulses,
             impacts: ImpactLaw::None,

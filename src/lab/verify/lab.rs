@@ -4,7 +4,7 @@ use super::{Failure, Finding, Sweep, SweepRow};
 use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::Impacts;
 use crate::engine::contacts::Contact;
-use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP};
+use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP, Without};
 use crate::engine::solvers::Variant;
 use crate::engine::world::{Settings, World};
 use crate::lab::scenes::{self, Scene, SceneBody, SceneShape};
@@ -34,6 +34,12 @@ impl Lab {
     /// The same laboratory under another treatment of impacts.
     pub fn impacts(mut self, impacts: Impacts) -> Self {
         self.settings.impacts = impacts;
+        self
+    }
+
+    /// The same laboratory with a solver that lacks some of its mechanisms.
+    pub fn without(mut self, without: Without) -> Self {
+        self.settings.without = without;
         self
     }
 

@@ -9,10 +9,23 @@ use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::bounces::Bounces;
 
+/// How impacts spread, see [`spread`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spreading {
+    /// Bodies are where they were hit, else where they are.
+    pub timed: bool,
+    /// What does not bounce stops.
+    pub stops: bool,
+    /// Which number that the solver keeps per contact is the time of its frame.
+    pub lead: Option<usize>,
+    /// Points that an impact releases have borne their body until then.
+    pub releases: bool,
+}
+
 impl Passes<'_> {
-    /// Lets what comes in bounce and, with `stops`, stop, before the step; see [`spread`]. `lead`: which number that the solver keeps per contact is
-    /// the time of its frame.
-    pub(crate) fn spread_impacts(&mut self, timed: bool, stops: bool, lead: Option<usize>) {
+    /// Lets what comes in bounce or stop, before the step.
+    pub(crate) fn spread_impacts(&mut self, spreading: Spreading) {
+        let Spreading { timed, stops, lead, releases } = spreading;
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
         let Some([least_gain, fastest]) = spread::impact_speeds(self.work, h, dt) else { return };
@@ -34,6 +47,7 @@ impl Passes<'_> {
             dt,
             h,
             timed,
+            releases,
             record_impulses: self.input.record_impulses,
             bounces,
         });
@@ -55,7 +69,7 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(false, false, None);
+                self.spread_impacts(Spreading { timed: false, stops: false, lead: None, releases: true });
             }
         }
     }

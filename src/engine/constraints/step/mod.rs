@@ -10,6 +10,7 @@ mod sweeps;
 mod vectors;
 mod workspace;
 
+pub(crate) use impacts::Spreading;
 pub use solver::{Collision, Scene, Schedule, Solver};
 pub use workspace::{Observer, StepInput, Watch, WorkCount, Workspace};
 
@@ -111,6 +112,11 @@ impl<'a> Passes<'a> {
     /// The solver's own parameter of this index in `Variant::parameters`.
     pub fn parameter(&self, index: usize) -> f32 {
         self.input.parameters[index]
+    }
+
+    /// Whether the solver's mechanism of this index in `Variant::mechanisms` is at work.
+    pub fn has(&self, mechanism: usize) -> bool {
+        !self.input.without.leaves_out(mechanism)
     }
 
     /// Points of all contacts.

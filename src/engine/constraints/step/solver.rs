@@ -7,7 +7,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::contacts::Contact;
 use crate::engine::narrowphase::candidate::Candidates;
 use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::params::Parameters;
+use crate::engine::params::{Parameters, Without};
 use glam::Vec2;
 use std::fmt;
 
@@ -55,14 +55,14 @@ pub struct Scene<'a> {
     pub kept: &'a mut Kept,
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
-    /// Shapes of all bodies.
-    pub shapes: usize,
     /// Contacts have come or gone since contacts got their lanes; known after the collision.
     pub contacts_changed: bool,
     /// Steps taken.
     pub step_index: u64,
     /// The solver's own parameters.
     pub parameters: &'a Parameters,
+    /// Mechanisms of the solver that are left out.
+    pub without: Without,
     /// m/s²
     pub gravity: Vec2,
     /// Step (s).

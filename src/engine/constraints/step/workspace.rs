@@ -11,7 +11,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::point_vector::PointVector;
 use crate::engine::constraints::vectors::system::System;
 use crate::engine::lanes::BodyRow;
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::{Budget, Parameters, Without};
 use std::fmt;
 
 /// Everything a step works on, kept from step to step so that nothing is allocated.
@@ -102,6 +102,8 @@ pub struct StepInput {
     pub h: f32,
     /// The solver's own parameters.
     pub parameters: Parameters,
+    /// Mechanisms of the solver that are left out.
+    pub without: Without,
     /// Which phases run.
     pub phases: PhaseFilter,
     /// Sum impulses into [`crate::engine::contacts::Contact::step_impulse`].

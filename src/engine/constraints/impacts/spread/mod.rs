@@ -36,18 +36,12 @@
 //! beside another. Each has 32 waves, in the last 4 of which nothing bounces, and 256 visits of points and 8 for each point that has been
 //! looked at: what an impact takes grows with what it hits. What comes in even then is stopped by the solver, and no body of the
 //! island is displaced: one might be into a third that nobody has looked at.
-//!
-//! # Energy
-//!
-//! Friction takes energy at each point of a wave that is solved ([`law`]). Where it runs to and fro between points, or visits are spent, it
-//! may make some. With the changes Δv of a wave, E(τ) of v⁻ + τ Δv is a parabola, and the wave is given the largest τ ≤ 1 that makes
-//! none; E is what semi-implicit Euler keeps in flight, v²/2 − g·(x − h v/2). Not where something kinematic takes part, which may.
 
 mod find;
 mod law;
 mod point;
 
-use crate::engine::lanes::{BodyRow, held};
+use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 use point::{Body, Point, Role, STILL};
@@ -108,8 +102,6 @@ pub struct Spread {
     visits: usize,
     /// Slower is solved (m/s).
     slowest: f32,
-    /// Something kinematic takes part in it.
-    is_driven: bool,
 }
 
 impl Spread {
@@ -168,7 +160,7 @@ impl Spread {
 
     /// Lets the impacts of an island spread; whether all of them could.
     fn island(&mut self, on: &mut On<'_>, hit: std::ops::Range<usize>) -> bool {
-        (self.first, self.visits, self.is_driven) = (self.points.len(), 0, false);
+        (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
         for i in hit {
             self.list(on, self.hit[i].1);
@@ -185,7 +177,7 @@ impl Spread {
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                 self.slowest *= FINER;
             }
-            if !any && wave > 0 && !self.release(on) {
+            if !any && wave > 0 && !(on.releases && self.release(on)) {
                 is_done = true;
                 break;
             }
@@ -194,7 +186,7 @@ impl Spread {
                 self.visit(on, place, bounces);
             }
             let is_solved = self.spread(on, bounces);
-            self.end_wave(on);
+            self.end_wave();
             if !is_solved {
                 break;
             }
@@ -245,10 +237,6 @@ impl Spread {
             (point.role, point.impulse, point.begun) = (Role::Bounces, [0.0; 2], [0.0; 2]);
             any = true;
         }
-        for &row in &self.pushed {
-            let BodyRow { velocity, delta } = &on.rows[row as usize];
-            self.bodies[row as usize].before = [*velocity, *delta].map(|v| [v[0], v[1], v[2]]);
-        }
         any
     }
 
@@ -287,51 +275,13 @@ impl Spread {
         any
     }
 
-    /// Keeps what a wave has given, or the part of it that makes no energy.
-    fn end_wave(&mut self, on: &mut On<'_>) {
-        let bounced = self.points[self.first..].iter().any(|p| p.role == Role::Bounces && p.friction > 0.0);
-        let part = if bounced && !self.is_driven { self.part_without_gain(on) } else { 1.0 };
-        if part < 1.0 {
-            for &row in &self.pushed {
-                let [velocity, delta] = self.bodies[row as usize].before;
-                let row = &mut on.rows[row as usize];
-                for (now, before) in
-                    row.velocity.iter_mut().zip(velocity).chain(row.delta.iter_mut().zip(delta))
-                {
-                    *now = part.mul_add(*now - before, before);
-                }
-            }
-        }
+    /// Keeps what a wave has given.
+    fn end_wave(&mut self) {
         for point in &mut self.points[self.first..] {
             for k in 0..2 {
-                let gained = part * (point.impulse[k] - point.begun[k]);
-                point.given[k] += gained;
-                point.impulse[k] = point.begun[k] + gained;
+                point.given[k] += point.impulse[k] - point.begun[k];
             }
         }
-    }
-
-    /// The largest τ ≤ 1 that makes no energy; see the [module](self).
-    fn part_without_gain(&self, on: &On<'_>) -> f32 {
-        let (mut linear, mut square) = (0.0_f64, 0.0_f64);
-        for &row in &self.pushed {
-            let (BodyRow { velocity, delta }, before) =
-                (&on.rows[row as usize], self.bodies[row as usize].before);
-            for k in 0..3 {
-                let inverse = f64::from(if k < 2 { velocity[3] } else { delta[3] });
-                if inverse > 0.0 {
-                    let gained = f64::from(on.increments[row as usize][k]);
-                    let [from, change, moved] =
-                        [before[0][k], velocity[k] - before[0][k], delta[k] - before[1][k]].map(f64::from);
-                    linear += ((from + 0.5 * gained) * change - gained / f64::from(on.h) * moved) / inverse;
-                    square += change * change / inverse;
-                }
-            }
-        }
-        // E(τ) − E(0) = τ linear + τ² square/2.
-        let part = if square > 0.0 { -2.0 * linear / square } else { 1.0 };
-        // What rounding leaves of an elastic wave is no gain.
-        if part > 1.0 - 1e-4 { 1.0 } else { part.max(0.0) as f32 }
     }
 
     /// Visits the points of bodies that were pushed, until none is left, or visits are spent; whether it is done.
@@ -418,13 +368,10 @@ impl Spread {
         let point = self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
-                self.is_driven |= on.rows[row as usize].velocity[..3] != [0.0; 3];
                 continue;
             }
             let body = &mut self.bodies[row as usize];
             if body.time == STILL.time {
-                let BodyRow { velocity, delta } = &on.rows[row as usize];
-                body.before = [*velocity, *delta].map(|v| [v[0], v[1], v[2]]);
                 self.pushed.push(row);
             }
             body.time = body.time.max(time);

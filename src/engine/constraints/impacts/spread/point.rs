@@ -19,21 +19,13 @@ pub(super) struct Body {
     pub is_queued: bool,
     /// Its velocity before anything pushed it (m/s, m/s, rad/s).
     pub flown: [f32; 3],
-    /// Velocity and displacement before the wave.
-    pub before: [[f32; 3]; 2],
     /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
     pub rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-pub(super) const STILL: Body = Body {
-    first: NONE,
-    time: f32::NEG_INFINITY,
-    is_queued: false,
-    flown: [0.0; 3],
-    before: [[0.0; 3]; 2],
-    rounded: [0.0; 3],
-};
+pub(super) const STILL: Body =
+    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 3], rounded: [0.0; 3] };
 
 /// What a point does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -113,6 +105,8 @@ pub(crate) struct On<'a> {
     pub h: f32,
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
+    /// Points that an impact releases have borne their body until then.
+    pub releases: bool,
     pub record_impulses: bool,
     /// Contacts may bounce.
     pub bounces: bool,

@@ -37,22 +37,6 @@
 //! Where A is close to singular (its determinant below a thousandth of a₁₁ a₂₂) or there is one point only,
 //! rows are solved one after the other.
 //!
-//! # What pushing apart does to angular momentum
-//!
-//! Springs that push an overlap apart give two bodies an impulse Π, move them by it for a substep and
-//! give it back. Meanwhile one body has slid past the other by v_t h. Had both impulses the same arms, they would
-//! be a couple v_t h Π: bodies that are moved apart while they slide gain μ q v_t of angular momentum for a
-//! push by q, however short the substep. [`Parting`] takes it from the two spins, half from each. What it
-//! takes stays for all substeps that follow ([`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]), so that of j substeps
-//! to come it takes the j-th part. With δ the impulses that a sweep changes, which are −Π along n, and along t as well,
-//!
-//! ```text
-//! I_a Δω_a = I_b Δω_b = −½ (h/j) (v_t δ_n − v_n δ_t)
-//! ```
-//!
-//! Without friction bodies exchange no spin but by their arms, and nothing is taken. Nor is it from bodies that rest
-//! on each other: those that slide by less than a hundredth of the slop in a step.
-//!
 //! # Order of rows
 //!
 //! Friction rows come first, bounded by the normal impulses so far, so that normal rows have the last word
@@ -70,7 +54,6 @@ use crate::engine::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
 use crate::engine::lanes::{BodyRow, Lanes};
-use crate::engine::params::LINEAR_SLOP;
 
 /// A matrix with a determinant below this part of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
@@ -79,38 +62,6 @@ const SINGULAR: f32 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 
-/// A block sweep, normal rows first, that takes back what springs have pushed and leaves angular momentum as it is.
-#[derive(Clone, Copy, Debug)]
-pub struct Parting<R> {
-    /// Of the sweep.
-    pub rule: R,
-    /// h/j: substep over the substeps that it still counts in (s).
-    pub time: f32,
-    /// Bodies that slide slower rest on each other (m/s).
-    pub slowest: f32,
-}
-
-impl<R> Parting<R> {
-    /// In a substep of `h` (s), one of `substeps`, of which `to_come` are left with it.
-    pub fn new(rule: R, h: f32, substeps: u32, to_come: u32) -> Self {
-        Parting { rule, time: h / to_come as f32, slowest: RESTING_SLIDE / (h * substeps as f32) }
-    }
-}
-
-/// By how much bodies slide at most in a step that rest on each other (m).
-const RESTING_SLIDE: f32 = 0.01 * LINEAR_SLOP;
-
-impl<R: NormalRule> Pass for Parting<R> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
-    #[inline(always)]
-    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        sweep::<L, F, R, true, true>(on.rows, on.batches, self.rule, [self.time, self.slowest]);
-    }
-}
-
 impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRST> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane::of_sweep(layout, R::FRICTION, opposite)
@@ -118,27 +69,23 @@ impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRS
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        sweep::<L, F, R, NORMAL_FIRST, false>(on.rows, on.batches, self.0, [0.0; 2]);
+        sweep::<L, F, R, NORMAL_FIRST>(on.rows, on.batches, self.0);
     }
 }
 
 #[inline(never)]
-fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool, const PARTING: bool>(
+fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     rule: R,
-    [time, slowest]: [f32; 2],
 ) {
-    over_segments!(segment, L, N, R, NORMAL_FIRST, PARTING; rows, batches, rule, [time, slowest]);
+    over_segments!(segment, L, N, R, NORMAL_FIRST; rows, batches, rule);
 }
 
-/// The block sweep as a kernel. `PARTING`: see [`Parting`].
+/// The block sweep as a kernel.
 #[derive(Clone, Copy)]
-struct InBlocks<R, const NORMAL_FIRST: bool, const PARTING: bool> {
+struct InBlocks<R, const NORMAL_FIRST: bool> {
     rule: R,
-    /// As [`Parting::time`] and [`Parting::slowest`].
-    time: f32,
-    slowest: f32,
 }
 
 /// See [`Stages::Begun`].
@@ -153,24 +100,13 @@ struct Begun<L> {
 }
 
 #[inline(always)]
-fn segment<
-    L: Lanes,
-    N: KernelFeatures,
-    O: Opposite,
-    R: NormalRule,
-    const NORMAL_FIRST: bool,
-    const PARTING: bool,
->(
+fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, const NORMAL_FIRST: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
     rule: R,
-    [time, slowest]: [f32; 2],
 ) {
-    // Momentum is that of two bodies that move: against others nothing slides.
-    let slowest = if segment.pushes_a() { slowest } else { f32::INFINITY };
-    let kernel = InBlocks::<R, NORMAL_FIRST, PARTING> { rule, time, slowest };
-    in_stages::<L, N, O, _, _>(rows, batches, segment, kernel);
+    in_stages::<L, N, O, _, _>(rows, batches, segment, InBlocks::<R, NORMAL_FIRST> { rule });
 }
 
 /// The friction rows of a batch, bounded by the normal impulses in its record; `along_t` is the velocity of b against
@@ -199,8 +135,7 @@ fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     }
 }
 
-impl<L, N, O, R, const NORMAL_FIRST: bool, const PARTING: bool> Stages<L, N, O>
-    for InBlocks<R, NORMAL_FIRST, PARTING>
+impl<L, N, O, R, const NORMAL_FIRST: bool> Stages<L, N, O> for InBlocks<R, NORMAL_FIRST>
 where
     L: Lanes,
     N: KernelFeatures,
@@ -291,19 +226,6 @@ where
         }
         if const { NORMAL_FIRST || !N::FRICTION || !R::FRICTION } {
             state.sum[1] = tangent.sum;
-        }
-        if const { PARTING && O::HAS_ROW && N::FRICTION && R::FRICTION } {
-            let [along_n, along_t] = state.along::<O>(record);
-            let slides = along_t.max(-along_t) - L::splat(self.slowest);
-            if slides.any_positive() {
-                let [normal, tangent] = state.sum;
-                let orbital = along_t.mul_add(normal, -(along_n * tangent)) * L::splat(0.5 * self.time);
-                let rough = record[layout.friction].min(slides);
-                let taken = rough.select_positive(orbital, L::zero());
-                for (w, inertia) in state.w.iter_mut().zip(inertia) {
-                    *w = inertia.neg_mul_add(taken, *w);
-                }
-            }
         }
     }
 }

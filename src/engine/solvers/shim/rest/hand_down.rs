@@ -86,9 +86,8 @@ impl HandDown {
         self.downwards.extend(standing.map(|&body| (body, still(&self.upright, body, bearing))));
     }
 
-    /// Hands down what accelerates bodies; whether something bears for the first time.
-    pub fn run(&mut self, on: &mut On<'_>) -> bool {
-        let mut begins = false;
+    /// Hands down what accelerates bodies.
+    pub fn run(&mut self, on: &mut On<'_>) {
         for i in 0..self.downwards.len() {
             let (body, still) = self.downwards[i];
             let [x, y, turn, inv_mass] = on.fields[body as usize].velocity;
@@ -104,11 +103,9 @@ impl HandDown {
             self.find_supports(on, body);
             let is_new = self.supports.iter().all(|support| support.load == [0.0; 2]);
             if !self.supports.is_empty() && (is_new || still.is_finite()) {
-                begins |= is_new;
                 self.stand(on, body);
             }
         }
-        begins
     }
 
     /// Lists the closed points of `body` with what is below it, with their loads.

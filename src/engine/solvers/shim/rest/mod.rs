@@ -34,31 +34,24 @@ pub(super) mod hand_down;
 pub(super) mod loads;
 pub(super) mod shorten;
 
-use super::Shim;
+use super::{Shim, part};
 use crate::engine::constraints::kernels::velocity::rules::Soft;
 use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::lanes::BodyRow;
 
 /// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; then the overlap that a body was put
-/// into the world with (m, ≤ 0), what is left of sag less than usual (m, ≤ 0), what springs of one point are shortened by (m), and the time of the frame of what rolls (s).
+/// into the world with (m, ≤ 0), nothing, what springs of one point are shortened by (m), and the time of the frame of what rolls (s).
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
 pub(super) const PLACED: usize = 4;
 
 /// See [`PER_CONTACT`].
-pub(super) const LESS: usize = 5;
-
-/// See [`PER_CONTACT`].
 pub(super) const HELD: usize = 6;
 
 /// See [`PER_CONTACT`].
 pub(super) const LEAD: usize = 7;
-
-/// How often as many sweeps are made in a step in which something bears for the first time: thrust, as of an arch, is found by
-/// sweeps alone.
-const AT_FIRST: u32 = 64;
 
 /// N of a point that is open.
 const OPEN: f32 = -1.0;
@@ -67,6 +60,8 @@ impl Shim {
     /// Finds the loads of closed contacts, and shortens `springs` by their sag.
     pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
         let (h, dt) = (passes.h(), passes.dt());
+        let [hands_down, holds, caps] =
+            [part::HAND_DOWN, part::HELD, part::DEPTH].map(|part| passes.has(part));
         let fields = &mut self.fields;
         let StepParts { work, .. } = passes.parts();
         fields.clear();
@@ -75,17 +70,18 @@ impl Shim {
             delta: [0.0, 0.0, 0.0, row.delta[3]],
         }));
         passes.over_contacts(&mut closed::Close { fields, h, dt });
-        let mut sweeps = load_sweeps;
         if load_sweeps > 0 {
             let StepParts { work, contacts, .. } = passes.parts();
             let Workspace { kept, motion, .. } = work;
             let (kept, increments) = (kept.contacts(), motion.velocity_increments());
-            let begins = self.hand_down.run(&mut hand_down::On { contacts, kept, fields, increments, h });
-            sweeps *= if begins { AT_FIRST } else { 1 };
+            let mut on = hand_down::On { contacts, kept, fields, increments, h };
+            if hands_down {
+                self.hand_down.run(&mut on);
+            }
         }
-        for _ in 0..sweeps {
+        for _ in 0..load_sweeps {
             passes.over_contacts(&mut loads::LoadSweep { fields, h });
         }
-        passes.over_contacts(&mut shorten::Shorten { springs, h, dt });
+        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, holds, caps });
     }
 }

@@ -4,9 +4,6 @@
 //!
 //! Points at rest shall stay points that touch: of each sag (1 − φ) is left, 20 µm at most.
 //!
-//! What is found in the first step of one of its bodies begins with all of its sag taken away, and leaves that overlap within a second: piles
-//! that begin at rest would else sink by it within a step, and rebound.
-//!
 //! # Contacts that roll
 //!
 //! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
@@ -35,7 +32,7 @@
 //! the depth from which the push speed u is all they give, and more as they bear a load. So what is
 //! thrown into another body is not thrown back.
 
-use super::{HELD, LESS, PLACED};
+use super::{HELD, PLACED};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
@@ -52,16 +49,17 @@ pub(in super::super) struct Shorten {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Contacts of one point keep what they were shortened by.
+    pub holds: bool,
+    /// Springs see no deeper than they bear.
+    pub caps: bool,
 }
 
 /// φ: part of a sag that is taken away (1).
 const SHARE: f32 = 0.95;
 
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
-pub(in super::super) const LEFT: f32 = 2e-5;
-
-/// Time in which that comes where a contact began without it (s).
-const GIVING: f32 = 1.0;
+const LEFT: f32 = 2e-5;
 
 /// Largest sag that is taken away (m).
 const LARGEST: f32 = 5.0 * SPECULATIVE_DISTANCE;
@@ -101,7 +99,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt }: &Shorten,
+    &Shorten { springs, h, dt, holds, caps }: &Shorten,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,
@@ -111,7 +109,7 @@ fn shorten<L: Lanes>(
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
     let per_impulse = L::splat(impulse_scale / (mass_scale * bias_rate));
     // Depth at which springs reach the push speed (m).
-    let deepest = L::splat(springs.push_speed / (mass_scale * bias_rate));
+    let deepest = L::splat(if caps { springs.push_speed / (mass_scale * bias_rate) } else { f32::MAX });
     let keeps = L::splat(PLACED_TIME / (PLACED_TIME + dt));
     let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
@@ -123,30 +121,28 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [mut placed, mut less, held, _]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [mut placed, _, held, _]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let is_single = if layout.points == 2 {
             record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
         } else {
             one
         };
-        if (-placed - less).any_positive() {
+        if (-placed).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
             placed = keeps.mul_add(placed.max(lowest), L::splat(LEFT)).min(zero);
-            less = (less + L::splat(LEFT * dt / GIVING)).min(zero);
             let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
             let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
             for (lane, &contact) in filled.iter().enumerate() {
-                let kept = &mut quads[2 * contact as usize + 1].0;
-                (kept[PLACED - 4], kept[LESS - 4]) = (of(&placed, lane), of(&less, lane));
+                quads[2 * contact as usize + 1].0[PLACED - 4] = of(&placed, lane);
             }
         }
         for p in 0..layout.points {
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
             let sag = (compliance * loads[2 * p].max(zero) / mass).min(L::splat(LARGEST));
-            let mut shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT) + less);
-            if p == 0 && is_single.any_positive() {
+            let mut shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT));
+            if holds && p == 0 && is_single.any_positive() {
                 let kept = held.max(L::splat(LEAST) * shorter).min(L::splat(MOST) * shorter);
                 let kept = held.select_positive(kept, shorter);
                 shorter = is_single.select_positive(kept, shorter);

@@ -1,0 +1,143 @@
+//! What each mechanism of a solver is for: the cases, errors and time of runs that leave it out.
+
+use crate::engine::params::{Mechanism, Without};
+use crate::engine::solvers::Variant;
+use crate::engine::world::Settings;
+use crate::lab::error::Error;
+use crate::lab::metrics::Observation;
+use crate::lab::report::table::{finish, table};
+use crate::lab::scenes;
+use crate::lab::verify::{self, Case, Lab, Matrix};
+use std::time::Instant;
+
+/// What a scene was without a mechanism.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct OnScene {
+    /// Its name.
+    pub scene: String,
+    /// Mean overlap of the run (m), with all and without; none where the run diverged.
+    pub overlap_m: [Option<f64>; 2],
+    /// Speed in the last second (m/s), likewise.
+    pub rest_speed_m_s: [Option<f64>; 2],
+    /// Time of all steps over that of the whole solver, stepped in turns (1).
+    pub time: f64,
+}
+
+/// A mechanism, and what is lost without it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Row {
+    /// Its name; `all of them` for the last row of several.
+    pub mechanism: String,
+    /// What it does.
+    pub meaning: String,
+    /// Lines of code in files of its own.
+    pub lines: u32,
+    /// Cases that pass with it and fail without.
+    pub lost: Vec<&'static str>,
+    /// Cases that fail with it and pass without.
+    pub won: Vec<&'static str>,
+    /// Scenes.
+    pub scenes: Vec<OnScene>,
+}
+
+/// What is to be left out, and where it is looked at.
+pub struct Plan {
+    /// Solver.
+    pub solver: &'static Variant,
+    /// Places of mechanisms in its table.
+    pub mechanisms: Vec<usize>,
+    /// Cases of [`verify`].
+    pub cases: Vec<&'static Case>,
+    /// Scenes.
+    pub scenes: Vec<String>,
+    /// Steps in each.
+    pub steps: u32,
+    /// Threads of cases; scenes run on one.
+    pub threads: usize,
+}
+
+/// Leaves out each mechanism in turn. `tell` is given how many of how many are done, and what runs.
+pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Row>, Error> {
+    let total = plan.mechanisms.len() + 1;
+    let passed = |without: Without, done: usize, name: &str| -> Vec<Option<bool>> {
+        let lab = |solver| Lab::new(solver).without(without);
+        let found: Matrix = verify::run(plan.cases.clone(), vec![plan.solver], plan.threads, lab, &|p| {
+            tell(done, total, &format!("{name}: {}", p.what));
+        });
+        found.cells.iter().map(|cells| cells[0].passed()).collect()
+    };
+    let whole = passed(Without::default(), 0, "whole");
+    let mut rows = Vec::new();
+    for (done, &place) in plan.mechanisms.iter().enumerate() {
+        let Mechanism { name, meaning, lines, .. } = plan.solver.mechanisms[place];
+        let without = Without::default().and(place);
+        let found = passed(without, done + 1, name);
+        let of = |before: bool| {
+            let cases = plan.cases.iter().zip(whole.iter().zip(&found));
+            let turned = cases.filter(|(_, now)| *now == (&Some(before), &Some(!before)));
+            turned.map(|(case, _)| case.id).collect()
+        };
+        let scenes = plan.scenes.iter().map(|scene| {
+            tell(done + 1, total, &format!("{name}: {scene}"));
+            on_scene(plan, scene, without)
+        });
+        let scenes = scenes.collect::<Result<_, _>>()?;
+        let (mechanism, meaning) = (name.into(), meaning.into());
+        rows.push(Row { mechanism, meaning, lines, lost: of(true), won: of(false), scenes });
+    }
+    Ok(rows)
+}
+
+/// Steps a scene with all mechanisms and without some, in turns.
+fn on_scene(plan: &Plan, name: &str, without: Without) -> Result<OnScene, Error> {
+    let scene = scenes::load(name)?.scene;
+    let build = |without| {
+        let settings = Settings { without, record_impulses: true, ..Settings::new(plan.solver) };
+        let world = scene.build(settings)?;
+        let seen = Observation::new(&world);
+        Ok::<_, Error>((world, seen))
+    };
+    let mut both = [build(Without::default())?, build(without)?];
+    let (mut times, mut diverged) = ([0.0; 2], [false; 2]);
+    for _ in 0..plan.steps {
+        for (k, (world, seen)) in both.iter_mut().enumerate() {
+            let start = Instant::now();
+            diverged[k] |= world.step().is_err();
+            times[k] += start.elapsed().as_secs_f64();
+            seen.observe(world);
+        }
+        if diverged != [false; 2] {
+            break;
+        }
+    }
+    let errors = both.map(|(_, seen)| seen.errors());
+    let of = |k: usize, value: f64| (!diverged[k] && value.is_finite()).then_some(value);
+    Ok(OnScene {
+        scene: name.into(),
+        overlap_m: [0, 1].map(|k| of(k, errors[k].penetration_mean)),
+        rest_speed_m_s: [0, 1].map(|k| of(k, errors[k].rest_velocity)),
+        time: times[1] / times[0],
+    })
+}
+
+/// The rows as two tables: cases, and scenes.
+pub fn text(rows: &[Row]) -> String {
+    let mut cases = table(&["without", "lines", "cases lost", "cases won"]);
+    let mut on_scenes = table(&["without", "scene", "overlap µm", "without", "rest mm/s", "without", "time"]);
+    let list = |cases: &[&str]| if cases.is_empty() { "–".to_string() } else { cases.join(" ") };
+    let number =
+        |value: Option<f64>, scale: f64| value.map_or("diverged".into(), |v| format!("{:.3}", v * scale));
+    for row in rows {
+        let lines = if row.lines == 0 { "–".into() } else { row.lines.to_string() };
+        cases.add_row([row.mechanism.clone(), lines, list(&row.lost), list(&row.won)]);
+        for OnScene { scene, overlap_m, rest_speed_m_s, time } in &row.scenes {
+            let [all, without] = overlap_m.map(|v| number(v, 1e6));
+            let [rest, rest_without] = rest_speed_m_s.map(|v| number(v, 1e3));
+            let name = row.mechanism.clone();
+            on_scenes.add_row([name, scene.clone(), all, without, rest, rest_without, format!("{time:.2}")]);
+        }
+    }
+    let scenes =
+        if rows.iter().all(|row| row.scenes.is_empty()) { String::new() } else { finish(on_scenes, 2) };
+    finish(cases, 4) + "\n" + &scenes
+}
