@@ -22,7 +22,7 @@ use simpulse::engine::lanes::{
 use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
 use simpulse::engine::narrowphase::hull::{Hull, HullRow};
 use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
-use simpulse::engine::params::Budget;
+use simpulse::engine::params::{Budget, Without};
 use simpulse::engine::shapes::Shape;
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -375,6 +375,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
         h: 0.01,
         parameters: [0.0; 8],
+        without: Without::default(),
         phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
