@@ -33,7 +33,7 @@
 //! # A bound for each island
 //!
 //! Bodies that contacts connect are an island. Impacts of one are solved without a look at the others, so that a scene behaves alike
-//! beside another. Each has 32 waves, in the last 4 of which nothing bounces, and 256 visits of points and 8 for each point that has been
+//! beside another. Each has 32 waves, in the last 4 of which nothing bounces, and 256 visits of points and 2 for each point that has been
 //! looked at: what an impact takes grows with what it hits. What comes in even then is stopped by the solver, and no body of the
 //! island is displaced: one might be into a third that nobody has looked at.
 
@@ -73,7 +73,7 @@ const ROUNDING: f32 = 1e-6;
 const WAVES: [u32; 2] = [32, 4];
 
 /// Visits of an island, and for each point that was looked at.
-const VISITS: [usize; 2] = [256, 8];
+const VISITS: [usize; 2] = [256, 2];
 
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
