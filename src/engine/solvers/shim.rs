@@ -36,7 +36,7 @@ use crate::engine::params::{Budget, Mechanism, Parameter, lines_of};
 use frames::Roll;
 use glam::Vec2;
 use rest::hand_down::HandDown;
-use rest::{LEAD, PER_CONTACT, PLACED};
+use rest::{BORNE, LEAD, PER_CONTACT, PLACED};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -79,7 +79,7 @@ pub static SOLVER: Variant = Variant {
 mod part {
     pub const STATICS: usize = 0;
     pub const HAND_DOWN: usize = 1;
-    pub const HELD: usize = 2;
+    pub const RISING: usize = 2;
     pub const PLACED: usize = 3;
     pub const DEPTH: usize = 4;
     pub const BEARING: usize = 5;
@@ -108,8 +108,8 @@ const MECHANISMS: [Mechanism; 11] = [
         lines: lines_of(include_str!("shim/rest/hand_down.rs")),
     },
     Mechanism {
-        name: "held",
-        meaning: "contacts of one point keep what they are shortened by, within bounds",
+        name: "rising",
+        meaning: "where something moves, springs are shortened for loads as these rise within 0.2 s",
         case: "",
         lines: 0,
     },
@@ -258,7 +258,9 @@ impl Shim {
             if contact.body_a.max(contact.body_b) >= stepped {
                 let least = contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
                 let is_placed = !scene.without.leaves_out(part::PLACED);
-                scene.kept.contact(i)[PLACED] = if is_placed { least } else { 0.0 };
+                let kept = scene.kept.contact(i);
+                kept[PLACED] = if is_placed && least < 0.0 { least } else { 1.0 };
+                kept[BORNE..].fill(-1.0);
             }
         }
     }

@@ -1,7 +1,10 @@
 //! Which points bear, and what their loads of the last step do to the accelerations of bodies.
 //!
-//! A point is closed if its gap is a fraction of the slop and it moves along its normal no faster than what forces make of
-//! rest in a step, v ≤ dt (|a_a| + |a_b|). One that closes begins with the impulse of the last substep.
+//! A point is closed if its gap is a fraction of the slop, it moves along its normal no faster than what forces make of
+//! rest in a step, v ≤ dt (|a_a| + |a_b|), and it is still closed in the middle of the step: a load acts until its end, and one that acts
+//! on what has left works on it. That work is all that keeps a box rocking. One that closes begins with the impulse of the last substep.
+//!
+//! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between.
 
 use super::OPEN;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -12,6 +15,12 @@ use crate::engine::params::LINEAR_SLOP;
 
 /// Greatest gap of a closed point (m).
 const CLOSED: f32 = 0.02 * LINEAR_SLOP;
+
+/// What is slower is calm (m/s): a twentieth of the gap of a closed point in the time in which loads rise.
+const CALM_SPEED: f32 = 1e-3;
+
+/// For so long (s).
+const CALM_TIME: f32 = 0.3;
 
 /// Finds closed points, and starts from their loads.
 pub(in super::super) struct Close<'a> {
@@ -50,7 +59,8 @@ fn close<L: Lanes>(
     let records = records.chunks_exact_mut(layout.stride).zip(contact.batches::<L::Index>());
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
     let increments: &[Quad] = bytemuck::cast_slice(increments);
-    let (zero, open) = (L::zero(), L::splat(OPEN));
+    let (zero, one, open) = (L::zero(), L::splat(1.0), L::splat(OPEN));
+    let (closed, half_step) = (L::splat(CLOSED), L::splat(0.5 * dt));
     let (per_step, per_substep, h) = (L::splat(dt / h), L::splat(1.0 / h), L::splat(h));
     let rows_of = row_a.batches().zip(row_b.batches());
     for (batch, ((record, index), (row_a, row_b))) in records.zip(rows_of).enumerate() {
@@ -69,14 +79,19 @@ fn close<L: Lanes>(
         let [nx, ny] = [record[0], record[1]];
         let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
+        let [placed, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut loads = [open, zero, open, zero];
+        let mut fastest = zero;
         for p in 0..layout.points {
             let arms = arms_of(record, layout, p);
             let vn = a[2].neg_mul_add(arms[0][0], b[2].mul_add(arms[1][0], straight));
             let speed = vn.max(-vn);
+            fastest = fastest.max(record[layout.at(p, layout.normal_mass)].select_positive(speed, zero));
             let at = |quantity: usize| record[layout.at(p, quantity)];
-            let near = L::splat(CLOSED) - at(layout.separation);
-            let is_closed = at(layout.normal_mass).select_positive(near.min(still - speed), zero);
+            let near = closed - at(layout.separation);
+            let in_the_middle = half_step.mul_add(vn, at(layout.separation).max(-closed));
+            let stays = near.min(still - speed).min(closed - in_the_middle);
+            let is_closed = at(layout.normal_mass).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
             let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
             let normal = begun(last[2 * p], at(layout.normal_impulse));
@@ -86,11 +101,13 @@ fn close<L: Lanes>(
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // What is left of impulses is what statics does not know.
+            let borne = if p == 0 { borne_0 } else { borne_1 }.max(zero);
             let at = layout.at(p, layout.normal_impulse);
-            record[at] = record[at] - impulse[0];
+            record[at] = borne.neg_mul_add(h, record[at]);
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
-                record[at] = record[at] - impulse[1];
+                let part = last[2 * p].select_positive(borne / last[2 * p], zero);
+                record[at] = (part * last[2 * p + 1]).neg_mul_add(h, record[at]);
             }
             push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
         }
@@ -98,7 +115,13 @@ fn close<L: Lanes>(
         if segment.pushes_a() {
             L::scatter_velocity(fields, row_a, [free_a[0], free_a[1], free_a[2], free_a[3]]);
         }
-        store::<L>(quads, index, segment.filled(batch, L::WIDTH), loads);
+        store::<L, 0>(quads, index, segment.filled(batch, L::WIDTH), loads);
+        let calm = (placed.max(zero) + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
+        let calm = (L::splat(CALM_SPEED) - fastest).select_positive(calm, zero);
+        let at_once = calm - L::splat(CALM_TIME);
+        let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
+        let placed = (-placed).select_positive(placed, calm);
+        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [placed, lead, borne[0], borne[1]]);
     }
 }
 
@@ -122,15 +145,20 @@ pub(super) fn push<L: Lanes>([a, b]: [&mut [L; 8]; 2], [nx, ny]: [L; 2], arms: [
     a[2] = a[7].neg_mul_add(turn(arms[0]), a[2]);
 }
 
-/// Writes the loads of the `filled` lanes of a batch.
+/// Writes four numbers kept of the contacts in the `filled` lanes of a batch, those of their quad `O`.
 #[inline(always)]
-pub(super) fn store<L: Lanes>(quads: &mut [Quad], index: LaneIndex<L::Index>, filled: usize, loads: [L; 4]) {
+pub(super) fn store<L: Lanes, const O: usize>(
+    quads: &mut [Quad],
+    index: LaneIndex<L::Index>,
+    filled: usize,
+    values: [L; 4],
+) {
     if filled == L::WIDTH {
-        L::scatter_quads::<2, 0>(quads, index, loads);
+        L::scatter_quads::<2, O>(quads, index, values);
         return;
     }
     for (lane, &contact) in index.entries()[..filled].iter().enumerate() {
-        let of = |load: &L| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(load))[lane];
-        quads[2 * contact as usize].0 = [of(&loads[0]), of(&loads[1]), of(&loads[2]), of(&loads[3])];
+        let of = |value: &L| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(value))[lane];
+        quads[2 * contact as usize + O].0 = [of(&values[0]), of(&values[1]), of(&values[2]), of(&values[3])];
     }
 }

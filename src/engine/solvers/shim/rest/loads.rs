@@ -77,6 +77,6 @@ fn sweep<L: Lanes>(
         if segment.pushes_a() {
             L::scatter_velocity(fields, row_a, [a[0], a[1], a[2], a[3]]);
         }
-        store::<L>(quads, index, segment.filled(batch, L::WIDTH), loads);
+        store::<L, 0>(quads, index, segment.filled(batch, L::WIDTH), loads);
     }
 }

@@ -40,18 +40,19 @@ use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::lanes::BodyRow;
 
-/// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; then the overlap that a body was put
-/// into the world with (m, ≤ 0), nothing, what springs of one point are shortened by (m), and the time of the frame of what rolls (s).
+/// Numbers kept per contact: N and T of both points (N), of a point that is open −1 and 0; the overlap that a body was put into the
+/// world with (m, < 0), or how long the contact has been calm (s, ≥ 0); the time of the frame of what rolls (s); and the load that springs
+/// of each point are shortened for (N), of a contact that is calm −1.
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
 pub(super) const PLACED: usize = 4;
 
 /// See [`PER_CONTACT`].
-pub(super) const HELD: usize = 6;
+pub(super) const LEAD: usize = 5;
 
 /// See [`PER_CONTACT`].
-pub(super) const LEAD: usize = 7;
+pub(super) const BORNE: usize = 6;
 
 /// N of a point that is open.
 const OPEN: f32 = -1.0;
@@ -60,8 +61,8 @@ impl Shim {
     /// Finds the loads of closed contacts, and shortens `springs` by their sag.
     pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
         let (h, dt) = (passes.h(), passes.dt());
-        let [hands_down, holds, caps] =
-            [part::HAND_DOWN, part::HELD, part::DEPTH].map(|part| passes.has(part));
+        let [hands_down, rises, caps] =
+            [part::HAND_DOWN, part::RISING, part::DEPTH].map(|part| passes.has(part));
         let fields = &mut self.fields;
         let StepParts { work, .. } = passes.parts();
         fields.clear();
@@ -82,6 +83,6 @@ impl Shim {
         for _ in 0..load_sweeps {
             passes.over_contacts(&mut loads::LoadSweep { fields, h });
         }
-        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, holds, caps });
+        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, rises, caps });
     }
 }

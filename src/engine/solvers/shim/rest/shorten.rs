@@ -4,11 +4,16 @@
 //!
 //! Points at rest shall stay points that touch: of each sag (1 − φ) is left, 20 µm at most.
 //!
-//! # Contacts that roll
+//! # Loads that rise
 //!
-//! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
-//! swells and settles without an end. So a contact of one point keeps what it was shortened by while that is at least half of what its
-//! load calls for, and no more than that and a tenth.
+//! What shortens a spring that bears F by δ does the work F δ, and a load that comes a step late does it with what moves. So where something
+//! moves, the load that a spring is shortened for follows its load at once downwards, and upwards within τ = 0.2 s:
+//!
+//! ```text
+//! F ← min(N, F + (N − F) dt/(τ + dt))
+//! ```
+//!
+//! Contacts that are calm ([`super::closed`]) have all of it at once, and so have those that are found in the first step of one of their bodies.
 //!
 //! # Overlap that was placed
 //!
@@ -32,13 +37,11 @@
 //! the depth from which the push speed u is all they give, and more as they bear a load. So what is
 //! thrown into another body is not thrown back.
 
-use super::{HELD, PLACED};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
 use crate::engine::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
-use crate::engine::params::SPECULATIVE_DISTANCE;
 
 /// See the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -49,8 +52,8 @@ pub(in super::super) struct Shorten {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
-    /// Contacts of one point keep what they were shortened by.
-    pub holds: bool,
+    /// Loads rise slowly where something moves.
+    pub rises: bool,
     /// Springs see no deeper than they bear.
     pub caps: bool,
 }
@@ -61,14 +64,8 @@ const SHARE: f32 = 0.95;
 /// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
 const LEFT: f32 = 2e-5;
 
-/// Largest sag that is taken away (m).
-const LARGEST: f32 = 5.0 * SPECULATIVE_DISTANCE;
-
-/// Least and most that a contact of one point keeps of what its load calls for (1).
-const LEAST: f32 = 0.5;
-
-/// See [`LEAST`].
-const MOST: f32 = 1.1;
+/// τ: time in which loads rise on what moves (s).
+const RISE: f32 = 0.2;
 
 /// Depth that springs see beyond that of the push speed, per sag (1).
 const EARNED: f32 = 20.0;
@@ -99,7 +96,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt, holds, caps }: &Shorten,
+    &Shorten { springs, h, dt, rises, caps }: &Shorten,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,
@@ -110,6 +107,7 @@ fn shorten<L: Lanes>(
     let per_impulse = L::splat(impulse_scale / (mass_scale * bias_rate));
     // Depth at which springs reach the push speed (m).
     let deepest = L::splat(if caps { springs.push_speed / (mass_scale * bias_rate) } else { f32::MAX });
+    let grows = L::splat(dt / (RISE + dt));
     let keeps = L::splat(PLACED_TIME / (PLACED_TIME + dt));
     let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
@@ -121,50 +119,39 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [mut placed, _, held, _]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
-        let is_single = if layout.points == 2 {
-            record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
-        } else {
-            one
-        };
+        let [mut placed, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let mut borne = [borne_0, borne_1];
         if (-placed).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
-            placed = keeps.mul_add(placed.max(lowest), L::splat(LEFT)).min(zero);
-            let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
-            let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
-            for (lane, &contact) in filled.iter().enumerate() {
-                quads[2 * contact as usize + 1].0[PLACED - 4] = of(&placed, lane);
-            }
+            let goes = keeps.mul_add(placed.max(lowest), L::splat(LEFT)).min(zero);
+            placed = (-placed).select_positive(goes, placed);
         }
         for p in 0..layout.points {
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
-            let sag = (compliance * loads[2 * p].max(zero) / mass).min(L::splat(LARGEST));
-            let mut shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT));
-            if holds && p == 0 && is_single.any_positive() {
-                let kept = held.max(L::splat(LEAST) * shorter).min(L::splat(MOST) * shorter);
-                let kept = held.select_positive(kept, shorter);
-                shorter = is_single.select_positive(kept, shorter);
-                let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
-                let filled = &index.entries()[..segment.filled(batch, L::WIDTH)];
-                for (lane, &contact) in
-                    filled.iter().enumerate().filter(|&(lane, _)| of(&is_single, lane) > 0.0)
-                {
-                    quads[2 * contact as usize + 1].0[HELD - 4] = of(&shorter, lane);
-                }
+            let load = loads[2 * p].max(zero);
+            if rises {
+                let risen = grows.mul_add(load - borne[p], borne[p]).min(load);
+                borne[p] = (borne[p] + L::splat(0.5)).select_positive(risen, load);
+            } else {
+                borne[p] = load;
             }
+            let sag = compliance * borne[p] / mass;
+            let shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT));
             let at = layout.at(p, layout.normal_impulse);
-            let impulse = loads[2 * p].max(zero).mul_add(h_lanes, record[at]).max(zero);
+            let impulse = borne[p].mul_add(h_lanes, record[at]).max(zero);
             record[at] = impulse;
-            let borne = (per_impulse * impulse / mass).min(L::splat(LARGEST));
-            let depth = L::splat(EARNED).mul_add(borne, deepest);
+            let depth = L::splat(EARNED).mul_add(per_impulse * impulse / mass, deepest);
             let at = layout.at(p, layout.separation);
-            record[at] = (record[at] - placed).max(-depth) - shorter;
+            record[at] = (record[at] - placed.min(zero)).max(-depth) - shorter;
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
-                record[at] = loads[2 * p + 1].mul_add(h_lanes, record[at]);
+                let part = load.select_positive(borne[p] / load, zero);
+                record[at] = (part * loads[2 * p + 1]).mul_add(h_lanes, record[at]);
             }
         }
+        let filled = segment.filled(batch, L::WIDTH);
+        super::closed::store::<L, 1>(quads, index, filled, [placed, lead, borne[0], borne[1]]);
     }
 }
