@@ -7,6 +7,7 @@
 //! their contact is. What goes beyond [`super::soft_step`], in `shim/`:
 //!
 //! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
+//! * `jams.rs`: two bodies that are caught in each other at several shapes begin without impulses;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
@@ -21,6 +22,7 @@
 //! body rocks on others: it goes on for long.
 
 mod frames;
+mod jams;
 mod rest;
 
 use super::{Law, Uses, Variant};
@@ -35,6 +37,7 @@ use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Mechanism, Parameter, lines_of};
 use frames::Roll;
 use glam::Vec2;
+use jams::Jams;
 use rest::hand_down::HandDown;
 use rest::{BORNE, LEAD, PER_CONTACT, PLACED};
 use std::f32::consts::TAU;
@@ -88,10 +91,12 @@ mod part {
     pub const IMPACTS: usize = 8;
     pub const MOMENT: usize = 9;
     pub const RELEASE: usize = 10;
+    pub const JAMS: usize = 11;
+    pub const HELD: usize = 12;
 }
 
 /// What a run can leave out, and what fails then.
-const MECHANISMS: [Mechanism; 11] = [
+const MECHANISMS: [Mechanism; 13] = [
     Mechanism {
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
@@ -160,12 +165,25 @@ const MECHANISMS: [Mechanism; 11] = [
         case: "A26.block",
         lines: 0,
     },
+    Mechanism {
+        name: "jams",
+        meaning: "contacts of two bodies that push against each other begin without impulses",
+        case: "",
+        lines: lines_of(include_str!("shim/jams.rs")),
+    },
+    Mechanism {
+        name: "held",
+        meaning: "contacts of one point keep what they are shortened by, within bounds",
+        case: "",
+        lines: 0,
+    },
 ];
 
 /// What it keeps.
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: HandDown,
+    jams: Jams,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -190,6 +208,9 @@ impl Solver for Shim {
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         self.contacts_changed = scene.contacts_changed;
+        if !scene.without.leaves_out(part::JAMS) {
+            self.jams.release(scene.contacts);
+        }
         self.place(scene);
         if scene.contacts_changed || scene.gravity != self.gravity {
             self.gravity = scene.gravity;
@@ -243,7 +264,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + held(&self.fields)
+        self.hand_down.held_bytes() + self.jams.held_bytes() + held(&self.fields)
     }
 }
 

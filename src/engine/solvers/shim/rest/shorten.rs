@@ -1,9 +1,5 @@
 //! Shortens springs by the sag of their loads.
 //!
-//! # What is left
-//!
-//! Points at rest shall stay points that touch: of each sag (1 − φ) is left, 20 µm at most.
-//!
 //! # Loads that rise
 //!
 //! What shortens a spring that bears F by δ does the work F δ, and a load that comes a step late does it with what moves. So where something
@@ -15,6 +11,12 @@
 //!
 //! Contacts that are calm ([`super::closed`]) have all of it at once, and so have those that are found in the first step of one of their bodies.
 //!
+//! # Contacts that roll
+//!
+//! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
+//! swells and settles without an end. So a contact of one point keeps the load that it was shortened for while that is at least half of what it
+//! bears, and no more than that and a tenth.
+//!
 //! # Overlap that was placed
 //!
 //! Bodies may be put into a world where they overlap. No load has made that overlap, and springs that see it throw bodies apart
@@ -22,7 +24,7 @@
 //! bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
 //!
 //! ```text
-//! d₀ ← min(max(d₀, s) τ/(τ + dt) + 20 µm, 0)
+//! d₀ ← max(d₀, s) τ/(τ + dt)
 //! ```
 //!
 //! # How deep springs see it
@@ -54,15 +56,17 @@ pub(in super::super) struct Shorten {
     pub dt: f32,
     /// Loads rise slowly where something moves.
     pub rises: bool,
+    /// Contacts of one point keep what they were shortened by.
+    pub holds: bool,
     /// Springs see no deeper than they bear.
     pub caps: bool,
 }
 
-/// φ: part of a sag that is taken away (1).
-const SHARE: f32 = 0.95;
+/// Least and most that a contact of one point keeps of its load (1).
+const LEAST: f32 = 0.5;
 
-/// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
-const LEFT: f32 = 2e-5;
+/// See [`LEAST`].
+const MOST: f32 = 1.1;
 
 /// τ: time in which loads rise on what moves (s).
 const RISE: f32 = 0.2;
@@ -96,7 +100,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt, rises, caps }: &Shorten,
+    &Shorten { springs, h, dt, rises, holds, caps }: &Shorten,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,
@@ -124,27 +128,38 @@ fn shorten<L: Lanes>(
         if (-placed).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
-            let goes = keeps.mul_add(placed.max(lowest), L::splat(LEFT)).min(zero);
+            let goes = keeps * placed.max(lowest);
             placed = (-placed).select_positive(goes, placed);
         }
+        let is_single = if layout.points == 2 {
+            record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
+        } else {
+            one
+        };
+        let risen = |borne: L, load: L| {
+            let grown = grows.mul_add(load - borne, borne).min(load);
+            (borne + L::splat(0.5)).select_positive(grown, load)
+        };
         for p in 0..layout.points {
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
             let load = loads[2 * p].max(zero);
-            if rises {
-                let risen = grows.mul_add(load - borne[p], borne[p]).min(load);
-                borne[p] = (borne[p] + L::splat(0.5)).select_positive(risen, load);
+            if holds && p == 0 && is_single.any_positive() {
+                let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
+                let kept = borne[0].select_positive(kept, load);
+                borne[0] = is_single.select_positive(kept, risen(borne[0], load));
+            } else if rises {
+                borne[p] = risen(borne[p], load);
             } else {
                 borne[p] = load;
             }
             let sag = compliance * borne[p] / mass;
-            let shorter = sag - (L::splat(1.0 - SHARE) * sag).min(L::splat(LEFT));
             let at = layout.at(p, layout.normal_impulse);
             let impulse = borne[p].mul_add(h_lanes, record[at]).max(zero);
             record[at] = impulse;
             let depth = L::splat(EARNED).mul_add(per_impulse * impulse / mass, deepest);
             let at = layout.at(p, layout.separation);
-            record[at] = (record[at] - placed.min(zero)).max(-depth) - shorter;
+            record[at] = (record[at] - placed.min(zero)).max(-depth) - sag;
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
                 let part = load.select_positive(borne[p] / load, zero);
