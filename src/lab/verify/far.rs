@@ -11,15 +11,15 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
         kilometre,
-        Yes("contacts see differences of positions, taken before they are rounded"),
+        Yes("contacts use differences of positions, taken before rounding"),
     ),
     Case::new(
         "B15.far",
-        "greatest distance from the origin with the same trajectory",
+        "largest distance from the origin with the same trajectory",
         "m",
-        "1e5 m is to hold, with the tolerance of B15.kilometre",
+        "1e5 m has to hold, with the tolerance of B15.kilometre",
         distance,
-        Yes("contacts see differences of positions, taken before they are rounded"),
+        Yes("contacts use differences of positions, taken before rounding"),
     ),
 ];
 
