@@ -4,7 +4,7 @@
 //! **As a library:** start with [`engine`], which says how to build for your CPU, which bits are promised, and how bodies are
 //! added, moved, queried and removed. [`changelog`] lists changes.
 //!
-//! # Three storeys
+//! # Three stories
 //!
 //! ```text
 //! cli       commands: arguments in, files and text out         (feature `cli`)
@@ -14,7 +14,7 @@
 //! engine    shapes, contacts, batches, solvers, world          (always)
 //! ```
 //!
-//! Imports point downwards only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
+//! Imports point downward only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
 //! `default-features = false` leaves just that.
 //!
 //! # The pipeline

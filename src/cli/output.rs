@@ -35,7 +35,7 @@ pub fn print_json(value: &Value) -> Result<ExitCode, Error> {
     print(&format!("{value:#}\n"))
 }
 
-/// Anything that can be serialised.
+/// Anything that can be serialized.
 pub fn value(of: &impl serde::Serialize) -> Result<Value, Error> {
     serde_json::to_value(of).map_err(|e| Error::invalid("json", e.to_string()))
 }

@@ -378,7 +378,7 @@ fn head(world: &World, scene: &Scene) -> String {
 fn counts(world: &World) -> String {
     let c = &world.counts;
     format!(
-        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
+        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
          {:.0} % of lanes filled, {} bytes of records\n",
         c.pairs,
         c.contacts,
@@ -425,7 +425,7 @@ impl CsvFile {
     }
 }
 
-/// A line per body: origin, angle with all turns since the start, velocity of the centre of mass.
+/// A line per body: origin, angle with all turns since the start, velocity of the center of mass.
 fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
@@ -437,7 +437,7 @@ fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> 
     Ok(())
 }
 
-/// A line per contact point: geometry at the start of the step, where the centres of mass
+/// A line per contact point: geometry at the start of the step, where the centers of mass
 /// were at `starts`; impulses on body b over the step.
 fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
     for contact in &world.contacts {

@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Run random scenes and count failures that no solver may have
 ///
 /// Ten families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
-/// stirrers, overlaps, extreme steps, centimetres beside a hundred metres, plates and needles, far from the origin.
+/// stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from the origin.
 /// Every scene runs under every solver, on all cores; only poses are checked, in double precision. A scene fails if
 /// it diverges, gains energy, flings a body, lets one escape from its walls, ends with bodies inside each other or
 /// does not come to rest when it should. The same seed gives the same scenes.
@@ -36,7 +36,7 @@ Examples:
   simpulse torture                                     a thousand scenes
   simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; the same again goes on where it stopped
   simpulse torture --families driven,fast --solvers soft_step,box2d,rapier --keep failed/
-  simpulse torture --only driven:17 --keep failed/     one scene again, and its minimised file")]
+  simpulse torture --only driven:17 --keep failed/     one scene again, and its minimized file")]
 pub struct TortureArgs {
     /// Scenes, over all families
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -212,7 +212,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// One scene under one solver; kept, minimised, if it fails and a folder is given.
+/// One scene under one solver; kept, minimized, if it fails and a folder is given.
 fn one(
     args: &TortureArgs,
     family: &'static Family,

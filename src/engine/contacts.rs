@@ -8,10 +8,10 @@ use glam::Vec2;
 #[repr(C)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ManifoldPoint {
-    /// From the centre of mass of body a to the contact point, world axes (m): midway between both surfaces, or
+    /// From the center of mass of body a to the contact point, world axes (m): midway between both surfaces, or
     /// on that of b if a is static or kinematic.
     pub anchor_a: Vec2,
-    /// From the centre of mass of body b to the same point, world axes (m).
+    /// From the center of mass of body b to the same point, world axes (m).
     pub anchor_b: Vec2,
     /// Signed gap along the normal (m); negative is overlap.
     pub separation: f32,

@@ -12,7 +12,7 @@ pub const SPECULATIVE_DISTANCE: f32 = 4.0 * LINEAR_SLOP;
 /// has moved that far. Larger: more candidates. Smaller: more searches.
 pub const AABB_MARGIN: f32 = 0.1;
 
-/// Fraction of the overlap that Baumgarte stabilisation removes per step (1).
+/// Fraction of the overlap that Baumgarte stabilization removes per step (1).
 pub const BAUMGARTE: f32 = 0.3;
 
 /// Stiffness of a soft contact between two dynamic bodies (Hz); contacts with
@@ -32,7 +32,7 @@ pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
 pub const MAX_PUSH_SPEED: f32 = 3.0;
 
 /// Most overlap that one position sweep removes at a point (m): more would turn bodies
-/// further than a linearised contact can follow.
+/// further than a linearized contact can follow.
 pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 
 /// Approach speeds above this bounce (m/s), where a source has no other.
@@ -98,7 +98,7 @@ pub struct Parameter {
 
 /// What several solvers can be given.
 impl Parameter {
-    /// Share of the overlap that Baumgarte stabilisation removes.
+    /// Share of the overlap that Baumgarte stabilization removes.
     pub const BAUMGARTE: Parameter = Parameter {
         name: "baumgarte",
         unit: "",

@@ -250,7 +250,7 @@ impl Lock {
         match file.try_lock() {
             Ok(()) => {}
             Err(std::fs::TryLockError::WouldBlock) => {
-                let message = "another study writes into it; give another folder with --out";
+                let message = "another study is writing there; give another folder with --out";
                 return Err(Error::invalid(folder.display().to_string(), message));
             }
             // A system without locks: two studies are the user's to keep apart.

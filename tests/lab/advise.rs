@@ -110,10 +110,10 @@ fn the_program_prints_evidence_and_writes_it() {
     let out = text(&none.stdout);
     assert_eq!(none.status.code(), Some(1), "{}", text(&none.stderr));
     assert!(
-        out.contains("no setting that was tried keeps the limits") && out.contains("nearest: pgs"),
+        out.contains("none of the settings tried meets the limits") && out.contains("nearest: pgs"),
         "{out}"
     );
-    assert!(out.contains("over its worst limit by a factor of"), "{out}");
+    assert!(out.contains("exceeds its worst limit by a factor of"), "{out}");
     let none = json(&limits);
     assert!(none["best"].is_null() && none["nearest"]["keeps_limits"] == false);
 }

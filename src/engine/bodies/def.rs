@@ -54,7 +54,7 @@ pub struct BodyDef {
     pub position: [f64; 2],
     /// rad
     pub angle: f64,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub velocity: [f64; 2],
     /// rad/s
     pub angular_velocity: f64,
@@ -190,7 +190,7 @@ impl BodyDef {
         BodyDef { angle, ..self }
     }
 
-    /// With this velocity of the centre of mass (m/s).
+    /// With this velocity of the center of mass (m/s).
     pub fn with_velocity(self, velocity: [f64; 2]) -> Self {
         BodyDef { velocity, ..self }
     }
@@ -200,7 +200,7 @@ impl BodyDef {
         BodyDef { angular_velocity, ..self }
     }
 
-    /// Mass (kg), centre (m, in the body's frame) and inertia (kg·m²) of all shapes.
+    /// Mass (kg), center (m, in the body's frame) and inertia (kg·m²) of all shapes.
     pub fn mass(&self) -> MassProperties {
         combine(&self.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
     }

@@ -158,7 +158,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
     impact(&mover(a, body_a, pose_a), &mover(b, body_b, pose_b), limit)
 }
 
-/// Bounds of a shape over the step: those of the disc about its centre of mass that holds it however it turns.
+/// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.
 fn swept(moving: Moving<'_>, rows: &[BodyRow], shape: usize) -> Aabb {
     let body = moving.proxies[shape].body as usize;
     let reach = advance::reach(&moving.shapes[shape]);

@@ -303,7 +303,7 @@ macro_rules! registers {
                 }
             }
 
-            /// Keeps a transposed register whole: without it the optimiser splits the
+            /// Keeps a transposed register whole: without it the optimizer splits the
             /// transpose into 128-bit shuffles, one set per extracted lane.
             #[inline(always)]
             fn barrier(mut v: $register) -> $register {

@@ -3,10 +3,10 @@
 //!
 //! **Source.** `giles2025`, algorithm 1, with the contact rows of its two-dimensional demonstration.
 //!
-//! The demonstration's defaults (10 iterations and one of post-stabilisation at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
+//! The demonstration's defaults (10 iterations and one of post-stabilization at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
 //! sticking within 10 mm) are the defaults here.
 //!
-//! **Departures.** Bodies go colour by colour; in natural order one by one, as the contacts name them. How fast a body fell
+//! **Departures.** Bodies go color by color; in natural order one by one, as the contacts name them. How fast a body fell
 //! is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has drifted, not its two
 //! anchors, so that along n it is where the manifold of the step has it. There is no geometric stiffness: rows are
 //! linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The cone is that of the normal
@@ -15,18 +15,18 @@
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
-//! a colour (`avbd/descent.rs`). Sweeps of a step request 9477 B per contact.
+//! a color (`avbd/descent.rs`). Sweeps of a step request 9477 B per contact.
 //!
 //! **Fails when** iterations are few for the height of a stack: a penalty needs them to grow, and
 //! descent carries a change by one body per iteration. In `f32` a body is lost where penalties exceed
 //! its inertia M/h² by more than seven digits. From zero, orders hardly matter: penalties begin at 1 N/m, M/h² of a
 //! unit box is 3600 N/m at 60 Hz, and while they are that soft a body does not feel in one iteration what its
-//! neighbours do in the same. Cold curves of all orders on the frozen pyramid of five differ by 2·10⁻⁵ after 100
+//! neighbors do in the same. Cold curves of all orders on the frozen pyramid of five differ by 2·10⁻⁵ after 100
 //! iterations and by 6·10⁻⁴ at most.
 //!
 //! # The method
 //!
-//! With y = x + h v + h² a, each body minimises |x − y|²_M/(2h²) + the energy of its rows:
+//! With y = x + h v + h² a, each body minimizes |x − y|²_M/(2h²) + the energy of its rows:
 //!
 //! ```text
 //! (M/h² + Σ k JᵀJ) Δx = −M (x − y)/h² + Σ Jᵀ f,   f = λ − k C within its bounds
@@ -36,7 +36,7 @@
 //! f ≥ 0 along n, |f| ≤ µ f_n along t. Then λ ← f and, where f is within its bounds, k ← k + β |C|.
 //! From step to step k keeps the share γ.
 //!
-//! Old error comes out of positions alone, by post-stabilisation: α = 1 in all iterations, so that forces and
+//! Old error comes out of positions alone, by post-stabilization: α = 1 in all iterations, so that forces and
 //! velocities know nothing of it, and λ stays whole from step to step; then velocities are taken, and `position_iterations`
 //! with α = 0 move bodies without a trace in velocities or multipliers. With none of those α is the parameter, and λ keeps
 //! the share α γ.

@@ -19,7 +19,7 @@
 //!
 //! # Why it converges
 //!
-//! With J split by contacts, the sweep minimises the sum of all contacts' energies over copies that
+//! With J split by contacts, the sweep minimizes the sum of all contacts' energies over copies that
 //! were equal before it; the mean is the projection on equal copies in the norm of their masses,
 //! n (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is kept: copies get Δλ/(m/n) each,
 //! a body the mean, Σ Δλ/m.

@@ -1,7 +1,7 @@
 //! Gauss–Seidel in a new random order for every sweep.
 //!
 //! A fixed order pushes the same way sweep after sweep, so that its error has a direction: a stack leans
-//! towards the side that is solved first. A random one has none.
+//! toward the side that is solved first. A random one has none.
 //!
 //! **Source.** `cottle1992` (the splitting); otherwise [`super::pgs`].
 //!

@@ -197,7 +197,7 @@ impl Narrow {
 
     /// Lists the candidates that are worth a look; returns the points of manifolds that are kept.
     ///
-    /// Where most candidates do not touch, those whose centres are too far apart are left out
+    /// Where most candidates do not touch, those whose centers are too far apart are left out
     /// before their shapes are read; where most do, the lists of the last step still hold.
     fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
         let cull = 4 * contacts.len() < 3 * self.candidates.len();

@@ -17,9 +17,9 @@ pub struct StepCounts {
     pub sweeps: usize,
     /// Rows solved in all sweeps of the step.
     pub row_updates: usize,
-    /// Colours in use.
+    /// Colors in use.
     pub colors: usize,
-    /// Contacts solved serially because colours ran out.
+    /// Contacts solved serially because colors ran out.
     pub overflow: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,

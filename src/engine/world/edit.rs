@@ -212,7 +212,7 @@ impl World {
         Ok(())
     }
 
-    /// Sets the velocity of a body's centre of mass (m/s) and its spin (rad/s).
+    /// Sets the velocity of a body's center of mass (m/s) and its spin (rad/s).
     ///
     /// Errors: the body was removed; it is static; a value that is not finite.
     pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f32; 2], spin: f32) -> Result<(), Error> {
@@ -228,7 +228,7 @@ impl World {
         Ok(())
     }
 
-    /// Applies a force (N) at the centre of mass over the next step, in addition to the standing
+    /// Applies a force (N) at the center of mass over the next step, in addition to the standing
     /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic bodies are
     /// moved by it.
     ///

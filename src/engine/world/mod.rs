@@ -1,7 +1,7 @@
 //! One time step of the whole pipeline, every phase timed.
 //!
 //! ```text
-//! bounds → pairs → manifolds → colours → records → solver stages → impulses, poses
+//! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
 //! ```
 
 use crate::engine::bodies::Bodies;
@@ -51,7 +51,7 @@ pub use settings::{Order, Settings};
 struct Surface {
     friction: f32,
     restitution: f32,
-    /// Farthest point from the body's centre of mass (m).
+    /// Farthest point from the body's center of mass (m).
     reach: f32,
     /// What the narrow phase knows it as.
     class: Class,
@@ -90,7 +90,7 @@ struct Surface {
 pub struct World {
     /// Body state.
     pub bodies: Bodies,
-    /// Shapes, in the frame of their body's centre of mass.
+    /// Shapes, in the frame of their body's center of mass.
     pub shapes: Vec<Shape>,
     /// Body of each shape.
     pub shape_body: Vec<u32>,
@@ -290,7 +290,7 @@ impl World {
         solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
     }
 
-    /// Lanes per instruction of the last step: as many as the settings allow and the colours fill.
+    /// Lanes per instruction of the last step: as many as the settings allow and the colors fill.
     pub fn lane_width(&self) -> LaneWidth {
         LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
     }

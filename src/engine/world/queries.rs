@@ -157,7 +157,7 @@ impl Queries<'_> {
         });
     }
 
-    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector towards it; zero where
+    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector toward it; zero where
     /// cores overlap.
     fn distance(&self, i: usize, other: &Shape, center: DVec2) -> (f64, DVec2) {
         let bodies = &self.world.bodies;

@@ -14,7 +14,7 @@ use crate::engine::solvers::Variant;
 pub enum Order {
     /// One after the other, sorted by shape pair (width 1 only).
     Natural,
-    /// Colour by colour.
+    /// Color by color.
     Colored,
 }
 
@@ -40,7 +40,7 @@ pub struct Settings {
     pub solver: &'static Variant,
     /// Lanes per instruction, at most.
     pub width: LaneWidth,
-    /// Fewest lanes that a step may fall back to where colours are small; see [`Self::exactly`]. Every width gives the
+    /// Fewest lanes that a step may fall back to where colors are small; see [`Self::exactly`]. Every width gives the
     /// same bits.
     pub narrowest: LaneWidth,
     /// Constraint order.
@@ -77,7 +77,7 @@ pub struct Settings {
 
 impl Settings {
     /// Standard settings of `solver`: its budget, the widest lanes that this build has instructions
-    /// for, coloured, gravity (0, −10), 1/60 s.
+    /// for, colored, gravity (0, −10), 1/60 s.
     pub fn new(solver: &'static Variant) -> Self {
         Settings {
             solver,

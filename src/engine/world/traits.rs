@@ -37,7 +37,7 @@ pub(super) struct Traits {
 }
 
 impl Traits {
-    /// Takes note of a body; `round` if it is made of discs about its centre of mass.
+    /// Takes note of a body; `round` if it is made of discs about its center of mass.
     pub fn add(&mut self, body: &BodyDef, round: bool) {
         let dynamic = body.kind == BodyKind::Dynamic;
         let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);

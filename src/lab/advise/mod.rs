@@ -4,7 +4,7 @@
 //! their stiffness; the fastest lane width goes with it. The search
 //!
 //! 1. tries a grid in which every part of the budget is doubled, the least work first;
-//! 2. refines what is good enough: each part is lowered by bisection towards its half;
+//! 2. refines what is good enough: each part is lowered by bisection toward its half;
 //! 3. times the best few again, in turns and several times, and lets that decide.
 //!
 //! Where a scene has to rest, what keeps the limits is [run on](crate::lab::study::horizon) for a minute before
@@ -39,7 +39,7 @@ use search::Search;
 /// What to search, and how long.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Name of the catalogue with its size, or a `.json` file.
+    /// Name of the catalog with its size, or a `.json` file.
     pub scene: String,
     /// What is good enough.
     pub limits: Limits,
@@ -47,7 +47,7 @@ pub struct Plan {
     pub impacts: Impacts,
     /// Rows of [`crate::engine::solvers::VARIANTS`].
     pub solvers: Vec<&'static Variant>,
-    /// Lane widths of coloured settings; with one lane there is natural order too.
+    /// Lane widths of colored settings; with one lane there is natural order too.
     pub widths: Vec<LaneWidth>,
     /// Steps of the runs that measure errors; where none, the scene's own.
     pub steps: Option<u32>,
@@ -177,7 +177,7 @@ impl Trial {
             ),
             (
                 limits.truth.is_some() && reference.is_none_or(|e| over(e, limits.truth)),
-                reference.map_or("never comes to its reference value".into(), |e| {
+                reference.map_or("never reaches its reference value".into(), |e| {
                     format!("{} off its reference value", si(e, unit))
                 }),
             ),
@@ -204,9 +204,9 @@ pub struct Advice {
     pub finalists: Vec<Trial>,
     /// Everything that was tried, in that order, with the times of the trials.
     pub trials: Vec<Trial>,
-    /// Settings left out because they should not be cheaper.
+    /// Settings skipped because they cannot be cheaper.
     pub left_out: usize,
-    /// Whether the time was up before the grid was done.
+    /// Whether the time limit was reached before the grid was done.
     pub is_cut_short: bool,
     /// Timing runs and steps of the final timing.
     pub timing: [u32; 2],
@@ -263,7 +263,7 @@ pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error>
     }
     let loaded = open_scene(&plan.scene, Some(plan.seed), plan.steps, None)?;
     if plan.limits.truth.is_some() && loaded.truth.is_none() {
-        return Err(Error::invalid("max-truth", format!("no truth is known about '{}'", plan.scene)));
+        return Err(Error::invalid("max-truth", format!("no reference value is known for '{}'", plan.scene)));
     }
     let mut search = Search::new(plan, &loaded.scene, progress);
     search.coarse()?;

@@ -29,7 +29,7 @@ pub const NEGLIGIBLE: f64 = 0.01;
 /// How to judge.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Growth of a time or an error from which it is a regression (1): 0.1 is a tenth more.
+    /// Smallest increase of a time or an error that counts as a regression (1): 0.1 is 10 %.
     pub threshold: f64,
     /// Divide times by what all settings have in common.
     pub relative: bool,
@@ -52,7 +52,7 @@ pub struct Pair {
     pub marks: [Option<Mark>; 2],
     /// Errors that both have, by axis.
     pub errors: Vec<ErrorChange>,
-    /// Time after in times that before; none if one of them has no time.
+    /// Time after ÷ time before; none if one of them has no time.
     pub time: Option<TimeChange>,
 }
 

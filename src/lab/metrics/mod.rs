@@ -77,8 +77,8 @@ pub struct Errors {
     pub rest_depth_max: f64,
     /// Deepest overlap, in half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
-    /// Deepest overlap of the last second beyond what soft contacts give way at rest (m); none
-    /// without soft contacts.
+    /// Deepest overlap of the last second beyond the static deflection of the soft contacts (m); none without soft
+    /// contacts.
     #[serde(rename = "penetration_excess_m")]
     pub penetration_excess: Option<f64>,
     /// The most that soft contacts give way under the last second's load (m).
@@ -141,7 +141,7 @@ pub struct Errors {
     /// Half the width of its 95 % interval (m/s).
     #[serde(rename = "creep_half_width_m_s")]
     pub creep_half_width: f64,
-    /// When the scene came to rest for good (s), if it did.
+    /// Time at which the scene came to rest (s); none if it never did.
     #[serde(rename = "settled_s")]
     pub settled: Option<f64>,
 }

@@ -70,7 +70,7 @@ pub struct Rest {
     steps: u64,
     /// 2 E_kin/M, the last [`REST_WINDOW`] of them (m²/s²).
     speeds: VecDeque<f64>,
-    /// Centres of mass in the same window (m).
+    /// Centers of mass in the same window (m).
     positions: VecDeque<Vec<DVec2>>,
     /// Bodies that press on each other, with the tangent of their contact.
     touching: Vec<([usize; 2], DVec2)>,
@@ -129,7 +129,7 @@ impl Rest {
         self.settled
     }
 
-    /// The fastest of all slopes of a centre of mass against that of a body it presses on,
+    /// The fastest of all slopes of a center of mass against that of a body it presses on,
     /// along the tangent of their contact; of those that press on each other at the end.
     /// What rolls or slides on purpose creeps too.
     pub fn creep(&self) -> Slope {

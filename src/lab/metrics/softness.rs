@@ -22,7 +22,7 @@ pub fn floor(load: f64, mass: f64, omega: f64) -> f64 {
     if stiffness > 0.0 { load.max(0.0) / stiffness } else { 0.0 }
 }
 
-/// Deepest penetration at rest, and what of it is the springs'.
+/// Deepest penetration at rest, and the part of it that is static deflection of the springs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Depths {
     /// Deepest overlap (m).

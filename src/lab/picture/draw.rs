@@ -16,7 +16,7 @@ const MOVED: Color = Color::rgb(0xd9d2e9);
 /// Blue and green of Okabe and Ito: distinct with any color vision, and from the ramp.
 const IMPULSE: Color = Color::rgb(0x0072b2);
 const NORMAL: Color = Color::rgb(0x009e73);
-/// No overlap to the deepest: lightness falls steadily, so that it reads in grey, too.
+/// No overlap to the deepest: lightness falls steadily, so that it reads in gray, too.
 const RAMP: [Color; 5] = [
     Color::rgb(0xf3f5f8),
     Color::rgb(0xfde4a0),
@@ -61,7 +61,7 @@ fn round_down(value: f64) -> f64 {
     }
 }
 
-/// From metres on the stage to pixels.
+/// From meters on the stage to pixels.
 struct View {
     scale: f64,
     left: f64,

@@ -42,7 +42,7 @@ pub enum Anchor {
     End,
 }
 
-/// Something drawn; lengths in pixels, y downwards.
+/// Something drawn; lengths in pixels, y downward.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// A closed outline.
@@ -69,7 +69,7 @@ pub enum Item {
     },
     /// A filled disc.
     Disc {
-        /// Its centre.
+        /// Its center.
         at: [f64; 2],
         /// Its radius.
         radius: f64,

@@ -1,9 +1,9 @@
 //! The cost of a contact as scenes grow: what stays flat, what steps where a cache ends, and what
 //! grows.
 //!
-//! Scenes of all sizes are held still and take turns, so that whatever the machine does, it does to
-//! all of them. A turn is a few whole steps on the same state, pairs searched again in each; the
-//! first finds cold caches and is not timed.
+//! Scenes of all sizes are frozen and timed interleaved, so a slow spell of the machine affects all of them alike. A
+//! turn is a few whole steps on the same state, pairs searched again in each; the first finds cold caches and is not
+//! timed.
 
 use super::ceilings::ReadCurve;
 use super::waiting::{self, waited};

@@ -85,7 +85,7 @@ pub struct Header {
 pub struct ShapeRecord {
     /// Its body.
     pub body: u32,
-    /// Vertices in the frame of the body's centre of mass (m).
+    /// Vertices in the frame of the body's center of mass (m).
     pub points: Vec<[f32; 2]>,
     /// m
     pub radius: f32,

@@ -145,7 +145,7 @@ impl<'a> Cone<'a> {
         match remainder(&self.edges, &wanted, limit) {
             Some(rest) => Ok((norm(&rest) > BALANCED).then_some(rest)),
             None => {
-                let message = format!("statics found no balance in {limit} rounds");
+                let message = format!("the static solve found no equilibrium in {limit} rounds");
                 Err(Error::invalid(self.problem.name.clone(), message))
             }
         }
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn collapse_loads_by_hand() {
-        // A box pushed sideways at its centre slides at µ m g (µ < 1) and topples at m g beyond.
+        // A box pushed sideways at its center slides at µ m g (µ < 1) and topples at m g beyond.
         let p = block_on_incline(0.0, 0.3);
         let weight = GRAVITY * p.h;
         let push = |x: f64, y: f64| vec![[x * weight, y * weight, 0.0]];
@@ -228,7 +228,7 @@ mod tests {
         let contact = |a, b, normal, ra, rb, friction, manifold| {
             ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
         };
-        // Centres at ∓sin/2; feet outwards below, tops meeting at x = 0.
+        // Centers at ∓sin/2; feet outwards below, tops meeting at x = 0.
         let (left_foot, left_top) = ([-0.5 * sin, -0.5 * cos], [0.5 * sin, 0.5 * cos]);
         let (right_foot, right_top) = ([0.5 * sin, -0.5 * cos], [-0.5 * sin, 0.5 * cos]);
         let contacts = vec![

@@ -20,7 +20,7 @@ pub struct Environment {
     pub target_features: Vec<String>,
     /// Widest lanes that one instruction of these sets processes.
     pub native_lanes: usize,
-    /// Whether the program was built with optimisation checks on.
+    /// Whether the program was built with optimization checks on.
     pub debug_assertions: bool,
     /// Version of this crate.
     pub version: String,

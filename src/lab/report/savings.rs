@@ -1,14 +1,14 @@
-//! Savings from specialisation as a table.
+//! Savings from specialization as a table.
 
 use super::table::{finish, table};
 use super::units::{digits, lanes};
 use crate::lab::study::savings::Saving;
 
 const LEGEND: &str = "\
-Savings from specialisation: what a kernel gains by leaving out a feature that its scene does not have.
-bytes, ns: of a prepared contact, and per contact and sweep, with the features of the scene alone; saved:
-what they would be more with this feature. frictionless: the scene with every friction coefficient zero.
-same bits: whether both kernels came to the same state.
+Savings from specialization: what a kernel gains by dropping a feature that its scene does not use.
+bytes, ns: per prepared contact, and per contact and sweep, with only the features of the scene; saved: how much
+larger they are with this feature. frictionless: the scene with every friction coefficient zero.
+same bits: whether both kernels give the same state.
 ";
 
 /// The savings, a line each.

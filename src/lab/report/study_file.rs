@@ -77,7 +77,7 @@ impl StudyFile {
         let mut found: Vec<(String, &String)> = Vec::new();
         for (part, name) in parts.iter().zip(names) {
             if chosen(part) != chosen(first) {
-                let message = format!("{name} was run with other settings than {}", names[0]);
+                let message = format!("{name} was run with different settings than {}", names[0]);
                 return Err(Error::invalid("merge", message));
             }
             for scene in part.scenes() {

@@ -2,7 +2,7 @@
 //!
 //! Eight colors that differ with any color vision (Okabe and Ito, yellow darkened for lines on
 //! white) times eight markers. A solver's place decides: first those of [`DEFAULT_SOLVERS`], which
-//! therefore differ in color, then the others of [`VARIANTS`]. Neighbours differ in both, and
+//! therefore differ in color, then the others of [`VARIANTS`]. Neighbors differ in both, and
 //! sixty-four solvers differ in one of them.
 
 use crate::engine::solvers::VARIANTS;

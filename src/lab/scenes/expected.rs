@@ -8,7 +8,7 @@ use super::{Entry, Loaded, Scene, entry_of, load};
 use crate::lab::error::Error;
 
 impl Expect {
-    /// What a scene of the catalogue expects.
+    /// What a scene of the catalog expects.
     pub(super) fn of(name: &str, demands: &[Demand], truth: Option<&Truth>, tolerances: &Tolerances) -> Self {
         let mut expect = Expect { catalogue: Some(name.to_string()), ..Expect::default() };
         for demand in demands {
@@ -61,11 +61,11 @@ impl Reference {
 
 /// A scene of a file with what it says of a run.
 ///
-/// Errors: an unknown scene of the catalogue.
+/// Errors: an unknown scene of the catalog.
 pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     let Some(expect) = scene.expect.clone() else {
         let tolerances = Tolerances::standard(&scene);
-        let nothing = "what must hold and what is known: the file says neither (expect)".to_string();
+        let nothing = "conditions and reference values: the file has none (expect)".to_string();
         return Ok(Loaded { scene, truth: None, demands: Vec::new(), tolerances, unchecked: vec![nothing] });
     };
     let mut unchecked = Vec::new();
@@ -90,7 +90,7 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
         unchecked.push("a reference value: the file has none".to_string());
     }
     if demands.is_empty() && expect.catalogue.is_none() {
-        unchecked.push("whether it stands, rests or stays inside: the file demands nothing".to_string());
+        unchecked.push("whether it stands, rests or stays inside: the file has no such condition".to_string());
     }
     tolerances.rest = expect.rests.then(|| Tolerances::resting(&scene));
     Ok(Loaded { scene, truth, demands, tolerances, unchecked })
@@ -106,7 +106,7 @@ fn lost(entry: &Entry, expect: &Expect, name: &str) -> Option<String> {
         (false, true) => "the reference value",
         (true, true) => "whether bodies get out, and the reference value",
     };
-    Some(format!("{what} of the catalogue's {name}: the bodies are others"))
+    Some(format!("{what} of the catalog's {name}: the bodies are others"))
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ pub struct SceneBody {
     /// rad
     #[serde(default, skip_serializing_if = "is_zero")]
     pub angle: f64,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     #[serde(default, skip_serializing_if = "is_origin")]
     pub velocity: [f64; 2],
     /// rad/s
@@ -116,7 +116,7 @@ pub struct Circle {
     pub radius: f64,
 }
 
-/// A rectangle turned about its centre, grown by `radius`.
+/// A rectangle turned about its center, grown by `radius`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
@@ -282,7 +282,7 @@ impl Scene {
     /// The scene as JSON, one body per line; defaults of bodies and shapes are left out.
     /// JSON has no NaN, so one becomes `null`, which reading refuses.
     pub fn to_json(&self) -> String {
-        // Infallible: every map key is a string and nothing here can fail to serialise.
+        // Infallible: every map key is a string and nothing here can fail to serialize.
         let line = |value: serde_json::Result<String>| value.unwrap_or_default();
         let bodies: Vec<String> = self.bodies.iter().map(|b| line(serde_json::to_string(b))).collect();
         let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));

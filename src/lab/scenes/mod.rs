@@ -1,4 +1,4 @@
-//! Scenes: their file format, a catalogue of them, what is known about each, what it demands of a
+//! Scenes: their file format, a catalog of them, what is known about each, what it demands of a
 //! run and how wrong that may be.
 //!
 //! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 or C11
@@ -194,7 +194,7 @@ impl Entry {
     }
 }
 
-/// A scene of the catalogue, and what is known about it.
+/// A scene of the catalog, and what is known about it.
 pub struct Loaded {
     /// Ready to build.
     pub scene: Scene,
@@ -293,7 +293,7 @@ impl Description {
     }
 }
 
-/// Describes a scene of the catalogue. One that may be very large is not made for it: its smallest
+/// Describes a scene of the catalog. One that may be very large is not made for it: its smallest
 /// sibling says what all sizes have in common, and its [`Outline`] the rest.
 ///
 /// Errors: as [`load`].

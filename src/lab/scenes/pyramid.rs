@@ -26,9 +26,9 @@ pub(super) const LARGE: Entry =
         .within(|scene, load| Tolerances::standard(scene).percent(load));
 
 pub(super) const MANY: Entry =
-    Entry::new("many_pyramids", "floors with pyramids of 55 boxes, as many as there are floors", |floors| {
+    Entry::new("many_pyramids", "floors, each with as many pyramids of 55 boxes as there are floors", |floors| {
         const BASE: u32 = 10;
-        // A pyramid and a metre of air, in both directions.
+        // A pyramid and a meter of air, in both directions.
         const SPACING: f64 = BASE as f64 + 1.0;
         let half_width = 0.5 * SPACING * f64::from(floors);
         let height = |floor: u32| SPACING * f64::from(floor);

@@ -23,7 +23,7 @@ const MISS: f64 = 1e-3;
 /// The quantile of the normal distribution that leaves out half of [`MISS`].
 const Z: f64 = 3.291;
 
-/// The time of one setting in times that of another.
+/// The time of one setting ÷ that of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
     /// Median over the pairs of blocks, or of the means where spikes differ.

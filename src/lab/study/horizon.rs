@@ -106,7 +106,7 @@ pub fn run_on(
         if untried.is_empty() {
             return Ok(());
         }
-        tell(format!("a minute of {name}: {} settings", untried.len()));
+        tell(format!("extending {name} to a minute: {} settings", untried.len()));
         let jobs: Vec<(Record, Settings)> =
             untried.into_iter().map(|r| Ok((r.clone(), settings(plan, r)?))).collect::<Result<_, Error>>()?;
         let found = in_parallel(&jobs, |(_, settings)| later(&plan.open(name)?, settings.clone()))?;

@@ -3,7 +3,7 @@
 //! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
 //! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
 //! settings of a scene in common rounds, alone on the machine. All
-//! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
+//! colored widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
 //! Settings that would be named are then [run on](horizon), untimed and on all cores, for as long as the scene
 //! deserves.
 
@@ -81,11 +81,11 @@ pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
 /// What a study tries.
 #[derive(Clone, Debug)]
 pub struct StudyPlan {
-    /// Names of the catalogue, with sizes, or `.json` files.
+    /// Names of the catalog, with sizes, or `.json` files.
     pub scenes: Vec<String>,
     /// Rows of [`VARIANTS`].
     pub solvers: Vec<&'static Variant>,
-    /// Lane widths of coloured runs.
+    /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,
     /// Constraint orders; natural order has one lane.
     pub orders: Vec<Order>,
@@ -222,7 +222,7 @@ pub fn is_path(name: &str) -> bool {
     name.ends_with(".json") || name.contains(['/', '\\'])
 }
 
-/// A scene of the catalogue or of a file (a name with a separator, or that ends in `.json`), for
+/// A scene of the catalog or of a file (a name with a separator, or that ends in `.json`), for
 /// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
 pub fn open_scene(
     name: &str,

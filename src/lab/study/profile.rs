@@ -17,8 +17,8 @@ use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
 use super::interleave::Sample;
 
-/// For each solver the least time of its `allowed` records of one scene, in times that of the fastest
-/// solver; a time that ties with the least is 1. None where no record is allowed.
+/// For each solver the least time of its `allowed` records of one scene, relative to that of the fastest solver; a
+/// time that ties with the least is 1. None where no record is allowed.
 pub fn times_of_fastest(
     scene: &[Record],
     solvers: &[&str],

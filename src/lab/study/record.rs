@@ -46,7 +46,7 @@ pub struct Record {
     /// Times and counts; none if the run failed.
     #[serde(alias = "lap")]
     pub sample: Option<Sample>,
-    /// Times faster than one coloured lane; none without that run.
+    /// Times faster than one colored lane; none without that run.
     pub speed_up: Option<f64>,
     /// Errors, the same for all widths; none if the run failed.
     pub errors: Option<Errors>,
@@ -221,7 +221,7 @@ pub struct Failure {
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// What of it is out of bounds.
+    /// Which quantity is out of bounds.
     #[serde(default)]
     pub quantity: Quantity,
     /// What was broken.
@@ -285,7 +285,7 @@ pub(crate) mod tests {
     use crate::lab::scenes::{Scene, SceneBody, SceneShape};
     use crate::lab::study::interleave::Load;
 
-    /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
+    /// A record of `stack:2` by `pgs` in colors, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
         let sample = Sample {
             mean_ns: 1e3 * time,
@@ -333,7 +333,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Those of a box of a metre that nobody said has to rest.
+    /// Those of a box of a meter that nobody said has to rest.
     pub fn tolerances() -> Tolerances {
         let body = SceneBody::dynamic([0.0, 0.0], SceneShape::rectangle(0.5, 0.5));
         Tolerances::standard(&Scene::new("x", vec![body]))

@@ -3,7 +3,7 @@
 //! A solver is tuned on scenes that somebody thought of. Here [`families`] draw others, by seed; each runs
 //! under every solver, and a [`judge`] looks on from outside, in double precision, at poses alone: whatever
 //! moves the bodies, this crate's solvers or another engine, is an [`Engine`] to it. What fails is
-//! [minimised](minimise) into a scene file.
+//! [minimized](minimize) into a scene file.
 //!
 //! | verdict | what is forbidden |
 //! |---|---|
@@ -44,7 +44,7 @@ pub struct Case {
     pub room: Room,
     /// Whether it should be at rest in its last second.
     pub rests: bool,
-    /// Substeps in the place of the solver's own, for solvers that take several.
+    /// Substeps instead of the solver's own, for solvers that take several.
     pub substeps: Option<u32>,
 }
 
@@ -63,7 +63,7 @@ pub struct Room {
 pub trait Engine {
     /// Advances by the scene's step. Errors: what is wrong, where the engine itself says that it diverged.
     fn step(&mut self) -> Result<(), String>;
-    /// Centre of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
+    /// Center of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
     fn pose(&self, body: usize) -> [[f64; 2]; 2];
 }
 

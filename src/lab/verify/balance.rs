@@ -103,7 +103,7 @@ fn groove(lab: &Lab) -> Result<Finding, Failure> {
         SceneBody::fixed([0.5 * sin, -0.5 * cos], SceneShape::rectangle(10.0, 0.5).friction(0.0))
             .turned(angle)
     };
-    // Its centre is half a metre from both faces.
+    // Its center is half a meter from both faces.
     let (na, nb) = ([alpha.sin(), alpha.cos()], [-beta.sin(), beta.cos()]);
     let determinant = na[0] * nb[1] - na[1] * nb[0];
     let at = [0.5 * (nb[1] - na[1]) / determinant, 0.5 * (na[0] - nb[0]) / determinant];

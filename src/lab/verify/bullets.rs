@@ -24,7 +24,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// Metres per step: 300 m/s at 60 Hz.
+/// Meters per step: 300 m/s at 60 Hz.
 const WAY: f64 = 5.0;
 
 /// Deepest that the far side of what is thrown from the left gets beyond x = 0, where the target's near side is.

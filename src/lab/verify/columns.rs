@@ -115,7 +115,7 @@ fn load_error(world: &World, count: usize) -> f64 {
     let dt = f64::from(world.settings.dt);
     let mut found = vec![0.0; count];
     for c in &world.contacts {
-        // Body 0 is the ground; a contact of neighbours is named by the lower one.
+        // Body 0 is the ground; a contact of neighbors is named by the lower one.
         if let Some(load) = found.get_mut(c.body_a.min(c.body_b) as usize) {
             *load += normal_impulse(c) / dt;
         }

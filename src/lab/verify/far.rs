@@ -33,7 +33,7 @@ fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
     lab.catalog(&format!("far_stack:{exponent}"), 10.0 * ROUNDING)
 }
 
-/// B15. At a kilometre, where the spacing of `f32`s is 6.1e-5 m.
+/// B15. At a kilometer, where the spacing of `f32`s is 6.1e-5 m.
 fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
     twins(lab, 3)
 }

@@ -88,7 +88,7 @@ fn rest(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// A27. A body turns about a corner A with ω until its next corner B meets the ground, which is rough: about B its angular momentum
-/// stays, and A is free to leave. With both at d left and right of below the centre and the centre h above the ground, it is
+/// stays, and A is free to leave. With both at d left and right of below the center and the center h above the ground, it is
 /// I ω + m (h² − d²) ω before and (I + m (h² + d²)) ω' after: 11/17 of the spin for a hexagon, 1 − 3/2 sin² α for a box.
 fn edges(lab: &Lab) -> Result<Finding, Failure> {
     let hexagon: Vec<[f64; 2]> =
@@ -145,7 +145,7 @@ fn energy(lab: &Lab) -> Result<Finding, Failure> {
 fn rod(lab: &Lab) -> Result<Finding, Failure> {
     let (half, thin, mu) = (1.0f64, 0.02f64, 1.0);
     let inertia = (half * half + thin * thin) / 3.0;
-    // Its lowest corner, about the centre.
+    // Its lowest corner, about the center.
     let diagonal = 0.5f64.sqrt();
     let [x, y] = [diagonal * (thin - half), -diagonal * (half + thin)];
     // n = (0, 1) and t = (1, 0): of an impulse (N, T) the corner gains k (N, T).

@@ -243,7 +243,7 @@ fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(gain, 0.0, 1e-5))
 }
 
-/// A body of 1 kg that touches the ground with one point, `arm` from its centre (m), and comes in at
+/// A body of 1 kg that touches the ground with one point, `arm` from its center (m), and comes in at
 /// `velocity` (m/s).
 struct Rough {
     shape: SceneShape,
@@ -376,7 +376,7 @@ fn disc() -> Rough {
     }
 }
 
-/// A19. A unit square on a corner, 20° to the left of below its centre.
+/// A19. A unit square on a corner, 20° to the left of below its center.
 fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
     rough_impact(lab, corner)
 }

@@ -59,7 +59,7 @@ fn deck(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(off), 0.0, 1e-4))
 }
 
-/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their centre of mass over its edge.
+/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their center of mass over its edge.
 fn bricks(lab: &Lab) -> Result<Finding, Failure> {
     let (count, half, high) = (8, 1.0, 0.25);
     let found = bisect(0.9, 1.1, |part| {
@@ -97,7 +97,7 @@ fn logs(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 1.0, 0.01).note(format!("{below:.5} under, {beside:.5} between")))
 }
 
-/// B24. Discs of radius r in a shaft of width w touch with their line of centres at sin β = (w − 2 r)/2 r from the vertical: the
+/// B24. Discs of radius r in a shaft of width w touch with their line of centers at sin β = (w − 2 r)/2 r from the vertical: the
 /// floor bears 2 m g, each wall m g tan β, and they bear m g/cos β from each other.
 fn shaft(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, width) = (0.5, 1.6);

@@ -59,7 +59,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B3. A disc a quarter of a metre deep in the ground: the worst difference from the soft contact's own
+/// B3. A disc a quarter of a meter deep in the ground: the worst difference from the soft contact's own
 /// recovery over half a second, which a substep advances by d' = d − h min(γ β d, v_max) + γ_i g h²
 /// with ω = 2π 60 Hz, ζ = 10. Positions are read at 0.25 to 0.5 m, where `f32`s are 2⁻²⁵ m apart: 30
 /// steps may be half of that off each.
@@ -148,7 +148,7 @@ fn share(depths: impl Iterator<Item = f64>) -> f64 {
     if sum > 0.0 { most / (sum / count) } else { f64::INFINITY }
 }
 
-/// B19. Kinetic energy is bounded: if each of the 12 contacts between the centre and a wall opens at
+/// B19. Kinetic energy is bounded: if each of the 12 contacts between the center and a wall opens at
 /// the cap of 3 m/s, speeds grow from 0 to 36 m/s along x and y, √(2/3) of that in the mean.
 fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
     let bound = (2.0f64 / 3.0).sqrt() * 12.0 * f64::from(MAX_PUSH_SPEED);

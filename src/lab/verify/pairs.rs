@@ -292,12 +292,12 @@ fn near_miss(lab: &Lab) -> Result<Finding, Failure> {
 fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     let (m, big, alpha) = (1.0, 2.0, 30f64.to_radians());
     let (sin, cos) = alpha.sin_cos();
-    // Falls to the right, from 4 m high at the left; its centre of mass is at a third of base and height.
+    // Falls to the right, from 4 m high at the left; its center of mass is at a third of base and height.
     let (base, high) = (4.0 * cos / sin, 4.0);
     let triangle = SceneShape::polygon(vec![[0.0, 0.0], [base, 0.0], [0.0, high]]);
     let density = big / (0.5 * base * high);
     let wedge = SceneBody::dynamic([0.0, 0.0], triangle.density(density).friction(0.0));
-    // Flush, half a metre from the top.
+    // Flush, half a meter from the top.
     let at = [0.5 * cos + 0.25 * sin, high - 0.5 * sin + 0.25 * cos];
     let block = SceneShape::rectangle(0.25, 0.25).density(m / 0.25).friction(0.0);
     let bodies = vec![ground(60.0, 0.0), wedge, SceneBody::dynamic(at, block).turned(-alpha)];

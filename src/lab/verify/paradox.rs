@@ -87,7 +87,7 @@ const CARD: [f64; 2] = [2.0, 0.02];
 
 /// B10. The same by simulation, P = 0: the friction below which the tops drop by 5 cm in three seconds.
 /// A card of half length l and half thickness t stands on the inner corner of its foot and leans with
-/// the outer one of its top, so its centre is t cos φ nearer to the line through the top: µ = tan φ/2 −
+/// the outer one of its top, so its center is t cos φ nearer to the line through the top: µ = tan φ/2 −
 /// t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and the threshold
 /// by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
 fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {

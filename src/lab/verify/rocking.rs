@@ -35,7 +35,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A26.rollers",
-        "period of a plank on two rollers that turn towards each other",
+        "period of a plank on two rollers that turn toward each other",
         "s",
         "1 %, as for A1.slip",
         rollers,
@@ -51,12 +51,12 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A26.turntable",
-        "slip in 10 s of a box in a rotating frame, held by a wall",
+        "slip in 10 s of a box on the inside of a rotating frame",
         "m",
         "A1.stick: 1e-4 m",
         turntable,
         No(
-            "within a step bodies move along tangents; the wall pushes them back along its normal only",
+            "within a step bodies move along tangents, and the wall pushes back along its normal only",
         ),
     ),
 ];
@@ -96,7 +96,7 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     growth(lab, Scene::new("plank", vec![support, plank]), period)
 }
 
-/// A26. A light disc of radius R with a dense core of radius r, d below its centre; its centre of mass is e below it.
+/// A26. A light disc of radius R with a dense core of radius r, d below its center; its center of mass is e below it.
 /// T = 2π √((I + m (R − e)²)/(m g e)).
 fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, core, below, dense, start) = (0.5, 0.1, 0.3, 100.0, 0.1);
@@ -135,7 +135,7 @@ fn block(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(after / before, truth, 0.01 * truth))
 }
 
-/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its centre:
+/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its center:
 /// N₁ − N₂ = −m g x/(d − µ b), so that T = 2π √((d − µ b)/(µ g)).
 fn rollers(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, d, b, radius, start) = (0.3, 1.0, 0.01, 0.25, 0.2);

@@ -24,7 +24,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "B24.tree",
-        "displacement in 20 s of five storeys, each a plank on a post with a weight at each end",
+        "displacement in 20 s of five stories, each a plank on a post with a weight at each end",
         "m",
         "the slop",
         tree,

@@ -190,7 +190,7 @@ fn worst(found: &Finding) -> f64 {
 }
 
 /// A1. A box of 2 kg and side 1 that slides on the flat with µ = 0.3 leans forward: moments about its
-/// centre give N = m g/2 (1 ± µ H/w), 13 N in front.
+/// center give N = m g/2 (1 ± µ H/w), 13 N in front.
 fn split(lab: &Lab) -> Result<Finding, Failure> {
     let (mass, friction) = (2.0, 0.3);
     let shape = SceneShape::rectangle(0.5, 0.5).density(mass).friction(friction);

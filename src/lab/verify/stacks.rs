@@ -126,7 +126,7 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, load_tolerance(1.0, world.settings.dt.into()) / G))
 }
 
-/// Upward impulse on a body in the last step (N·s) and its moment about the body's centre (N·m·s).
+/// Upward impulse on a body in the last step (N·s) and its moment about the body's center (N·m·s).
 fn bearing(world: &World, body: u32) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for c in world.contacts.iter().filter(|c| c.body_a == body || c.body_b == body) {
@@ -172,7 +172,7 @@ fn release_gap(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// B21. Boxes on an incline of 0.05 rad with µ = 1.1 tan 0.05, for ten minutes: speed of the fastest
-/// from 5 min on. (At 0.25 rad ten would topple: their centre is 5 m up and the base ± ½ m wide, so tan
+/// from 5 min on. (At 0.25 rad ten would topple: their center is 5 m up and the base ± ½ m wide, so tan
 /// θ < 1/10.)
 fn creep(lab: &Lab, count: u32) -> Result<Finding, Failure> {
     let angle: f64 = 0.05;
@@ -221,7 +221,7 @@ mod tests {
         let manifold = Manifold { normal: Vec2::Y, count: 2, points: [at(-1.0), at(2.0)] };
         let step_impulse = [[3.0, 1.0], [1.0, 0.0]];
         world.contacts = vec![Contact { body_a: 0, body_b: 1, manifold, step_impulse, ..Default::default() }];
-        // Normals −1·3 + 2·1; the friction 1 along (1, 0) half a metre below: +0.5.
+        // Normals −1·3 + 2·1; the friction 1 along (1, 0) half a meter below: +0.5.
         assert_eq!(bearing(&world, 1), [4.0, -0.5]);
         assert_eq!(bearing(&world, 0)[0], -4.0);
     }

@@ -94,8 +94,8 @@ fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3 * SPEED))
 }
 
-/// A20. The kerb stops the box at its upper edge, a below the box's centre, and the ground its front edge, b before it: both
-/// impulses go through the kerb's edge, about which angular momentum stays.
+/// A20. The curb stops the box at its upper edge, a below the box's center, and the ground its front edge, b before it: both
+/// impulses go through the curb's edge, about which angular momentum stays.
 fn kerb(lab: &Lab) -> Result<Finding, Failure> {
     let (b, half, height) = (0.5, 1.0, 0.3);
     let (a, squared) = (half - height, (b * b + half * half) / 3.0);

@@ -111,7 +111,7 @@ impl ImpactLaw {
 /// Side records of what bounces.
 #[derive(Clone, Debug, Default)]
 pub struct ImpactRecords {
-    /// Of the coloured batches, and of the serial ones.
+    /// Of the colored batches, and of the serial ones.
     pub bounces: [Bounces; 2],
     /// Impacts before the step.
     pub(crate) spread: spread::Spread,

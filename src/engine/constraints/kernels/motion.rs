@@ -34,7 +34,7 @@ pub enum RotationUpdate {
     /// By h ω.
     #[default]
     Exact,
-    /// By atan(h ω): what q ← normalise(q + h ω q⊥) does, as many engines have it.
+    /// By atan(h ω): what q ← normalize(q + h ω q⊥) does, as many engines have it.
     Normalized,
 }
 
@@ -209,7 +209,7 @@ impl Motion {
     /// Takes the turns of round bodies out of their rows, until [`Self::finish`].
     pub(crate) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
         // A contact's anchor turns with its body, as a corner does. The contact point of a disc
-        // does not: it stays on the line of centres however the disc rolls. So sweeps are
+        // does not: it stays on the line of centers however the disc rolls. So sweeps are
         // not shown the turn of a round body; it is kept here for its pose. Without this a disc
         // that rolls at 7 rad/s and 60 Hz seems to lift off by 3 mm in the course of a step.
         for (body, turned) in &mut self.round {

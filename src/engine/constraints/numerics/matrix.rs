@@ -123,7 +123,7 @@ pub struct Lu {
 }
 
 impl Lu {
-    /// Factorises a square matrix; none if a column leaves no pivot that is finite and not zero.
+    /// Factorizes a square matrix; none if a column leaves no pivot that is finite and not zero.
     pub fn new(matrix: Matrix) -> Option<Self> {
         let n = matrix.columns;
         let mut factors = matrix.clone();
@@ -159,7 +159,7 @@ impl Lu {
         solution
     }
 
-    /// L Y = P R downwards, then U X = Y upwards.
+    /// L Y = P R downward, then U X = Y upward.
     fn solve_strips(&self, right: &[Strip]) -> Vec<Strip> {
         let mut x: Vec<Strip> = self.order.iter().map(|&i| right[i]).collect();
         for i in 1..x.len() {

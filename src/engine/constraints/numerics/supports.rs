@@ -31,9 +31,9 @@ pub(crate) struct Support {
     pub contact: u32,
     /// Which of its points it is.
     pub point: usize,
-    /// Unit normal towards the body.
+    /// Unit normal toward the body.
     pub normal: DVec2,
-    /// From the body's centre of mass (m).
+    /// From the body's center of mass (m).
     pub arm: DVec2,
     /// Coulomb coefficient (1).
     pub friction: f64,

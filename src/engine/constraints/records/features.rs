@@ -5,7 +5,7 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Features {
     /// Some contact can turn a body. Not so when every dynamic body is a disc about
-    /// its own centre, nothing spins at the start and there is no friction.
+    /// its own center, nothing spins at the start and there is no friction.
     pub rotation: bool,
     /// Some pair of surfaces has a friction coefficient above zero.
     pub friction: bool,

@@ -1,7 +1,7 @@
 //! Numbers that a solver keeps from step to step, per contact, per contact point and per body.
 //!
 //! Multipliers, penalties, rest lengths: what they mean is the solver's affair. A contact point
-//! is recognised by its shape pair and its feature id, as its impulses are; a new one starts with
+//! is recognized by its shape pair and its feature id, as its impulses are; a new one starts with
 //! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
 
 use crate::engine::contacts::Contact;

@@ -1,4 +1,4 @@
-//! Block descent: bodies go, one colour after the other, where their inertia and the penalties of their contacts
+//! Block descent: bodies go, one color after the other, where their inertia and the penalties of their contacts
 //! are in balance. The method is told in `solvers/avbd.rs`.
 //!
 //! # A contact as seen from a body
@@ -91,7 +91,7 @@ impl Descent {
         self.lanes.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
-    /// Gives bodies their lanes, by colours or one by one in the `sequence` of contacts.
+    /// Gives bodies their lanes, by colors or one by one in the `sequence` of contacts.
     pub(crate) fn assign(
         &mut self,
         rows: &[BodyRow],

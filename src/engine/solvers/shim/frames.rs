@@ -7,7 +7,7 @@
 //! n(t) = d(t)/|d(t)|,    d(t) = d + u t
 //! ```
 //!
-//! with d from the centre (or the corner) of one shape to the centre of the other, and u the velocity between these. A
+//! with d from the center (or the corner) of one shape to the center of the other, and u the velocity between these. A
 //! force that keeps the direction of the step's beginning lags behind this one by
 //!
 //! ```text
@@ -23,11 +23,11 @@
 //!
 //! # Arms
 //!
-//! In the directions n and t of the beginning, an arm r is (r·n, r·t) = (−r × t, r × n). The centre of a shape, c = r ± ρ n with
-//! ρ its distance from the contact point, turns by τ ω, and the normal by φ towards t,
+//! In the directions n and t of the beginning, an arm r is (r·n, r·t) = (−r × t, r × n). The center of a shape, c = r ± ρ n with
+//! ρ its distance from the contact point, turns by τ ω, and the normal by φ toward t,
 //!
 //! ```text
-//! φ = τ (t·u)/|d|   between two centres,   φ = −τ ω   on a face of a body with the spin ω
+//! φ = τ (t·u)/|d|   between two centers,   φ = −τ ω   on a face of a body with the spin ω
 //! ```
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.

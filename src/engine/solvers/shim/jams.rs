@@ -3,7 +3,7 @@
 //! Where two bodies overlap at several of their shapes, from opposite sides, no motion parts them: a body of two shapes
 //! that was thrown half through a line, or a disc between two jaws of one body. What one contact pushes the other pushes
 //! back, and no load and no law says how much: impulses that cancel may be any. Springs as stiff as the step allows
-//! press, as overlaps of centimetres never become less, until they hold thousands of times the weight. As soon as a normal
+//! press, as overlaps of centimeters never become less, until they hold thousands of times the weight. As soon as a normal
 //! turns by φ, as at the end of the line, sin φ of that is left in the next warm start, and shoots the
 //! bodies apart.
 //!

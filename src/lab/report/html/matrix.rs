@@ -108,8 +108,7 @@ pub fn matrix(matrix: &Matrix) -> String {
         }
         text += "</tr>\n";
     }
-    text + "</tbody></table>\n<p class=\"soft\">A cell is the distance to the reference value in tolerances: up to 1 passes, \
-            ✗ fails. * is required of the default solver.</p>\n"
+    text + "</tbody></table>\n<p class=\"soft\">A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.</p>\n"
 }
 
 /// Two digits.

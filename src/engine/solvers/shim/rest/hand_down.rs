@@ -1,7 +1,7 @@
 //! Loads that go down from body to body.
 //!
 //! Sweeps spread a change of loads by a contact each, and a moment along a column of N bodies takes N⁴ of them. From the top of the
-//! contact graph downwards it takes one pass: each body stands on its closed points with the bodies below it, whose loads are found
+//! contact graph downward it takes one pass: each body stands on its closed points with the bodies below it, whose loads are found
 //! such that nothing is left that accelerates it ([`supports`]), and what these loads change acts on the bodies below. Bodies
 //! that are not accelerated are left as they are, so that a pile at rest costs one comparison a body.
 //!
@@ -34,7 +34,7 @@ pub(in super::super) struct HandDown {
     bearing: Vec<u32>,
     /// Of all contacts; empty if `upright` has all bodies that have some.
     all: Graph,
-    /// Bodies from the top downwards, and the part of their free acceleration that is left alone; infinite for what leans, on a body
+    /// Bodies from the top downward, and the part of their free acceleration that is left alone; infinite for what leans, on a body
     /// of its own level or on several in different directions: only sweeps find its thrust.
     downwards: Vec<(u32, f32)>,
     /// Of one body.
