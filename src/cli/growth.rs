@@ -199,10 +199,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         let bytes = |e: &Entry| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
         let expected = entries.last().map_or(0.0, bytes) * target;
         if free_memory().is_some_and(|free| expected > MEMORY_SHARE * free) {
-            notes += &format!(
-                "skipped: {target} contacts would take about {:.0} MB of memory\n",
-                1e-6 * expected
-            );
+            notes +=
+                &format!("skipped: {target} contacts would take about {:.0} MB of memory\n", 1e-6 * expected);
             continue;
         }
         let what = format!("settling {}: {} bodies, {} steps", scene.name, scene.bodies.len(), args.settle);

@@ -60,7 +60,10 @@ impl<'a> Row<'a> {
         let range = expected.split(" to ").map(|bound| bound.trim().parse::<f64>());
         let expected = range.collect::<Result<Vec<_>, _>>().ok().and_then(|range| range.try_into().ok());
         let expected = expected.ok_or_else(|| {
-            Error::invalid(format!("line {}", line + 1), format!("'{}' is not a range 'low to high'", cells[3]))
+            Error::invalid(
+                format!("line {}", line + 1),
+                format!("'{}' is not a range 'low to high'", cells[3]),
+            )
         })?;
         Ok(Some(Row { line, command, figure, expected, cells }))
     }

@@ -85,7 +85,7 @@ impl Timings {
     }
 }
 
-/// What the passes of one phase request, where that is counted.
+/// Memory requests of the passes of one phase, if counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Requested {
     /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
@@ -95,8 +95,7 @@ pub struct Requested {
     pub bytes: [f64; 2],
 }
 
-/// Which phases of a step run: all of them, or one alone, again and again, on the records of a
-/// step that was prepared before.
+/// Which phases of a step run: all, or one alone on the records of an earlier step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PhaseFilter {
     /// The only phase that runs; none: all do.
@@ -172,7 +171,7 @@ impl Clock {
         self.laps
     }
 
-    /// Books the time since the last lap on `phase`.
+    /// Adds the time since the last lap to `phase`.
     #[inline]
     pub fn lap(&mut self, phase: Phase) {
         if let Some((_, last)) = &mut self.start {
@@ -202,8 +201,8 @@ impl Clock {
     }
 }
 
-/// Time that this thread was ready to run and did not, since it began. None where the system does
-/// not say; what a hypervisor takes is not in it.
+/// Time that this thread was ready but not running, since it started. None where the system does not report it; time
+/// taken by a hypervisor is not included.
 pub fn waited() -> Option<Duration> {
     parse_wait(&std::fs::read_to_string("/proc/thread-self/schedstat").ok()?)
 }

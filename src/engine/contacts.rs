@@ -61,16 +61,16 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner, infinite on a
-    /// face; both 0 where nothing is round. Only found for solvers that ask for them.
+    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner,
+    /// infinite on a face; both 0 where nothing is round. Only computed for solvers that request them.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub radii: [f32; 2],
-    /// Fills the second cache line.
+    /// Padding to two cache lines.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub unused: f32,
 }
 
-/// Quads of a [`Contact`], and which of them holds what.
+/// Layout of a [`Contact`] in quads.
 pub mod quad {
     /// Quads per contact.
     pub const STRIDE: usize = size_of::<super::Contact>() / 16;

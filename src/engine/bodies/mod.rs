@@ -16,16 +16,16 @@ pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
 pub enum BodyKind {
     /// Never moves.
     Static,
-    /// Moves with its given velocity, whatever it meets.
+    /// Keeps its given velocity in every collision.
     Kinematic,
     /// Moved by forces and contacts.
     Dynamic,
 }
 
-/// The name of a body of a [`World`](crate::engine::world::World).
+/// Identifies a body of a [`World`](crate::engine::world::World).
 ///
-/// It stays valid while the body exists, whatever else is added or removed. After the body is removed its index may go to
-/// a new one; the generation tells the two apart, so that an old handle is an error and never another body.
+/// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed body may
+/// be reused; the generation distinguishes the two, so an old handle gives an error and never another body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BodyHandle {
@@ -84,7 +84,7 @@ pub struct Bodies {
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub group: Vec<i32>,
-    /// Whether dynamic bodies stop it, where it is fast.
+    /// Whether dynamic bodies stop it under continuous collision.
     pub bullet: Vec<bool>,
     /// Whether a body is made of discs about its center of mass: turning it moves no contact.
     pub round: Vec<bool>,
@@ -207,8 +207,8 @@ impl Bodies {
         }
     }
 
-    /// Poses of the centers of mass of bodies `a` and `b`, from a's position: the difference of
-    /// the positions includes their low parts, so that it is as good far out as at the origin.
+    /// Poses of the centers of mass of bodies `a` and `b`, from a's position: the difference of the positions
+    /// includes their low parts, so the result is as accurate far from the origin as near it.
     #[inline]
     pub fn relative_poses(&self, a: usize, b: usize) -> [Pose; 2] {
         let x = (self.position_x[b] - self.position_x[a]) + (self.position_x_lo[b] - self.position_x_lo[a]);
@@ -222,9 +222,9 @@ impl Bodies {
 
     /// Moves body `i` by `delta` (m).
     ///
-    /// A position of f32 alone stands still once a step's motion is below half its last
-    /// digit: 30 nm at 1 m, 4 mm at 100 km. So what the sum rounds away is kept in the low part,
-    /// by Knuth's two-sum, which is exact whatever the two magnitudes are.
+    /// A position of f32 alone stands still once a step's motion is below half its last digit: 30 nm at 1 m, 4 mm at
+    /// 100 km. So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is exact for any
+    /// magnitudes.
     #[inline]
     pub fn advance(&mut self, i: usize, delta: Vec2) {
         let add = |sum: &mut f32, lo: &mut f32, delta: f32| {
@@ -243,7 +243,7 @@ impl Bodies {
         Vec2::new(self.velocity_x[i], self.velocity_y[i])
     }
 
-    /// Center of mass of body `i` (m), with all the digits there are.
+    /// Center of mass of body `i` (m), in full precision.
     pub fn center(&self, i: usize) -> [f64; 2] {
         [
             f64::from(self.position_x[i]) + f64::from(self.position_x_lo[i]),

@@ -1,17 +1,17 @@
-//! Augmented vertex block descent: each body in turn goes where its inertia and the penalties of its
-//! contacts are in balance; multipliers and penalties grow until contacts hold.
+//! Augmented vertex block descent: each body in turn moves to the balance of its inertia and the penalties of its
+//! contacts; multipliers and penalties grow until contacts hold.
 //!
 //! **Source.** `giles2025`, algorithm 1, with the contact rows of its two-dimensional demonstration.
 //!
 //! The demonstration's defaults (10 iterations and one of post-stabilization at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
 //! sticking within 10 mm) are the defaults here.
 //!
-//! **Departures.** Bodies go color by color; in natural order one by one, as the contacts name them. How fast a body fell
-//! is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has drifted, not its two
-//! anchors, so that along n it is where the manifold of the step has it. There is no geometric stiffness: rows are
-//! linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The cone is that of the normal
-//! force of the same iteration, not of the last one. Spins have no limit. There are rows of contacts alone: constraints of
-//! other types do nothing.
+//! **Departures.** Bodies go color by color; in natural order one by one, as the contacts name them. The acceleration
+//! of a body is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has
+//! drifted, not its two anchors, so that along n it is where the manifold of the step has it. There is no geometric
+//! stiffness: rows are linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The
+//! cone is that of the normal force of the same iteration, not of the last one. Spins have no limit. There are rows
+//! of contacts alone: constraints of other types do nothing.
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
@@ -57,7 +57,7 @@ use descent::{Bodies, Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
 pub static SOLVER: Variant = Variant {
     name: "avbd",
     source: "giles2025",
-    summary: "descent body by body on penalties that grow, with multipliers",
+    summary: "descent body by body on growing penalties, with multipliers",
     budget: Budget { substeps: 1, velocity_iterations: 10, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[
@@ -66,7 +66,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.99,
             range: [0.0, 1.0],
-            meaning: "share of old error that is left alone in a step, where no position iterations take it out",
+            meaning: "share of the old error that a step leaves alone, if no position iterations remove it",
             trials: &[],
         },
         Parameter {

@@ -1,5 +1,5 @@
-//! Newton's method on the contact law itself: the impulses of a step are solved for, not approached.
-//! For scenes of some dozens of contact points.
+//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of iterated. For
+//! scenes of a few dozen contact points.
 //!
 //! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search,
 //! proximal outer loop); with `lemke` set, `cottle1992` (Lemke's method on the law as a linear complementarity
@@ -51,7 +51,7 @@ use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 pub static SOLVER: Variant = Variant {
     name: "direct",
     source: "alart1991",
-    summary: "Newton's or Lemke's method on the contact law, for small scenes; else sweeps",
+    summary: "Newton's or Lemke's method on the contact law in small scenes; sweeps otherwise",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,
@@ -76,7 +76,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.0,
             range: [0.0, 1.0],
-            meaning: "1: Lemke's method in place of Newton's",
+            meaning: "1: Lemke's method instead of Newton's",
             trials: &[],
         },
     ],

@@ -14,8 +14,7 @@
 //! soft sweeps and `relax_iterations` rigid ones, each of which gathers bodies twice as
 //! [`super::jacobi`] does. Sweeps of a step request 4389 B per contact.
 //!
-//! **Fails when** sweeps are few: it converges always and slowly, as each contact sees the n-th part
-//! of a mass.
+//! **Fails when** sweeps are few: it always converges, but slowly, since each contact sees the n-th part of a mass.
 //!
 //! # Why it converges
 //!

@@ -1,5 +1,5 @@
-//! What rapier does by default: soft contacts in substeps, the two normal rows of a contact solved
-//! together, and stabilizing sweeps with friction.
+//! The default method of rapier: soft contacts in substeps, the two normal rows of a contact solved together, and
+//! stabilizing sweeps with friction.
 //!
 //! **Source.** `crozet2025rapier` (2D, version 0.35); the pair of rows is that of
 //! [`super::pgs_ngs_block`] with soft rows on its diagonal. Normal rows come before friction rows: with the other order

@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
             unit: "m/N",
             default: 0.0,
             range: [0.0, 1.0],
-            meaning: "how far a contact point gives way to a force; 0 is rigid",
+            meaning: "displacement of a contact point per force; 0 is rigid",
             trials: &[],
         },
     ],

@@ -1,4 +1,4 @@
-//! Bodies come, go and are moved by the caller.
+//! Adding, removing and moving bodies.
 
 use super::{Surface, World};
 use crate::engine::bodies::def::{finite, finite_pair};
@@ -23,7 +23,7 @@ pub(super) struct Slots {
     pub shapes: Vec<u32>,
     /// Bodies whose places may be taken.
     pub free: Vec<u32>,
-    /// Bodies that were removed since the last step: what solvers remember of them goes in the next.
+    /// Bodies removed since the last step; solvers forget them in the next.
     pub removed: Vec<u32>,
 }
 
@@ -125,8 +125,8 @@ impl World {
 
     /// Removes a body and its contacts. Other handles stay valid, and so do indices of other bodies.
     ///
-    /// Until another body takes its place, the index stands for a static body that nothing touches. `contacts` remain those
-    /// of the last step until the next. Errors: the body was removed before; a constraint of another type is on it.
+    /// Until its index is reused, it names a static body that nothing touches. `contacts` remain those of the last
+    /// step until the next. Errors: the body was removed before; a constraint of another type is on it.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -188,7 +188,7 @@ impl World {
         (0..self.bodies.len()).filter_map(|i| self.handle(i))
     }
 
-    /// Puts a body elsewhere: the origin of its frame to `position` (m), turned to `angle` (rad). It keeps its velocity.
+    /// Moves a body: the origin of its frame to `position` (m), its angle to `angle` (rad). The velocity stays.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -228,9 +228,9 @@ impl World {
         Ok(())
     }
 
-    /// Applies a force (N) at the center of mass over the next step, in addition to the standing
-    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic bodies are
-    /// moved by it.
+    /// Applies a force (N) at the center of mass during the next step only, in addition to the persistent
+    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic
+    /// bodies are moved by it.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -250,12 +250,12 @@ impl World {
         self.apply(body, force.into(), 0.0)
     }
 
-    /// Applies a torque (N·m) over the next step. Errors: as [`World::apply_force`].
+    /// Applies a torque (N·m) during the next step only. Errors: as [`World::apply_force`].
     pub fn apply_torque(&mut self, body: BodyHandle, torque: f32) -> Result<(), Error> {
         self.apply(body, Vec2::ZERO, torque)
     }
 
-    /// Changes the velocity of a dynamic body at once by an impulse (N·s) at a point of the world (m).
+    /// Changes the velocity of a dynamic body immediately, by an impulse (N·s) at a world point (m).
     ///
     /// Errors: the body was removed; a value that is not finite.
     pub fn apply_impulse(
@@ -293,7 +293,7 @@ impl World {
         Ok(())
     }
 
-    /// Scenes in which nothing turns have no rotation in their kernels.
+    /// Kernels of scenes without rotation omit it.
     fn may_spin(&mut self, spin: f32) {
         if spin != 0.0 {
             self.traits.spins();

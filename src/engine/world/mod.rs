@@ -61,7 +61,7 @@ struct Surface {
 
 /// Bodies, shapes, contacts and the settings that move them.
 ///
-/// A clone goes on with the same bits; a watch on iterations is not copied.
+/// A clone continues with the same bits; a watch on iterations is not copied.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -96,7 +96,7 @@ pub struct World {
     pub shape_body: Vec<u32>,
     /// Contacts of the last step with at least one point, sorted by shape pair.
     pub contacts: Vec<Contact>,
-    /// What the run chose.
+    /// Settings of the run.
     pub settings: Settings,
     /// Times of the last step.
     pub timings: Timings,
@@ -178,7 +178,7 @@ impl World {
         }
     }
 
-    /// What the scene needs of its constraints.
+    /// Features that the scene's constraints need.
     pub fn features(&self) -> Features {
         self.features
     }
@@ -198,7 +198,7 @@ impl World {
         self.check()
     }
 
-    /// Velocities and motions of the rows to the bodies.
+    /// Writes velocities and displacements of the rows back to the bodies.
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
@@ -216,8 +216,8 @@ impl World {
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
     }
 
-    /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that
-    /// one phase can be measured again and again on the same state. Impulses are kept.
+    /// Runs every phase of a step, pairs included, without moving the bodies, so that phases can be measured
+    /// repeatedly on one state. Impulses are kept.
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
@@ -225,8 +225,8 @@ impl World {
         self.timings = clock.stop();
     }
 
-    /// Finds the contacts of the coming step, with the impulses that it would start from, and
-    /// solves nothing. The step finds the same contacts again.
+    /// Finds the contacts of the next step, with its warm-start impulses, without solving. The step then finds the
+    /// same contacts.
     pub fn find_contacts(&mut self) {
         self.update_pairs();
         self.update_contacts();
@@ -243,7 +243,7 @@ impl World {
         &mut self.work
     }
 
-    /// Everything of a step up to the new velocities and motions in the rows.
+    /// A step up to the new velocities and displacements in the rows.
     fn solve(&mut self, clock: &mut Clock) {
         self.update_pairs();
         clock.lap(Phase::Pairs);
@@ -260,7 +260,7 @@ impl World {
         (self.counts.sweeps, self.counts.row_updates) = (count.sweeps, count.row_updates);
     }
 
-    /// Body rows and what moves them, from the bodies.
+    /// Fills the body rows and their forces from the bodies.
     fn load_rows(&mut self) {
         let (features, s) = (self.kernel_features(), &self.settings);
         let motion = MotionInput {
@@ -295,8 +295,8 @@ impl World {
         LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
     }
 
-    /// The scene's needs and the extra ones, completed to a set that has a kernel:
-    /// friction and second points act through rotation.
+    /// Features of the scene and the extra ones, completed to a set that has a kernel: friction and second points
+    /// require rotation.
     fn kernel_features(&self) -> Features {
         let mut features = self.features.union(self.settings.extra_features);
         features.rotation |= features.friction || features.two_points;
@@ -304,7 +304,7 @@ impl World {
         features
     }
 
-    /// Reports the first body that is out of all bounds.
+    /// Returns the first body that diverged.
     fn check(&self) -> Result<(), Divergence> {
         let b = &self.bodies;
         // Cut to one length and without branches, so that the compiler does it in lanes.

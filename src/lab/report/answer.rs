@@ -336,10 +336,7 @@ fn fallen(records: &[Record]) -> String {
     let found = fails_later(records);
     let lines = found.iter().take(MOST_NOTES).map(|(r, why)| {
         let time = digits(r.cost_ns() / 1e3);
-        format!(
-            "  ! {}: {}, {} ({time} µs) passes its run, then {why}\n",
-            r.scene, r.solver, r.budget_text
-        )
+        format!("  ! {}: {}, {} ({time} µs) passes its run, then {why}\n", r.scene, r.solver, r.budget_text)
     });
     let mut text: String = lines.collect();
     if found.len() > MOST_NOTES {
@@ -425,7 +422,9 @@ fn left_out(records: &[Record]) -> String {
 fn differing(records: &[Record]) -> String {
     match records.iter().filter(|r| r.bits_equal == Some(false)).count() {
         0 => String::new(),
-        count => format!("\n{count} settings did NOT reproduce the state of their error run: see tables.txt\n"),
+        count => {
+            format!("\n{count} settings did NOT reproduce the state of their error run: see tables.txt\n")
+        }
     }
 }
 

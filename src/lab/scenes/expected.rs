@@ -90,7 +90,8 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
         unchecked.push("a reference value: the file has none".to_string());
     }
     if demands.is_empty() && expect.catalogue.is_none() {
-        unchecked.push("whether it stands, rests or stays inside: the file has no such condition".to_string());
+        unchecked
+            .push("whether it stands, rests or stays inside: the file has no such condition".to_string());
     }
     tolerances.rest = expect.rests.then(|| Tolerances::resting(&scene));
     Ok(Loaded { scene, truth, demands, tolerances, unchecked })

@@ -130,10 +130,7 @@ impl Tolerances {
     pub fn standard(scene: &Scene) -> Self {
         Tolerances {
             penetration: Tolerance::new(SEEN * size(scene), "1 % of a body starts to be visible"),
-            residual: Tolerance::new(
-                0.1,
-                "10 % of the lighter body's weight: loads correct to one digit",
-            ),
+            residual: Tolerance::new(0.1, "10 % of the lighter body's weight: loads correct to one digit"),
             truth: None,
             rest: None,
         }
@@ -145,7 +142,8 @@ impl Tolerances {
     /// of 1 is some hundredths of it. How deep bodies fly into each other before they are a contact is no
     /// solver's error, and not in the penetration.
     pub fn impacts(scene: &Scene) -> Self {
-        let reason = "one body weight: impacts reach dozens of weights, so this is a few percent of an impact";
+        let reason =
+            "one body weight: impacts reach dozens of weights, so this is a few percent of an impact";
         Tolerances { residual: Tolerance::new(1.0, reason), ..Self::standard(scene) }
     }
 

@@ -31,9 +31,7 @@ pub(super) static CASES: &[Case] = &[
         "N",
         "1 %",
         train,
-        Yes(
-            "an accelerating wall is an impact in every step, which spreads along the row before the step",
-        ),
+        Yes("an accelerating wall is an impact in every step, which spreads along the row before the step"),
     ),
     Case::new(
         "A23.shake",

@@ -49,7 +49,9 @@ pub(super) static CASES: &[Case] = &[
         "N",
         "momentum per step at the speed limit of B5.jitter",
         box_loads,
-        Yes("below the buckling height of 14 boxes (Greenhill); cos²(π/20) per sweep leaves no error after 20 s"),
+        Yes(
+            "below the buckling height of 14 boxes (Greenhill); cos²(π/20) per sweep leaves no error after 20 s",
+        ),
     ),
     Case::new(
         "B5.drift",

@@ -76,7 +76,8 @@ impl Lab {
     /// its truth's observer sees.
     pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Result<Finding, Failure> {
         let loaded = scenes::load(name)?;
-        let mut truth = loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no reference value")))?;
+        let mut truth =
+            loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no reference value")))?;
         let seconds = f64::from(loaded.scene.steps) * loaded.scene.dt;
         self.run(loaded.scene, seconds, |world| truth.observer.observe(world))?;
         let error = truth.observer.error().ok_or_else(|| Failure::Unmeasured("nothing observed".into()))?;

@@ -13,9 +13,7 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "A1.stick: 1e-4 m",
         deck,
-        Yes(
-            "impulses start from the loads of statics, which spread friction evenly over the points",
-        ),
+        Yes("impulses start from the loads of statics, which spread friction evenly over the points"),
     ),
     Case::new(
         "B24.bricks",

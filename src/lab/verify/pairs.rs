@@ -53,9 +53,7 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "1 %",
         coupling,
-        No(
-            "an impact may visit each point that it reaches 8 times on average; this row takes hundreds",
-        ),
+        No("an impact may visit each point that it reaches 8 times on average; this row takes hundreds"),
     ),
     Case::new(
         "A20.caught",

@@ -31,7 +31,9 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "1 %, as for A1.slip",
         block,
-        Yes("impacts spread from body to body; a contact that an impact releases has carried its load until then"),
+        Yes(
+            "impacts spread from body to body; a contact that an impact releases has carried its load until then",
+        ),
     ),
     Case::new(
         "A26.rollers",
@@ -55,9 +57,7 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "A1.stick: 1e-4 m",
         turntable,
-        No(
-            "within a step bodies move along tangents, and the wall pushes back along its normal only",
-        ),
+        No("within a step bodies move along tangents, and the wall pushes back along its normal only"),
     ),
 ];
 
