@@ -289,7 +289,7 @@ impl Found {
                 "weights of the lighter body × step".into(),
             ),
             reference,
-            "behaviour\n".to_string(),
+            "behavior\n".to_string(),
             line("holds", holds, when),
             line("residual speed, last second", si(e.rest_velocity, "m/s"), "rms".into()),
             line("energy change", ratio(e.energy_change), "relative; positive is a gain".into()),

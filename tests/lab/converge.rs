@@ -320,7 +320,7 @@ fn reports_say_what_was_measured() {
     let problem = disc_column(4);
     let report = run(&problem, &["pgs", "soft_step"]);
     let text = table::text(&report);
-    assert!(text.contains("unique (no friction)") && text.contains("off by up to 10 %"), "{text}");
+    assert!(text.contains("unique (no friction)") && text.contains("each changed by up to 10 %"), "{text}");
     assert!(text.contains('—') && !text.contains("Time to"), "{text}");
     let csv = table::csv(&report).unwrap();
     let points: usize = report.curves.iter().map(|c| c.points.len()).sum();
