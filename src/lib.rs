@@ -1,10 +1,10 @@
 //! A SIMD structure-of-arrays 2D rigid-body laboratory: which contact solver, how many
 //! iterations, how fast, and how wrong?
 //!
-//! **As a library:** start with [`engine`], which says how to build for your CPU, which bits are promised, and how bodies are
-//! added, moved, queried and removed. [`changelog`] lists changes.
+//! **As a library:** start with [`engine`]: how to build for your CPU, which bits are promised, and how to add, move,
+//! query and remove bodies. [`changelog`] lists changes.
 //!
-//! # Three stories
+//! # Three layers
 //!
 //! ```text
 //! cli       commands: arguments in, files and text out         (feature `cli`)
@@ -47,9 +47,8 @@
 //! # Reading order
 //!
 //! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method,
-//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, [`engine::lanes`] what it is
-//! made of. `lab::scenes` says what is simulated and what is known about it, `lab::metrics` how
-//! errors are measured.
+//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on [`engine::lanes`].
+//! `lab::scenes` has the scenes with their known values, `lab::metrics` measures errors.
 
 // Printing panics where a reader has left: what the program prints goes through `cli::output`.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

@@ -278,7 +278,7 @@ impl Found {
                 if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },
                 si(e.penetration(self.rests), "m"),
                 format!(
-                    "greatest {}; {} before a contact was found",
+                    "greatest {}; {} when first found",
                     si(e.penetration_max, "m"),
                     si(e.flight_depth_max, "m")
                 ),

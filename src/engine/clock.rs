@@ -70,6 +70,19 @@ impl Phase {
 }
 
 /// Time of each phase of the last step, and of the whole step.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::clock::Phase;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::find("pgs")?) });
+/// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
+/// world.step()?;
+/// for phase in Phase::ALL {
+///     println!("{:<12} {} ns", phase.name(), world.timings.phase_ns[phase as usize]);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timings {
     /// Nanoseconds per phase, indexed by `Phase as usize`.

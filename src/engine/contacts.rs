@@ -38,6 +38,24 @@ pub struct Manifold {
 
 /// Two shapes close enough to touch: eight quads, two cache lines.
 ///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("shim")?) };
+/// let mut world = World::new(settings);
+/// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
+/// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+/// for _ in 0..60 {
+///     world.step()?;
+/// }
+/// let contact = &world.contacts[0];
+/// let load: f32 = contact.step_impulse.iter().map(|[normal, _]| normal / world.settings.dt).sum();
+/// let deepest = contact.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
+/// // A box of 1 kg weighs 10 N.
+/// assert!((load - 10.0).abs() < 0.01 && deepest < 1e-4, "{load} N, {deepest} m");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// The narrow phase writes the first five in lanes and preparation reads them in lanes, so their
 /// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

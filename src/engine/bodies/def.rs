@@ -175,6 +175,21 @@ impl BodyDef {
     }
 
     /// A body that keeps its given velocity in every collision, at `position` (m), without shapes.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let belt = BodyDef::kinematic([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?).with_velocity([1.0, 0.0]);
+    /// world.add_body(&belt)?;
+    /// let cargo = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+    /// for _ in 0..60 {
+    ///     world.step()?;
+    /// }
+    /// // Friction has brought the box to the speed of the belt.
+    /// assert!((world.bodies.velocity_x[cargo.index()] - 1.0).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn kinematic(position: [f64; 2]) -> Self {
         BodyDef::new(BodyKind::Kinematic, position, Vec::new())
     }

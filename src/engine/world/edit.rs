@@ -258,6 +258,19 @@ impl World {
     /// Changes the velocity of a dynamic body immediately, by an impulse (N·s) at a world point (m).
     ///
     /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let plate = ShapeDef::rectangle(1.0, 0.125)?.with_density(2.0);
+    /// let plate = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(plate))?;
+    /// // 2 N·s upward at the right end of 1 kg: it rises and turns.
+    /// world.apply_impulse(plate, [0.0, 2.0], [1.0, 2.0])?;
+    /// assert_eq!(world.bodies.velocity_y[plate.index()], 2.0);
+    /// assert!(world.bodies.angular_velocity[plate.index()] > 5.0);
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
     pub fn apply_impulse(
         &mut self,
         body: BodyHandle,

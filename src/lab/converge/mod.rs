@@ -184,8 +184,30 @@ impl Schedule {
     }
 }
 
-/// Runs everything on `problem`. Errors: a problem that is not valid, is out of the range of
-/// `f32`, or has no contacts; a reference that does not hold.
+/// Runs every solver of `options` on `problem`.
+///
+/// Errors: a problem that is not valid, is out of the range of `f32`, or has no contacts; a reference that does not hold.
+///
+/// ```
+/// use simpulse::engine::solvers::find;
+/// use simpulse::lab::converge::{Options, converge};
+/// use simpulse::lab::reference::gallery;
+///
+/// let problem = gallery::disc_column(4);
+/// let options = Options {
+///     solvers: vec![find("pgs")?],
+///     max_iterations: 100,
+///     rounds: 0,
+///     baseline: false,
+///     ..Options::default()
+/// };
+/// let report = converge(&problem, None, &options)?;
+/// let curve = &report.curves[0];
+/// // Index of the first point with a residual below 1e-3.
+/// let reached = curve.rigid.first[2].ok_or("not within 100 sweeps")?;
+/// println!("{}: {} sweeps to 1e-3", curve.solver, curve.points[reached].sweeps);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn converge(
     problem: &ContactProblem,
     reference: Option<&Reference>,

@@ -18,7 +18,28 @@
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
 //!
-//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report.
+//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report. Outside the crate it is a
+//! function of a world:
+//!
+//! ```
+//! use simpulse::engine::world::{Settings, World};
+//! use simpulse::engine::{solvers, bodies::BodyKind};
+//! use simpulse::lab::scenes;
+//!
+//! /// Height of the highest body (m).
+//! fn height(world: &World) -> f64 {
+//!     let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Dynamic);
+//!     dynamic.map(|i| world.bodies.origin(i)[1]).fold(0.0, f64::max)
+//! }
+//!
+//! let mut world = scenes::load("stack:5")?.scene.build(Settings::new(solvers::find("shim")?))?;
+//! let before = height(&world);
+//! for _ in 0..60 {
+//!     world.step()?;
+//! }
+//! assert!((height(&world) - before).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod balance;
 pub mod distribution;
@@ -174,7 +195,24 @@ impl Residuals {
     }
 }
 
-/// Watches a world and sums its errors up.
+/// Observes a world step by step and accumulates its errors.
+///
+/// ```
+/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::lab::{metrics::Observation, scenes};
+///
+/// let scene = scenes::load("pyramid:4")?.scene;
+/// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("soft_step")?) };
+/// let mut world = scene.build(settings)?;
+/// let mut observation = Observation::new(&world);
+/// for _ in 0..120 {
+///     world.step()?;
+///     observation.observe(&world);
+/// }
+/// let errors = observation.errors();
+/// assert!(errors.penetration_max < 0.01 && errors.law_rms_body < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Observation {
     previous: Vec<BodyState>,

@@ -17,7 +17,24 @@ use std::path::Path;
 /// Steps of a scene that gives none: five seconds at the default step.
 pub const DEFAULT_STEPS: u32 = 300;
 
-/// Bodies, the field they move in, and for how long.
+/// A scene: bodies, gravity, step and number of steps, and what is known about them.
+///
+/// Scenes are written in code or read from JSON (`simpulse scene NAME --json` prints one):
+///
+/// ```
+/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+///
+/// let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(20.0, 1.0));
+/// let ball = SceneBody::dynamic([0.0, 2.0], SceneShape::disc(0.5).restitution(0.8)).moving([1.0, 0.0], 0.0);
+/// let scene = Scene::new("ball", vec![ground, ball]).steps(120);
+/// scene.validate()?;
+///
+/// assert_eq!(Scene::from_json(&scene.to_json(), "ball.json".as_ref())?, scene);
+/// let mut world = scene.build(Settings::new(solvers::find("shim")?))?;
+/// world.step()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
