@@ -100,6 +100,7 @@ impl Timings {
 
 /// Memory requests of the passes of one phase, if counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Requested {
     /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
     /// rows written.
@@ -110,6 +111,7 @@ pub struct Requested {
 
 /// Which phases of a step run: all, or one alone on the records of an earlier step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[doc(hidden)]
 pub struct PhaseFilter {
     /// The only phase that runs; none: all do.
     pub only: Option<Phase>,
@@ -130,6 +132,7 @@ impl PhaseFilter {
 
 /// Adds the time since the last lap to a phase, and counts laps; reads no clock while it is off.
 #[derive(Debug)]
+#[doc(hidden)]
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
@@ -216,6 +219,7 @@ impl Clock {
 
 /// Time that this thread was ready but not running, since it started. None where the system does not report it; time
 /// taken by a hypervisor is not included.
+#[doc(hidden)]
 pub fn waited() -> Option<Duration> {
     parse_wait(&std::fs::read_to_string("/proc/thread-self/schedstat").ok()?)
 }

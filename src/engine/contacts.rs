@@ -89,6 +89,7 @@ pub struct Contact {
 }
 
 /// Layout of a [`Contact`] in quads.
+#[doc(hidden)]
 pub mod quad {
     /// Quads per contact.
     pub const STRIDE: usize = size_of::<super::Contact>() / 16;

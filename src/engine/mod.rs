@@ -22,12 +22,14 @@
 pub mod bodies;
 pub mod broadphase;
 pub mod clock;
+#[doc(hidden)]
 pub mod coloring;
 pub mod constraints;
 pub mod contacts;
 pub mod continuous;
 pub mod error;
 pub mod lanes;
+#[doc(hidden)]
 pub mod narrowphase;
 pub mod params;
 pub mod shapes;

@@ -119,5 +119,6 @@ pub mod report;
 pub mod scenes;
 pub mod study;
 pub mod torture;
+#[doc(hidden)]
 pub mod units;
 pub mod verify;

@@ -30,6 +30,7 @@ use std::ops::Range;
 
 /// What is known of the bodies of a world, and the fast ones of the last step.
 #[derive(Clone, Debug, Default)]
+#[doc(hidden)]
 pub struct Continuous {
     /// How far a body may move in a step without a look, squared (m²): half its least width. Infinite unless dynamic.
     safe_squared: Vec<f32>,
@@ -43,6 +44,7 @@ pub struct Continuous {
 
 /// What moves, as [`Continuous::shorten`] needs it.
 #[derive(Clone, Copy)]
+#[doc(hidden)]
 pub struct Moving<'w> {
     /// At the start of the step.
     pub bodies: &'w Bodies,

@@ -218,6 +218,7 @@ impl World {
 
     /// Runs every phase of a step, pairs included, without moving the bodies, so that phases can be measured
     /// repeatedly on one state. Impulses are kept.
+    #[doc(hidden)]
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
@@ -234,11 +235,13 @@ impl World {
 
     /// The rule of the last step's last velocity sweep: none without one, or without
     /// `Settings::observe_rule`.
+    #[doc(hidden)]
     pub fn observed_rule(&self) -> Option<&ObservedRule> {
         self.work.last_rule.as_ref()
     }
 
     /// The constraint records and body rows of the last step, for benches of single kernels.
+    #[doc(hidden)]
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work
     }

@@ -20,10 +20,12 @@
 //!
 //! Methods in `f64` that share no code with the solvers ([`crate::lab::reference`]) stand beside them.
 
+#[doc(hidden)]
 pub mod plot;
 pub mod replay;
 mod scalar;
 mod setup;
+#[doc(hidden)]
 pub mod summary;
 pub mod table;
 mod timing;

@@ -7,9 +7,12 @@
 
 pub mod draw;
 pub mod frame;
+#[doc(hidden)]
 pub mod letters;
+#[doc(hidden)]
 pub mod outline;
 pub mod png;
+#[doc(hidden)]
 pub mod raster;
 pub mod svg;
 

@@ -7,21 +7,33 @@
 //! Settings that would be named are then [run on](horizon), untimed and on all cores, for as long as the scene
 //! deserves.
 
+#[doc(hidden)]
 pub mod answer;
 pub mod budget;
 pub mod compare;
+#[doc(hidden)]
 pub mod cost;
+#[doc(hidden)]
 pub mod curve;
+#[doc(hidden)]
 pub mod horizon;
+#[doc(hidden)]
 pub mod impacts;
+#[doc(hidden)]
 pub mod interleave;
+#[doc(hidden)]
 pub mod pareto;
+#[doc(hidden)]
 pub mod profile;
+#[doc(hidden)]
 pub mod ranking;
 pub mod record;
+#[doc(hidden)]
 pub mod savings;
+#[doc(hidden)]
 pub mod slices;
 pub mod sweep;
+#[doc(hidden)]
 pub mod telling;
 
 use crate::engine::constraints::Impacts;

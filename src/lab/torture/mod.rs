@@ -3,7 +3,7 @@
 //! A solver is tuned on scenes that somebody thought of. Here [`families`] draw others, by seed; each runs
 //! under every solver, and a [`judge`] looks on from outside, in double precision, at poses alone: whatever
 //! moves the bodies, this crate's solvers or another engine, is an [`Engine`] to it. What fails is
-//! [minimized](minimize) into a scene file.
+//! [minimized](minimise) into a scene file.
 //!
 //! | verdict | what is forbidden |
 //! |---|---|
@@ -18,9 +18,12 @@
 //! so it is told and fails nothing.
 
 pub mod families;
+#[doc(hidden)]
 pub mod judge;
 pub mod minimise;
+#[doc(hidden)]
 pub mod shapes;
+#[doc(hidden)]
 pub mod table;
 
 use crate::engine::solvers::Variant;

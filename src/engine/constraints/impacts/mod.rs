@@ -11,7 +11,9 @@
 use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::params::RESTITUTION_THRESHOLD;
 
+#[doc(hidden)]
 pub mod bias;
+#[doc(hidden)]
 pub mod restitution;
 pub(crate) mod spread;
 pub(crate) mod touch;
