@@ -1,5 +1,19 @@
-//! A SIMD structure-of-arrays 2D rigid-body laboratory: which contact solver, how many
-//! iterations, how fast, and how wrong?
+//! A 2D rigid-body engine in SIMD lanes, and a laboratory for contact solvers: which solver, how many iterations, how fast,
+//! and how wrong?
+//!
+//! ```
+//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse::engine::{solvers, world::{Settings, World}};
+//!
+//! let mut world = World::new(Settings::new(solvers::find("shim")?));
+//! world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(20.0, 1.0)?))?;
+//! let ball = world.add_body(&BodyDef::dynamic([0.0, 3.0]).with(ShapeDef::circle(0.5)?))?;
+//! for _ in 0..120 {
+//!     world.step()?;
+//! }
+//! println!("{:?}", world.bodies.origin(ball.index()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! **As a library:** start with [`engine`]: how to build for your CPU, which bits are promised, and how to add, move,
 //! query and remove bodies. [`changelog`] lists changes.

@@ -13,12 +13,14 @@
 //!     let mut world = World::new(Settings::new(solvers::find(solver)?));
 //!     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
 //!     for i in 0..5 {
-//!         world.add_body(&BodyDef::dynamic([0.0, i as f64 + 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+//!         let cube = ShapeDef::rectangle(0.5, 0.5)?;
+//!         world.add_body(&BodyDef::dynamic([0.0, f64::from(i) + 0.5]).with(cube))?;
 //!     }
 //!     for _ in 0..120 {
 //!         world.step()?;
 //!     }
-//!     Ok(world.contacts.iter().map(|c| -c.manifold.points[0].separation).fold(0.0, f32::max))
+//!     let overlaps = world.contacts.iter().map(|c| -c.manifold.points[0].separation);
+//!     Ok(overlaps.fold(0.0, f32::max))
 //! };
 //! assert!(sag("shim")? < 0.1 * sag("soft_step")?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -135,7 +135,8 @@ impl World {
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.remove_body(ball)?;
     /// assert!(!world.contains(ball));
-    /// assert_eq!(world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err().to_string(), "body 0 was removed");
+    /// let error = world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err();
+    /// assert_eq!(error.to_string(), "body 0 was removed");
     /// # Ok::<(), simpulse::engine::error::Error>(())
     /// ```
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {

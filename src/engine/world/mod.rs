@@ -66,13 +66,16 @@ struct Surface {
 /// ```
 /// # use simpulse_engine as simpulse;
 /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
-/// // One lane and the widest: the same bits.
+/// // A stack, at one lane and at the widest: the same bits.
 /// let mut hashes = Vec::new();
 /// for width in [LaneWidth::W1, LaneWidth::W16] {
-///     let mut world = World::new(Settings::new(solvers::find("soft_step")?).exactly(width));
-///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+///     let settings = Settings::new(solvers::find("soft_step")?).exactly(width);
+///     let mut world = World::new(settings);
+///     let (floor, cube) = (ShapeDef::rectangle(50.0, 1.0)?, ShapeDef::rectangle(0.5, 0.5)?);
+///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(floor))?;
 ///     for i in 0..8 {
-///         world.add_body(&BodyDef::dynamic([0.3 * i as f64, 1.1 * i as f64 + 0.6]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+///         let (x, y) = (0.3 * f64::from(i), 1.1 * f64::from(i) + 0.6);
+///         world.add_body(&BodyDef::dynamic([x, y]).with(cube.clone()))?;
 ///     }
 ///     for _ in 0..30 {
 ///         world.step()?;

@@ -19,7 +19,7 @@ pub fn savings_table(savings: &[Saving]) -> String {
     }
     for own in savings.chunk_by(|a, b| (a.solver, a.lanes) == (b.solver, b.lanes)) {
         text += &format!("\n{}, {}\n", own[0].solver, lanes(own[0].lanes));
-        let mut rows = table(&["scene", "left out", "bytes", "saved", "ns", "saved", "same bits"]);
+        let mut rows = table(&["scene", "feature", "bytes", "saved", "ns", "saved", "same bits"]);
         for saving in own {
             rows.add_row([
                 saving.scene.clone(),
