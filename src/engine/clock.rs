@@ -177,7 +177,7 @@ impl Clock {
         self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
     }
 
-    /// What has been booked.
+    /// The times so far.
     pub(crate) fn requested(&self) -> Requested {
         self.requested
     }

@@ -12,7 +12,7 @@ pub enum Error {
     Invalid {
         /// Where the value stands, for example `vertices`.
         place: String,
-        /// What is wrong with it, with the value itself.
+        /// The reason, with the value.
         message: String,
     },
     /// A handle of a removed body.

@@ -59,7 +59,7 @@ pub const HIT_SPEED: f32 = 1.0;
 /// Bodies faster than this (m/s) or, in rad/s, spinning faster than this, have diverged.
 pub const DIVERGED_SPEED: f32 = 1.0e5;
 
-/// How much work one step may do.
+/// The work of one step.
 ///
 /// Each solver reads the fields that its schedule has and ignores the rest;
 /// its row in [`crate::engine::solvers::VARIANTS`] says which.
@@ -96,7 +96,7 @@ pub struct Parameter {
     pub trials: &'static [f32],
 }
 
-/// What several solvers can be given.
+/// Parameters that several solvers share.
 impl Parameter {
     /// Share of the overlap that Baumgarte stabilization removes.
     pub const BAUMGARTE: Parameter = Parameter {

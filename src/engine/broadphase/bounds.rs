@@ -171,7 +171,7 @@ impl FatBoxes {
     }
 }
 
-/// How far `tight` is inside of `fat` on the side where it is least, less what rounding may take.
+/// Smallest margin between `tight` and `fat` over all sides, less possible rounding.
 fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
     let low = (tight.min - fat.min).min_element();
     let high = (fat.max - tight.max).min_element();

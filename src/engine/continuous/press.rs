@@ -1,4 +1,4 @@
-//! What is pressed into something static stops where its middle would get in.
+//! Stops bodies that are pressed into a static shape before their center enters it.
 //!
 //! Where a piston leaves a body no room, all of its contacts give way, and a body that is past the middle of a wall is
 //! pushed out of it on the other side. What cannot move wins: with the depth d of a contact with a static shape, its

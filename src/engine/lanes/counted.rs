@@ -3,9 +3,9 @@
 //! The kernels are written once for any [`Lanes`]; run with [`Counted`] they do on one lane what
 //! they do on sixteen, and every operation is booked. A thread has one book.
 //!
-//! What is counted is what the text does. A compiler leaves out what nobody reads: in a sweep the
-//! tangential part of a motion (3 of some 140 operations against a dynamic body), and against a
-//! static one also the sine and versine of its turn (10 of some 100).
+//! Counts follow the source. A compiler removes dead code: in a sweep the tangential part of a motion (3 of some 140
+//! operations against a dynamic body), and against a static one also the sine and versine of its turn (10 of some
+//! 100).
 
 use super::index::LaneIndex;
 use super::quads::Quad;

@@ -1,4 +1,4 @@
-//! What this CPU has and this build does not use.
+//! CPU features that this build does not use.
 
 use super::{native_width, target_features};
 

@@ -57,7 +57,7 @@ pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L
     [product / comes.select_positive(sum, L::splat(1.0)), comes]
 }
 
-/// What a solver that turns the frames of round contacts asks of the narrow phase.
+/// Request of a solver that turns the frames of round contacts.
 ///
 /// A contact rolls if its gap changes by less than [`Rolling::limit`] in the coming step. Its gap is that of the step's
 /// beginning, as its normal turns with it; that of another one is [`passing`].

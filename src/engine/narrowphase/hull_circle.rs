@@ -35,7 +35,7 @@ impl<L: Lanes> HullCircle<L> {
         self.circle = ([place[0], place[1]], size[2]);
     }
 
-    /// How the circle's center moves in the frame of the hull where bodies move by `[x, y, θ, 0]` (m, rad).
+    /// Displacement of the circle's center in the frame of the hull when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
     fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = rotate(poses.rotation[1], self.circle.0);

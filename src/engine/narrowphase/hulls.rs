@@ -166,8 +166,8 @@ impl<L: Lanes> Face<L> {
     }
 }
 
-/// What feature ids call the two ends of the face at `slot`: its number and the next; for a capsule
-/// or segment (`flat` positive) 0 at a and 1 at b.
+/// Feature ids of the two ends of the face at `slot`: its number and the next; for a capsule or segment (`flat`
+/// positive) 0 at a and 1 at b.
 #[inline(always)]
 fn names<L: Lanes>(slot: L, last: L, flat: L) -> [L; 2] {
     let one = L::splat(1.0);

@@ -1,4 +1,4 @@
-//! What the narrow phase reads and writes in lanes.
+//! Data that the narrow phase reads and writes in lanes.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::lanes::{LaneIndex, Lanes, Quad};
@@ -24,7 +24,7 @@ impl PoseRow {
     }
 }
 
-/// What kernels tell apart in a shape.
+/// Properties of a shape that kernels distinguish.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Class {
     /// A polygon with four right angles.
@@ -162,7 +162,7 @@ impl<L: Lanes> ShapePair<L> {
 }
 
 impl<L: Lanes> ShapePair<L> {
-    /// How the shapes' centers move against each other where bodies move by `[x, y, θ, 0]` (m, rad).
+    /// Relative displacement of the shapes' centers when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
     pub fn way(&self, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = |k: usize| rotate(self.poses.rotation[k], [self.place[k][0], self.place[k][1]]);
@@ -170,7 +170,7 @@ impl<L: Lanes> ShapePair<L> {
     }
 }
 
-/// How the point at `r[1]` from the center of b moves against that at `r[0]` from a's, along world axes (m).
+/// Displacement of the point at `r[1]` from the center of b relative to that at `r[0]` from a's, world axes (m).
 #[inline(always)]
 pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
     let of =

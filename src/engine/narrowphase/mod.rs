@@ -81,7 +81,7 @@ pub fn collide_in_step(
         .map_or_else(Manifold::default, |touch| touch.without_grazes().manifold())
 }
 
-/// What [`collide_in_step`] finds, with grazes; none for two segments.
+/// The result of [`collide_in_step`], including grazes; none for two segments.
 fn touch(
     [a, b]: [&Shape; 2],
     [pose_a, pose_b]: [&Pose; 2],

@@ -133,7 +133,7 @@ struct Newton {
     merit: f64,
     /// Nothing better is found any more.
     done: bool,
-    /// What the records hold, and the friction of each point.
+    /// The records' values, and the friction of each point.
     written: Vec<Pair>,
     surfaces: Vec<Pair>,
     delta: Vec<Pair>,

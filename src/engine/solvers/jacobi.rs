@@ -53,7 +53,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Jacobi {
     /// Sums of velocity increments. `[rows]`

@@ -51,7 +51,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct MassSplitting {
     graph: Graph,

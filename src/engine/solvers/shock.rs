@@ -45,7 +45,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Shock {
     graph: Graph,

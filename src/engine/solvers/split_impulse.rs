@@ -36,7 +36,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct SplitImpulse {
     /// Rows as they were before bodies are pushed apart.

@@ -64,7 +64,7 @@ pub static SOLVER: Variant = Variant {
 /// Points that are farther apart (m) do not stick.
 const REACH: f32 = 2.0 * LINEAR_SLOP;
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct TgsSticky {
     /// How far each point has drifted before the step (m), in the order of the lanes.

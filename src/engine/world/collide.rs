@@ -12,7 +12,7 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 use glam::Vec2;
 
-/// What the narrow phase keeps from step to step.
+/// State of the narrow phase between steps.
 #[derive(Clone, Default)]
 pub(super) struct Narrow {
     /// Sorted by shape pair.

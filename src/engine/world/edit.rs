@@ -27,7 +27,7 @@ pub(super) struct Slots {
     pub removed: Vec<u32>,
 }
 
-/// What a body's standing forces were before some were applied for one step.
+/// Persistent forces of a body before others were applied for one step.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Standing {

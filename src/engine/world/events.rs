@@ -57,7 +57,7 @@ pub struct ContactPoint {
     pub tangent_impulse: f32,
 }
 
-/// Who touches whom.
+/// Touching pairs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Touching {

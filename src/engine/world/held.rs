@@ -1,13 +1,12 @@
 //! Repeats one phase of a step on a frozen state.
 //!
 //! ```text
-//! hold:   a whole step without moving bodies   every phase finds what it needs
-//! repeat: one phase, nothing else              what a profiler shall see
-//! reset:  what the phase changed, copied back  cheap, and outside of the repeats
-//! drop:   bodies and contacts as they were     the next step gives the bits it would have given
+//! hold:   a whole step without moving bodies   every phase finds what it needs repeat: one phase, nothing else
+//! what a profiler sees reset:  what the phase changed, copied back  cheap, and outside of the repeats drop:   bodies
+//! and contacts as they were     the next step gives the bits it would have given
 //! ```
 //!
-//! What repeats do to the state:
+//! Effect of repeats on the state:
 //!
 //! * *pairs* searches all pairs again each time and *color* for all colors, as a step does in which
 //!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
@@ -39,7 +38,7 @@ pub struct HeldWorld<'w> {
     buffers: Vec<Vec<Block>>,
 }
 
-/// What a step starts from, as far as phases write to it.
+/// State that a step starts from and that phases change.
 struct Saved {
     bodies: Bodies,
     contacts: Vec<Contact>,
@@ -53,7 +52,7 @@ struct Saved {
     types: Vec<Box<dyn ConstraintType>>,
 }
 
-/// What a step does in one phase.
+/// Work of a step in one phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
     /// The phase.

@@ -46,7 +46,7 @@ pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
-/// What is known of a shape for its contacts.
+/// Properties of a shape for its contacts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     friction: f32,

@@ -24,7 +24,7 @@ impl Having {
     }
 }
 
-/// What decides the needs of a scene.
+/// Properties that decide the features of a scene.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Traits {

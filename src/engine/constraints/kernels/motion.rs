@@ -16,7 +16,7 @@ use crate::engine::lanes::{BodyRow, held};
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
-/// How velocities and positions follow each other.
+/// Order of velocity and position updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
@@ -27,7 +27,7 @@ pub enum Integrator {
     ExplicitEuler,
 }
 
-/// How a spin turns a body within a substep.
+/// Rotation update of a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RotationUpdate {
@@ -38,7 +38,7 @@ pub enum RotationUpdate {
     Normalized,
 }
 
-/// What [`Motion::load`] is given besides the bodies.
+/// Inputs of [`Motion::load`] besides the bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput {
     /// m/s²
@@ -53,7 +53,7 @@ pub struct MotionInput {
     pub rotation: RotationUpdate,
 }
 
-/// What a step needs to move bodies, one entry per row.
+/// Data for moving bodies, one entry per row.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// What forces add to a velocity in one substep: `[h aₓ, h a_y, h α, 0]`.

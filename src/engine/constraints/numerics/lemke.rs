@@ -20,7 +20,7 @@ use std::cmp::Ordering;
 /// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
 pub const REBUILD: usize = 50;
 
-/// How Lemke's method ended.
+/// Outcome of Lemke's method.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// z, with w = A z + q and the complementarity pattern that LU refined.

@@ -1,4 +1,4 @@
-//! What the points under a body bear at rest.
+//! Loads of the points under a body at rest.
 //!
 //! The loads F of the points balance a force f and a torque τ as well as their laws allow: with the columns
 //! (u, r × u/ρ) of the unit normals and tangents u in A, and ρ the radius of gyration,
@@ -52,7 +52,7 @@ impl Support {
         self.load[1].abs() >= self.friction * self.load[0]
     }
 
-    /// What it pushes the body with (N).
+    /// Its force on the body (N).
     pub fn force(&self) -> DVec2 {
         self.load[0] * self.normal + self.load[1] * self.tangent()
     }

@@ -60,7 +60,7 @@ const IS_THERE: usize = 8;
 /// Lane vectors of a body: its inertial place, M/h² (kg/s²), I/h², and 0 if it does not turn.
 const BODY: usize = 6;
 
-/// What block descent works with, kept from step to step so that nothing is allocated.
+/// Buffers of block descent, kept from step to step to avoid allocation.
 #[derive(Clone, Debug, Default)]
 pub struct Descent {
     lanes: BodyLanes,
@@ -71,7 +71,7 @@ pub struct Descent {
     contacts: Vec<Block>,
 }
 
-/// What a pass of block descent is given besides.
+/// Further inputs of a pass of block descent.
 pub(crate) struct Bodies<'a> {
     pub rows: &'a mut [BodyRow],
     pub kept: &'a mut Kept,

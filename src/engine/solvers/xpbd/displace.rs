@@ -55,7 +55,7 @@ pub(crate) struct Displace<'a> {
 
 /// Corrects velocities; see the [module](self).
 pub(crate) struct AfterDisplacing<'a> {
-    /// How fast points shall leave (m/s), of the colored and of the serial batches; empty where nothing bounces.
+    /// Rebound speeds of points (m/s) in the colored and the serial batches; empty where nothing bounces.
     pub rebounds: [&'a mut [Block]; 2],
 }
 
