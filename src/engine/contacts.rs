@@ -50,7 +50,7 @@ pub struct Manifold {
 /// }
 /// let contact = &world.contacts[0];
 /// let load: f32 = contact.step_impulse.iter().map(|[normal, _]| normal / world.settings.dt).sum();
-/// let deepest = contact.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
+/// let deepest = contact.manifold.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
 /// // A box of 1 kg weighs 10 N.
 /// assert!((load - 10.0).abs() < 0.01 && deepest < 1e-4, "{load} N, {deepest} m");
 /// # Ok::<(), Box<dyn std::error::Error>>(())

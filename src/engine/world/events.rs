@@ -121,11 +121,13 @@ impl World {
     /// let crate_ = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
     /// for _ in 0..60 {
     ///     world.step()?;
-    /// } // The normal impulse of a substep ÷ its length is the force: the weight of the box. let h =
-    /// world.settings.h(); let points = world.contacts_of(crate_)?.flat_map(|contact| world.points_of(contact)); let
-    /// force: f32 = points.map(|point| point.normal_impulse / h).sum(); let mass = 1.0 /
-    /// world.bodies.inv_mass[crate_.index()]; assert!((force / (10.0 * mass) - 1.0).abs() < 1e-3, "{force} N on
-    /// {mass} kg");
+    /// }
+    /// // The normal impulse of a substep ÷ its length is the force: the weight of the box.
+    /// let h = world.settings.h();
+    /// let points = world.contacts_of(crate_)?.flat_map(|contact| world.points_of(contact));
+    /// let force: f32 = points.map(|point| point.normal_impulse / h).sum();
+    /// let mass = 1.0 / world.bodies.inv_mass[crate_.index()];
+    /// assert!((force / (10.0 * mass) - 1.0).abs() < 1e-3, "{force} N on {mass} kg");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn contacts_of(&self, body: BodyHandle) -> Result<impl Iterator<Item = &Contact>, Error> {

@@ -1,9 +1,10 @@
 //! Repeats one phase of a step on a frozen state.
 //!
 //! ```text
-//! hold:   a whole step without moving bodies   every phase finds what it needs repeat: one phase, nothing else
-//! what a profiler sees reset:  what the phase changed, copied back  cheap, and outside of the repeats drop:   bodies
-//! and contacts as they were     the next step gives the bits it would have given
+//! hold:   a whole step without moving bodies   every phase finds what it needs
+//! repeat: one phase, nothing else              what a profiler sees
+//! reset:  what the phase changed, copied back  cheap, and outside of the repeats
+//! drop:   bodies and contacts as they were     the next step gives the bits it would have given
 //! ```
 //!
 //! Effect of repeats on the state:
