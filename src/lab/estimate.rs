@@ -1,4 +1,4 @@
-//! What a run will take, before it starts: time and memory from bodies, steps and settings.
+//! Estimates before a run: time and memory from bodies, steps and settings.
 //!
 //! Figures are of pyramids (three contacts of two points per body) on one Zen 5 core, rounded; scenes with
 //! fewer contacts take a fraction of it, other machines a few times as much. That is enough to tell

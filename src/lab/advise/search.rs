@@ -32,7 +32,7 @@ pub struct Search<'a> {
     total: usize,
     /// Everything tried so far.
     pub trials: Vec<Trial>,
-    /// What was left out because it can only cost more.
+    /// Settings skipped because they can only cost more.
     pub left_out: usize,
     /// Whether the time was up before the grid was done.
     pub is_cut_short: bool,

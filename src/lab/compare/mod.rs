@@ -35,7 +35,7 @@ pub struct Options {
     pub relative: bool,
 }
 
-/// What both studies have of a setting.
+/// A setting in both studies.
 #[derive(Clone, Debug, Serialize)]
 pub struct Pair {
     /// Name with size.
@@ -65,7 +65,7 @@ pub struct ErrorChange {
     pub unit: &'static str,
     /// Before and after.
     pub values: [f64; 2],
-    /// What of it is negligible.
+    /// The share that is negligible.
     pub negligible: f64,
 }
 
@@ -80,7 +80,7 @@ pub struct TimeChange {
     pub interval: [f64; 2],
 }
 
-/// What two runs of one program differ by, as logarithms of ratios (1).
+/// Differences between two runs of one program, as logarithms of ratios (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Noise {
     /// Time of the fixed loop after, in that before (1); all times are divided by it.
@@ -93,7 +93,7 @@ pub struct Noise {
     pub allowed: f64,
 }
 
-/// What remains between two runs on a machine that does nothing else: code and data lie elsewhere.
+/// Difference that remains between two runs on an idle machine, because code and data lie at other addresses.
 const PLACEMENT: f64 = 0.02;
 
 /// Settings whose scatter says something.

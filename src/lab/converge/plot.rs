@@ -234,7 +234,7 @@ fn decade(exponent: i32) -> String {
         n => format!("1e{n}"),
     }
 }
-/// What is said of lanes that are wider than what this build has instructions for.
+/// Note on lanes wider than the native ones of this build.
 fn emulated(lanes: usize) -> &'static str {
     if lanes > native_width().lanes() { ", emulated" } else { "" }
 }

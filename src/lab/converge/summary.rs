@@ -1,4 +1,4 @@
-//! What convergence comes to, in sentences.
+//! Convergence in sentences.
 
 use super::replay::{Sequence, Start};
 use super::{Curve, Reached, Report, TOLERANCES};

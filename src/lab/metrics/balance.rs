@@ -1,4 +1,4 @@
-//! What a step should have kept: momentum, angular momentum and energy.
+//! Balances of a step: momentum, angular momentum and energy.
 //!
 //! External to the dynamic bodies are weight, applied forces and the impulses of contacts
 //! with static and kinematic bodies, all of which are known. Damping is external too, but

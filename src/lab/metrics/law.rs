@@ -1,4 +1,4 @@
-//! How far a step's impulses are from the contact law of Signorini and Coulomb.
+//! Residual of the contact law of Signorini and Coulomb, for the impulses of a step.
 //!
 //! Over a step a contact point has the impulse (λ_n, λ_t) and ends with the velocity
 //! (u_n, u_t). The law says

@@ -1,5 +1,4 @@
-//! How far a solver is from what it set out to solve itself: a second residual, never mixed
-//! with that of the [rigid law](super::law).
+//! The residual of a solver's own law: a second residual, never mixed with that of the [rigid law](super::law).
 //!
 //! A solver may want something else than the rigid law on purpose: a bias velocity that
 //! recovers overlap, or a soft contact. Its last velocity sweep then solves

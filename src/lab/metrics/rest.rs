@@ -129,9 +129,9 @@ impl Rest {
         self.settled
     }
 
-    /// The fastest of all slopes of a center of mass against that of a body it presses on,
-    /// along the tangent of their contact; of those that press on each other at the end.
-    /// What rolls or slides on purpose creeps too.
+    /// The fastest of all slopes of a center of mass against that of a body it presses on, along the tangent of their
+    /// contact; of those that press on each other at the end. Bodies that roll or slide on purpose count as creeping,
+    /// too.
     pub fn creep(&self) -> Slope {
         let slopes = self.touching.iter().filter_map(|&([a, b], tangent)| {
             let along: Vec<f64> = self.positions.iter().map(|x| (x[b] - x[a]).dot(tangent)).collect();

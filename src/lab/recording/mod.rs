@@ -60,7 +60,7 @@ pub struct Header {
     pub solver: String,
     /// Its budget, order and lanes in words.
     pub setting: String,
-    /// How the run ended: `holds`, or the word for what broke.
+    /// Outcome of the run: `holds`, or the word for its failure.
     pub outcome: String,
     /// Step (s).
     pub dt: f64,

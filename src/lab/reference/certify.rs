@@ -114,7 +114,7 @@ pub struct NoReference {
     pub why: String,
 }
 
-/// How far an answer is from a reference, in what the problem determines.
+/// Distance of a solution from a reference, in the quantities that the problem determines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// [`ContactProblem::velocity_error`] (1).

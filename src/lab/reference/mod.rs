@@ -1,4 +1,4 @@
-//! What the answer should have been: exact and certified solutions of one contact problem.
+//! Exact and certified solutions of a contact problem.
 //!
 //! Reading order: [`problem`] states the problem, [`residual`] the law and how far from it an
 //! answer is. [`stewart_trinkle`] solves small problems exactly by Lemke's method

@@ -84,7 +84,7 @@ fn least_squares(columns: &[Vec<f64>], used: &[usize], p: &[f64]) -> Option<(Vec
     Some((s, rest))
 }
 
-/// What of `x` is orthogonal to the basis, and its components along it.
+/// The part of `x` that is orthogonal to the basis, and its components along the basis.
 fn project(mut x: Vec<f64>, basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let mut weights = vec![0.0; basis.len()];
     for _ in 0..2 {

@@ -144,7 +144,7 @@ fn dot(a: &Velocity, b: &Velocity) -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactProblem {
-    /// What it is, and where it comes from.
+    /// Its name, with its origin.
     pub name: String,
     /// Step (s), > 0.
     pub h: f64,

@@ -31,7 +31,7 @@ const ROUNDS_PER_EDGE: usize = 20;
 /// Mechanisms allowed on the way to a collapse load; typical runs meet two to ten.
 const MECHANISMS: usize = 1000;
 
-/// How far a disturbance may grow.
+/// Largest growth of a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Collapse {
     /// Even without it there is no rest.
@@ -76,7 +76,7 @@ pub fn collapse(
     Err(Error::invalid(problem.name.clone(), format!("no collapse load in {MECHANISMS} mechanisms")))
 }
 
-/// What contacts can give the bodies.
+/// Forces that contacts can exert on the bodies.
 struct Cone<'a> {
     problem: &'a ContactProblem,
     /// Components that must balance, (body, 0..3): those of infinite mass are held by themselves.

@@ -13,7 +13,7 @@ pub struct Column {
     pub name: &'static str,
     /// Empty for words and counts; 1 for ratios.
     pub unit: &'static str,
-    /// What it holds.
+    /// Its content.
     pub meaning: &'static str,
 }
 
@@ -22,9 +22,9 @@ pub struct Column {
 pub struct Sheet {
     /// Its usual name.
     pub file: &'static str,
-    /// What writes it.
+    /// The command that writes it.
     pub command: &'static str,
-    /// What a line is.
+    /// The subject of a line.
     pub line: &'static str,
     /// In their order.
     pub columns: &'static [Column],

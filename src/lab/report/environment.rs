@@ -29,7 +29,7 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Of this program on this machine.
+    /// The environment of this program on this machine.
     pub fn current() -> Self {
         Environment {
             cpu: cpu_model(),

@@ -17,14 +17,14 @@ pub const NAME: &str = "study.json";
 pub struct StudyFile {
     /// [`SCHEMA`]
     pub schema_version: u32,
-    /// Where it ran; of a study that was put together, where its first part did.
+    /// Where it ran; for a merged study, where its first part ran.
     pub environment: Environment,
     /// Everything that was chosen.
     pub settings: Value,
     /// Scenes of the plan that have no records, because the study was interrupted or is a part of one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_scenes: Vec<String>,
-    /// What it was put together from. Times are comparable within a part only.
+    /// Its parts, if it was merged. Times are comparable only within a part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
     /// A record per setting, scene by scene.

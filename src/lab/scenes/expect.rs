@@ -1,4 +1,4 @@
-//! What a scene file says of a run: what must hold, and what is known.
+//! Expectations in a scene file: conditions that must hold, and known values.
 //!
 //! Scenes of the catalog write it with [`Scene::to_json`], so that a file that was printed is checked as the
 //! scene that it came from. Observers of the catalog that no number describes (the twin of a far stack, the
@@ -35,7 +35,7 @@ pub struct Expect {
     /// [`Demand::Inside`](super::holds::Demand::Inside) (m)
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub stays_inside: Option<[[f64; 2]; 2]>,
-    /// What is known.
+    /// The known value.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub reference: Option<Reference>,
 }
@@ -55,7 +55,7 @@ pub struct Reference {
     pub tolerance: f64,
 }
 
-/// What a file can know.
+/// Quantities whose value a file can give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {

@@ -8,7 +8,7 @@ use super::{Entry, Loaded, Scene, entry_of, load};
 use crate::lab::error::Error;
 
 impl Expect {
-    /// What a scene of the catalog expects.
+    /// Expectations of a scene of the catalog.
     pub(super) fn of(name: &str, demands: &[Demand], truth: Option<&Truth>, tolerances: &Tolerances) -> Self {
         let mut expect = Expect { catalogue: Some(name.to_string()), ..Expect::default() };
         for demand in demands {
@@ -33,7 +33,7 @@ impl Expect {
         expect
     }
 
-    /// What it demands, without what goes by the name of the scene.
+    /// Its conditions, without those that depend on the name of the scene.
     fn demands(&self) -> Vec<Demand> {
         [
             self.stands.then_some(Demand::Stands),
@@ -97,7 +97,7 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     Ok(Loaded { scene, truth, demands, tolerances, unchecked })
 }
 
-/// What goes by the name of a scene whose bodies are others.
+/// Expectations that are lost because the bodies differ from the catalog's.
 fn lost(entry: &Entry, expect: &Expect, name: &str) -> Option<String> {
     let by_name = entry.demands.iter().any(|d| matches!(d, Demand::Contains(_)));
     let value = entry.truth.is_some() && expect.reference.is_none();

@@ -49,10 +49,10 @@ pub struct Scene {
     /// Number of steps of a run, ≥ 1.
     #[serde(default = "default_steps")]
     pub steps: u32,
-    /// What a run is held to; none: it is not checked.
+    /// Conditions on a run; none: it is not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
-    /// In the order in which a world numbers them.
+    /// Bodies, in the order of their indices in a world.
     pub bodies: Vec<SceneBody>,
 }
 

@@ -1,4 +1,4 @@
-//! What a scene demands of a run, and the word for one that does not meet it.
+//! Conditions on a run, and the words for their violation.
 //!
 //! A run that fell has fallen, however fast it was and however small its errors are: nobody wants
 //! it. Every scene demands that its kinetic energy has a source (see
@@ -55,7 +55,7 @@ impl std::fmt::Display for Broken {
     }
 }
 
-/// What a scene demands of every step.
+/// A condition that every step has to meet.
 #[derive(Clone, Copy, Debug)]
 pub enum Demand {
     /// Every two bodies that touch at the start stay together: neither moves against the other by
@@ -92,7 +92,7 @@ pub const LEFT: f64 = 0.5;
 /// by up to m g h v/2, that is g h/v of it: 4 % at 4.5 m/s in steps of 1/60 s.
 pub const GAIN: f64 = 0.1;
 
-/// What comes to rest has to stand for so long (s).
+/// Time for which a scene at rest has to stand (s).
 pub const HORIZON: f64 = 60.0;
 
 impl Demand {

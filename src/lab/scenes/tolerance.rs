@@ -1,4 +1,4 @@
-//! How wrong a run of a scene may be: limits with their reasons, written down with the scene.
+//! Tolerances of a scene: limits on errors, with their reasons.
 //!
 //! They say what would be noticed, or what no solver can avoid, and not what some solver reaches: it
 //! is an answer, too, that none of those tried does.
@@ -33,7 +33,7 @@ impl Tolerance {
     }
 }
 
-/// How right a run has to be. Each is ten times as strict as the one before it, in every error.
+/// Accuracy of a run. Each level is ten times as strict as the one before, in every error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accuracy {
@@ -96,7 +96,7 @@ pub struct GivenTolerances {
     pub rest: Option<f64>,
 }
 
-/// What is seen of a body, in its size (1): a centimeter at a meter.
+/// Visible overlap, relative to the size of a body (1): 1 cm at 1 m.
 const SEEN: f64 = 0.01;
 
 /// What is seen to move at rest, in sizes of a body per second: half a centimeter at a meter, a twelfth of a
@@ -147,7 +147,7 @@ impl Tolerances {
         Tolerances { residual: Tolerance::new(1.0, reason), ..Self::standard(scene) }
     }
 
-    /// What may be left of the motion of what comes to rest.
+    /// Residual speed allowed at rest.
     pub fn resting(scene: &Scene) -> Tolerance {
         Tolerance::new(SEEN_MOVING * size(scene), "0.5 % of a body per second starts to be visible")
     }

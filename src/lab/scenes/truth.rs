@@ -1,10 +1,8 @@
 //! Known truths, and observers that measure how far a world is from them.
 //!
-//! An observer sees a world after each step and nothing else: not which solver
-//! ran, nor how long it took. It reads the `f32` state and computes in `f64`.
-//! Where the truth of a semi-implicit Euler scheme with n substeps is known
-//! exactly, the observer compares with that, so that a correct solver's error is
-//! rounding, not discretization.
+//! An observer sees a world after each step and nothing else: not which solver ran, nor how long it took. It reads
+//! the `f32` state and computes in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is
+//! known exactly, the observer compares with that, so that a correct solver's error is rounding, not discretization.
 
 use super::expect::Measure;
 use super::format::Scene;
@@ -24,13 +22,13 @@ pub trait Observer {
 
 /// Something known about a scene, and who measures it.
 pub struct Truth {
-    /// What is measured.
+    /// The measured quantity.
     pub quantity: &'static str,
-    /// Of `expected` and of the error.
+    /// Unit of `expected` and of the error.
     pub unit: &'static str,
     /// The value that the exact rigid bodies have (in the limit of small steps).
     pub expected: f64,
-    /// What a scene file calls it, with the body that it is about; none where only the catalog knows it.
+    /// Its name in scene files, with its body; none if only the catalog has it.
     pub measure: Option<(Measure, Option<usize>)>,
     /// Its error is the distance to the truth, in `unit`.
     pub observer: Box<dyn Observer>,
@@ -47,7 +45,7 @@ impl Truth {
     }
 }
 
-/// What observers may see of a world: plain state, so that tests make it by hand.
+/// The part of a world that observers see: plain state, so that tests can construct it.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
     pub bodies: &'a Bodies,

@@ -101,15 +101,15 @@ pub struct StudyPlan {
     pub widths: Vec<LaneWidth>,
     /// Constraint orders; natural order has one lane.
     pub orders: Vec<Order>,
-    /// Treatments of impacts; on scenes where nothing bounces only the first of them.
+    /// Impact laws; scenes where nothing bounces run only the first.
     pub impacts: Vec<Impacts>,
     /// Work per step.
     pub budgets: BudgetGrid,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
-    /// What takes several values; none in a study of budgets.
+    /// The swept quantity; none in a study of budgets.
     pub sweep: Option<Sweep>,
-    /// Tolerances that take the place of the scenes' own.
+    /// Tolerances that override the scenes' own.
     pub tolerances: GivenTolerances,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
@@ -117,7 +117,7 @@ pub struct StudyPlan {
     pub timing_steps: u32,
     /// Timing runs of each setting.
     pub repeats: u32,
-    /// Shuffles the timing runs, and lays out scenes that have chance in them.
+    /// Random seed of the order of timing runs, and of scenes that have one.
     pub seed: u64,
 }
 
@@ -147,12 +147,12 @@ fn widths(native: LaneWidth) -> Vec<LaneWidth> {
 }
 
 impl StudyPlan {
-    /// A look at everything, in seconds: short runs, nothing repeated.
+    /// An overview in seconds: short runs without repeats.
     pub fn quick() -> Self {
         StudyPlan { steps: Some(60), timing_steps: 36, repeats: 1, ..StudyPlan::default() }
     }
 
-    /// Refuses what cannot be run, before anything is.
+    /// Errors: a plan that cannot be run.
     pub fn check(&self) -> Result<(), Error> {
         let empty = [
             ("scenes", self.scenes.is_empty()),

@@ -1,4 +1,4 @@
-//! What a study finds: a record per setting, and which records are on a front.
+//! Results of a study: one record per setting, and which records are on a Pareto front.
 
 use super::curve::ErrorAxis;
 use super::interleave::Sample;
@@ -58,10 +58,10 @@ pub struct Record {
     /// The first demand of the scene that was not met.
     #[serde(rename = "holds", with = "holding")]
     pub broken: Option<Broken>,
-    /// What nobody checked, in words.
+    /// Conditions that were not checked, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
-    /// What happened when it was run on, for as long as the scene deserves; none if it was not.
+    /// Result of the extended run; none without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub later: Option<Later>,
     /// Whether this width ended in the same bits as the error run.
@@ -72,7 +72,7 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
-/// What holds is `"yes"` in files; what does not has its word and its step.
+/// In files `"yes"` if the run holds, otherwise the failure and its step.
 mod holding {
     use super::Broken;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -121,7 +121,7 @@ impl Record {
         self.sample.as_ref().map_or(f64::INFINITY, Sample::cost_ns)
     }
 
-    /// What went wrong after the end of the run, in words; none if nothing did, or nobody looked.
+    /// Failure after the end of the run, in words; none if there was none, or without an extended run.
     pub fn fails_later(&self) -> Option<String> {
         let later = self.later?;
         if let Some(broken) = later.broken {
@@ -178,7 +178,7 @@ impl Record {
     }
 }
 
-/// How far a run was from a known truth.
+/// Distance of a run from a reference value.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TruthError {
     /// What is known.
@@ -214,7 +214,7 @@ pub struct Fronts {
     pub truth: bool,
 }
 
-/// Where and when a run left all bounds.
+/// Body and step at which a run diverged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Failure {
     /// Step, from 1.
@@ -224,7 +224,7 @@ pub struct Failure {
     /// Which quantity is out of bounds.
     #[serde(default)]
     pub quantity: Quantity,
-    /// What was broken.
+    /// The violated criterion.
     #[serde(default)]
     pub criterion: Criterion,
     /// m/s or rad/s; none where it is not a finite number.

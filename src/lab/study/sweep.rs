@@ -19,7 +19,7 @@ use std::str::FromStr;
 /// Most values of a sweep.
 const MOST: usize = 100;
 
-/// What can vary besides the parameters of solvers: name, unit, whose it is.
+/// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
 const QUANTITIES: [(&str, &str, Kind); 8] = [
     ("substeps", "", Kind::Substeps),
     ("iterations", "", Kind::Iterations),

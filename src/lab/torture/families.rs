@@ -12,12 +12,12 @@ use std::f64::consts::TAU;
 pub struct Family {
     /// On the command line and in tables.
     pub name: &'static str,
-    /// What is hard about it.
+    /// The difficulty, in words.
     pub summary: &'static str,
     draw: fn(&mut Pcg64Mcg) -> Draft,
 }
 
-/// What a family draws.
+/// Draws a scene of the family.
 struct Draft {
     room: Room,
     /// Besides the walls.

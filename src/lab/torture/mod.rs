@@ -62,7 +62,7 @@ pub struct Room {
     pub wall: f64,
 }
 
-/// What moves the bodies of a scene.
+/// An engine that moves the bodies of a scene.
 pub trait Engine {
     /// Advances by the scene's step. Errors: what is wrong, where the engine itself says that it diverged.
     fn step(&mut self) -> Result<(), String>;
@@ -70,7 +70,7 @@ pub trait Engine {
     fn pose(&self, body: usize) -> [[f64; 2]; 2];
 }
 
-/// What no solver may do, in the order in which a run is named after it.
+/// Failures, in order of precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -123,7 +123,7 @@ pub struct Fault {
     pub body: Option<usize>,
 }
 
-/// What became of a scene under a solver.
+/// Result of a scene under a solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outcome {
     /// The first of each verdict, in their order.
@@ -161,9 +161,9 @@ pub struct Row {
     pub family: String,
     /// Which of its scenes.
     pub number: u32,
-    /// Who ran it, with what was chosen beside its defaults.
+    /// The solver, with options that differ from its defaults.
     pub solver: String,
-    /// What became of it.
+    /// Its result.
     pub outcome: Outcome,
 }
 

@@ -178,18 +178,18 @@ impl Required {
     }
 }
 
-/// What a case measured.
+/// Result of a case.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Finding {
     /// As read from the run.
     pub measured: f64,
-    /// What it should have been.
+    /// The reference value.
     pub truth: f64,
-    /// How far off it may be, ≥ 0.
+    /// The tolerance, ≥ 0.
     pub tolerance: f64,
-    /// What else is worth knowing; often empty.
+    /// Further remarks; often empty.
     pub note: String,
-    /// Where the truth is a threshold, how it was found.
+    /// If the reference value is a threshold, the sweep that found it.
     pub sweep: Option<Sweep>,
 }
 
@@ -250,7 +250,7 @@ pub enum Failure {
     /// The simulation left all bounds.
     #[error("{0}")]
     Diverged(Divergence),
-    /// What should have been measured never happened.
+    /// The event to be measured never happened.
     #[error("not measured: {0}")]
     Unmeasured(String),
     /// The case itself is wrong.
