@@ -1,9 +1,8 @@
 //! Result files: all or nothing.
 //!
-//! A regular file is written under a temporary name in its own folder and renamed when it is whole,
-//! so that an interrupted run leaves no half file; a link is followed, and the file that it leads to is
-//! replaced. What is not a regular file (a device, a pipe, `/dev/stdout`) is written through, and
-//! `-` is standard output.
+//! A regular file is written under a temporary name in its own folder and renamed when it is complete, so an
+//! interrupted run leaves no partial file. Links are followed, and their target is replaced. Devices, pipes and
+//! `/dev/stdout` are written directly; `-` is standard output.
 //!
 //! Temporary names are kept in a list until they are gone, so that a signal can remove them
 //! ([`remove_temporaries`]).

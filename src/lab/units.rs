@@ -1,4 +1,4 @@
-//! Human-readable numbers, three digits with the prefix that fits; and reading them.
+//! Formatting of numbers with three digits and an SI prefix, and parsing.
 
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;

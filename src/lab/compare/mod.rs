@@ -1,16 +1,14 @@
-//! Two studies side by side: what became better or worse beyond the noise.
+//! Comparison of two studies: changes beyond the noise.
 //!
-//! Settings that both have are paired: scene, solver, budget, order, lanes. **Errors** have no noise: the
-//! same program gives the same bits, so whatever changed was changed. What matters is judged by the
-//! tolerance of the scene: an error below [`NEGLIGIBLE`] of it is as good as none. **Times** have: both
-//! studies went through the same steps in the same blocks, so block k is paired with block k, and the
-//! median of the ratios has an interval ([`Ratio`]). A machine may be slower on another day, or be another
-//! machine; the median ratio over all settings is what they have in common, and can be divided out.
+//! Settings in both studies are paired by scene, solver, budget, order and lanes. **Errors** have no noise: the same
+//! program gives the same bits, so every difference is a change. They are compared with the tolerance of the scene:
+//! an error below [`NEGLIGIBLE`] of it counts as zero. **Times** have noise: both studies run the same steps in the
+//! same blocks, so block k is paired with block k, and the median of the ratios has an interval ([`Ratio`]). The
+//! machines may differ in speed; the median ratio over all settings can be divided out.
 //!
-//! One binary run twice differs, too: by where its memory lies, by the clock of the processor, by what else the
-//! machine does. What of that can be seen is measured and widens every interval ([`Noise`]): a fixed loop that
-//! each study timed between its rounds says what the machine was worth, the scatter of the settings around their
-//! common ratio what placement does, and the time in which threads waited how busy it was.
+//! Two runs of one binary differ as well: by memory placement, clock rate and load. The measurable part widens every
+//! interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the machine; the scatter of
+//! the settings around their common ratio measures placement; and the time that threads waited measures the load.
 
 pub mod text;
 

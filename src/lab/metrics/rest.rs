@@ -1,4 +1,4 @@
-//! Whether what should rest does: speed, creep and when it settled.
+//! Rest: speed, creep and settling time.
 
 use super::law::{PointStep, tangent};
 use super::state::BodyState;

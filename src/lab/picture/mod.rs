@@ -1,4 +1,4 @@
-//! Frames of a simulation as pictures: what was drawn where, then SVG or PNG.
+//! Frames of a simulation as pictures: a list of drawn items, then SVG or PNG.
 //!
 //! ```text
 //! World ──► Stage, Frame ──► Picture ──┬─► svg

@@ -1,4 +1,4 @@
-//! Whole runs in a compact file, and the page that plays them.
+//! Recordings: whole runs in a compact file, and the page that plays them.
 //!
 //! # The file, version 1
 //!

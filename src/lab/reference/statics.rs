@@ -1,4 +1,4 @@
-//! Statics: is rest possible at all, and how much may be added before it is not?
+//! Statics: whether rest is possible, and how much load may be added before it is not.
 //!
 //! Rest under loads f (N·s over a step, or N) is possible exactly if impulses within their friction
 //! cones balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. So the answer needs no time step and no

@@ -1,4 +1,4 @@
-//! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
+//! Reports: from [`Record`]s to tables, files and pages. Nothing here runs a simulation.
 
 #[doc(hidden)]
 pub mod answer;

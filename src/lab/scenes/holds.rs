@@ -1,9 +1,8 @@
 //! Conditions on a run, and the words for their violation.
 //!
-//! A run that fell has fallen, however fast it was and however small its errors are: nobody wants
-//! it. Every scene demands that its kinetic energy has a source (see
-//! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes
-//! through a static or kinematic one; what else it demands stands in its row of the catalog.
+//! A run that fails a condition is useless, however fast it is and however small its errors are. Every scene requires
+//! that its kinetic energy has a source (see [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up))
+//! and that no body passes through a static or kinematic one; further conditions are in its row of the catalog.
 
 use super::truth::View;
 use crate::engine::bodies::BodyKind;

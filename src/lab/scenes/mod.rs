@@ -1,8 +1,7 @@
-//! Scenes: their file format, a catalog of them, what is known about each, what it demands of a
-//! run and how wrong that may be.
+//! Scenes: file format, catalog, known values, conditions on a run, and tolerances.
 //!
-//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 or C11
-//! in the scene files are those of the list of hard cases.
+//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 in the scene files are those of `simpulse
+//! verify`.
 
 mod arch;
 mod bounce;

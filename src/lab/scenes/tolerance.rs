@@ -1,7 +1,7 @@
 //! Tolerances of a scene: limits on errors, with their reasons.
 //!
-//! They say what would be noticed, or what no solver can avoid, and not what some solver reaches: it
-//! is an answer, too, that none of those tried does.
+//! They follow from what is visible or what no solver can avoid, not from what some solver reaches. It is a valid
+//! result that no solver is within them.
 
 use super::format::Scene;
 use crate::engine::bodies::{BodyDef, BodyKind};

@@ -1,8 +1,8 @@
-//! Known truths, and observers that measure how far a world is from them.
+//! Known values, and observers that measure the distance of a world from them.
 //!
-//! An observer sees a world after each step and nothing else: not which solver ran, nor how long it took. It reads
-//! the `f32` state and computes in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is
-//! known exactly, the observer compares with that, so that a correct solver's error is rounding, not discretization.
+//! An observer sees only the world after each step, not the solver or its time. It reads the `f32` state and computes
+//! in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is known, the observer compares with
+//! that, so that a correct solver's error is rounding, not discretization.
 
 use super::expect::Measure;
 use super::format::Scene;

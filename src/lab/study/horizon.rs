@@ -1,8 +1,7 @@
-//! Runs to the horizon of a scene: whether what would be named stands for a minute.
+//! Extended runs: checks that recommended settings stand for a minute.
 //!
-//! A stack that stands for the five seconds of a run may fall in the thirteenth. Nobody wants it, however cheap
-//! it is, and nobody would find out from a run that ends before. So the settings that an [`Answer`] would name
-//! are run on, untimed and on all cores, and those that fail make place for the next.
+//! A stack that stands for the five seconds of a run may fall after thirteen. So the settings that an [`Answer`]
+//! would name are extended, untimed and on all cores, and those that fail are replaced by the next.
 
 use super::answer::{Answer, same};
 use super::record::Later;

@@ -1,10 +1,9 @@
-//! Timing: all settings of a scene take turns, in blocks of some steps.
+//! Interleaved timing: all settings of a scene take turns, in blocks of steps.
 //!
-//! A machine's clock rate and its other guests change from second to second, so settings that are
-//! timed one after another are compared with the weather. Here every setting of a scene has a world
-//! of its own, and in every round each world goes the same block of steps, in an order that rotates
-//! from round to round. Settings are compared by the blocks of the same round ([`super::compare`]),
-//! so what changes slowly changes both.
+//! Clock rate and load of a machine change from second to second, so times measured one setting after another are not
+//! comparable. Here every setting of a scene has its own world, and in every round each world runs the same block of
+//! steps, in an order that rotates from round to round. Settings are compared by blocks of the same round
+//! ([`super::compare`]), so slow changes affect both.
 //!
 //! ```text
 //! block:  ○ ● ● ● ● ● ● ● ● ◐     ○ meets cold caches, not timed

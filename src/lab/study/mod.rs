@@ -1,11 +1,9 @@
-//! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
+//! Studies: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
-//! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
-//! settings of a scene in common rounds, alone on the machine. All
-//! colored widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
-//! Settings that would be named are then [run on](horizon), untimed and on all cores, for as long as the scene
-//! deserves.
+//! Every setting runs twice. *Errors* come from one run with impulses recorded, on all cores in parallel, because no
+//! clock is read. *Times* come from [interleaved timing](interleave) of all settings of a scene in common rounds, on
+//! one core. All colored widths and the error run must agree to the last bit ([`Record::bits_equal`]). Settings that
+//! would be recommended are then [extended](horizon) to a minute, untimed and on all cores.
 
 #[doc(hidden)]
 pub mod answer;

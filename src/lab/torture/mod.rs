@@ -1,21 +1,20 @@
-//! A campaign: scenes drawn at random from families, and what no solver may do in any of them.
+//! Random scenes, drawn from families, and checks that every solver has to pass.
 //!
-//! A solver is tuned on scenes that somebody thought of. Here [`families`] draw others, by seed; each runs
-//! under every solver, and a [`judge`] looks on from outside, in double precision, at poses alone: whatever
-//! moves the bodies, this crate's solvers or another engine, is an [`Engine`] to it. What fails is
-//! [minimized](minimise) into a scene file.
+//! Solvers are tuned on known scenes. Here [`families`] draw others, by seed. Each runs under every solver, and a
+//! [`judge`] checks poses only, in double precision: it works for any [`Engine`], this crate's solvers or others.
+//! Failing scenes are [minimized](minimise) into scene files.
 //!
-//! | verdict | what is forbidden |
+//! | verdict | failure |
 //! |---|---|
-//! | diverged | a speed or a place out of all bounds |
-//! | energy | more energy than gravity, kinematic bodies and the start lend, see [`judge::Ledger`] |
-//! | flung | one body much faster than anything in the scene could make it |
+//! | diverged | a speed or a position out of bounds |
+//! | energy | more energy than gravity, kinematic bodies and the initial state provide, see [`judge::Ledger`] |
+//! | flung | a body much faster than anything in the scene can explain |
 //! | escaped | a body beyond the middle of the walls that close the scene |
 //! | sunk | at the end, two bodies past the middle of the thinner one |
-//! | restless | still in motion when nothing has driven it for seconds |
+//! | restless | still in motion after seconds without a drive |
 //!
-//! A step that takes longer than the time that it simulates is counted as late: it depends on the machine,
-//! so it is told and fails nothing.
+//! A step that takes longer than the time that it simulates counts as late. That depends on the machine, so it is
+//! reported but is not a failure.
 
 pub mod families;
 #[doc(hidden)]
@@ -34,16 +33,16 @@ use families::{FAMILIES, Family};
 use judge::Judge;
 use std::time::Instant;
 
-/// A scene with what is demanded of it.
+/// A scene with its conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// [`Family::name`].
     pub family: &'static str,
-    /// Which of its scenes, from 0.
+    /// Number of the scene in its family, from 0.
     pub number: u32,
-    /// What is simulated.
+    /// The scene.
     pub scene: Scene,
-    /// What closes it.
+    /// The walls around it.
     pub room: Room,
     /// Whether it should be at rest in its last second.
     pub rests: bool,

@@ -1,4 +1,4 @@
-//! Where cases are run: worlds of one solver, and readings of their state in `f64`.
+//! Tools of the cases: worlds of one solver, and measurements of their state in `f64`.
 
 use super::{Failure, Finding, Sweep, SweepRow};
 use crate::engine::bodies::BodyKind;
