@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_in_use_is_refused_by_name_and_free_afterwards() {
+    fn a_folder_in_use_is_refused_by_name_and_free_afterward() {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::of(folder.path()).unwrap();
         let message = Lock::of(folder.path()).unwrap_err().to_string();

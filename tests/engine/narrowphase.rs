@@ -168,7 +168,7 @@ fn rounded_corners_meet_along_the_line_between_them() {
 }
 
 #[test]
-fn centred_circles_have_no_lever_arm() {
+fn centered_circles_have_no_lever_arm() {
     let (small, large) = (Shape::circle("c", Vec2::ZERO, 0.3), Shape::circle("c", Vec2::ZERO, 7.0));
     let (small, large) = (small.expect("valid"), large.expect("valid"));
     for k in 0..100 {

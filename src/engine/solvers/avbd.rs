@@ -107,8 +107,8 @@ impl Solver for Avbd {
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h) = (passes.budget(), passes.h());
         let [alpha, beta, gamma] = [0, 1, 2].map(|i| passes.parameter(i));
-        let stabilises = budget.position_iterations > 0;
-        let (alpha, keep) = if stabilises { (1.0, 1.0) } else { (alpha, alpha * gamma) };
+        let stabilizes = budget.position_iterations > 0;
+        let (alpha, keep) = if stabilizes { (1.0, 1.0) } else { (alpha, alpha * gamma) };
         self.assign(passes);
         for substep in 0..budget.substeps {
             passes.integrate_velocities();

@@ -37,7 +37,7 @@ const ASPECT: [f64; 2] = [0.3, 0.95];
 fn ramp(share: f64) -> Color {
     let place = share.clamp(0.0, 1.0) * (RAMP.len() - 1) as f64;
     let i = (place as usize).min(RAMP.len() - 2);
-    RAMP[i].towards(RAMP[i + 1], place - i as f64)
+    RAMP[i].toward(RAMP[i + 1], place - i as f64)
 }
 
 /// The least of 1, 2, 5 × 10ⁿ that is no less than `value`; 0 for 0.
@@ -237,13 +237,13 @@ fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: 
         picture.text([x, y], 13.0, anchor, INK, text);
     };
     // A length.
-    let metres = round_down(0.6 * quarter / view.scale);
-    let (x, bar) = (column(0), metres * view.scale);
+    let meters = round_down(0.6 * quarter / view.scale);
+    let (x, bar) = (column(0), meters * view.scale);
     picture.line([x, bar_y], [x + bar, bar_y], INK, 2.0);
     for end in [x, x + bar] {
         picture.line([end, bar_y - 5.0], [end, bar_y + 5.0], INK, 1.4);
     }
-    text(picture, x, text_y, Anchor::Start, si_short(metres, "m"));
+    text(picture, x, text_y, Anchor::Start, si_short(meters, "m"));
     // Penetration.
     let (x, wide) = (column(1), 0.62 * quarter);
     if deepest > 0.0 {

@@ -27,7 +27,7 @@ impl Color {
     }
 
     /// The color at `share` of the way to another, in [0, 1].
-    pub fn towards(self, other: Color, share: f64) -> Self {
+    pub fn toward(self, other: Color, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
         let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
         Color(mix(self.0, other.0), mix(self.1, other.1), mix(self.2, other.2), mix(self.3, other.3))

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_topples_where_its_centre_leaves_the_base() {
+    fn a_box_topples_where_its_center_leaves_the_base() {
         // A unit box on a rough slope: 45°.
         for (slope, truth) in [(0.785, true), (0.786, false)] {
             assert_eq!(rests(&block_on_incline(slope, 10.0)), truth, "{slope}");

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sixty_four_solvers_look_different_and_neighbours_in_both() {
+    fn sixty_four_solvers_look_different_and_neighbors_in_both() {
         for i in 0..64 {
             assert!((0..i).all(|j| Style::at(i) != Style::at(j)), "{i}");
             let (a, b) = (Style::at(i), Style::at(i + 1));

@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn four_impacts_from_ten_metres_are_fast_enough() {
+    fn four_impacts_from_ten_meters_are_fast_enough() {
         assert_eq!(counted(10.0, 0.5), 4);
     }
 

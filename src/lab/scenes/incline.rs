@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_start_is_zero_and_a_metre_is_a_metre() {
+    fn the_start_is_zero_and_a_meter_is_a_meter() {
         let (sin, cos) = (SLOPE.sin(), SLOPE.cos());
         let at = |d: f64| {
             let body = [(0.5 * sin + d * cos) as f32, (0.5 * cos - d * sin) as f32];

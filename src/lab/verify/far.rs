@@ -10,7 +10,7 @@ pub(super) static CASES: &[Case] = &[
         "distance of ten boxes at 1 km to their twins at the origin, all steps",
         "m",
         "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
-        kilometre,
+        kilometer,
         Yes("contacts use differences of positions, taken before rounding"),
     ),
     Case::new(
@@ -34,7 +34,7 @@ fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
 }
 
 /// B15. At a kilometer, where the spacing of `f32`s is 6.1e-5 m.
-fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
+fn kilometer(lab: &Lab) -> Result<Finding, Failure> {
     twins(lab, 3)
 }
 

@@ -309,7 +309,7 @@ fn descend<L: Lanes>(lanes: &BodyLanes, [bodies, ends]: [&[Block]; 2], on: &mut 
                 let rows = rows(record, p, x, o, kept, alpha);
                 let is_there = record[3 + POINT * p + IS_THERE];
                 // A row at its bound keeps its stiffness: without it a body would go past where the row
-                // takes hold again, and back, for ever.
+                // takes hold again, and back, forever.
                 let rubs = record[2].select_positive(kept[TANGENT_PENALTY], zero);
                 for (axis, penalty) in [kept[NORMAL_PENALTY], rubs].into_iter().enumerate() {
                     let [jx, jy, jw] = rows.jacobian[axis];

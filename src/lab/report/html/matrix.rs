@@ -49,7 +49,7 @@ fn shade(margin: f64, passed: bool) -> (String, bool) {
         // A thousand times the tolerance is the darkest.
         false => (BEYOND, margin.max(1.0).log10() / 3.0),
     };
-    let Color(r, g, b, _) = from.towards(to, share);
+    let Color(r, g, b, _) = from.toward(to, share);
     let light = 0.3 * f64::from(r) + 0.6 * f64::from(g) + 0.1 * f64::from(b);
     (format!("#{r:02x}{g:02x}{b:02x}"), light < 130.0)
 }

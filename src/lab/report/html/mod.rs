@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn the_matrix_is_coloured_by_margin() {
+    fn the_matrix_is_colored_by_margin() {
         let json = r#"{"cases":[{"case":"A1","what":"slides","required":true}],"results":[
             {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"truth":1,"tolerance":2},
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
