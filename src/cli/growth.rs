@@ -23,10 +23,10 @@ use std::process::ExitCode;
 
 /// Measure the cost of a contact from a thousand contacts to a million
 ///
-/// Builds the scene in several sizes, settles each for some steps, holds them still and times whole steps of all of
-/// them in turn. A scene that has a size is built larger; a scene with a given size, or without one, is copied side
-/// by side into many small islands. Prints time per contact and phase with the errors, memory per contact and per
-/// body, and whether each phase stays flat (latency- or compute-bound), steps where its data leave a cache
+/// Builds the scene in several sizes, settles each for some steps, freezes them and times whole steps of all of them,
+/// interleaved. A scene that has a size is built larger; a scene with a given size, or without one, is copied side by
+/// side into many small islands. Prints time per contact and phase with the errors, memory per contact and per body,
+/// and whether each phase stays flat (latency- or compute-bound), steps where its data leave a cache
 /// (bandwidth-bound), or grows faster than n log n. Writes growth.csv and growth.svg.
 ///
 /// From one size to the next, the cost per contact may grow by as much as memory of the phase's
@@ -52,7 +52,7 @@ pub struct GrowthArgs {
     /// Lanes
     #[command(flatten)]
     pub lanes: Lanes,
-    /// Steps before a scene is held still
+    /// Steps before a scene is frozen
     #[arg(long, default_value_t = 8, value_name = "STEPS")]
     pub settle: u32,
     /// Timing runs per size

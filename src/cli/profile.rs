@@ -18,9 +18,9 @@ use std::process::ExitCode;
 
 /// Repeat one phase of a step and compare it with the roofline
 ///
-/// Settles the scene, holds its state still and repeats one phase on it, or every one in turn. Between
-/// repeats, it measures with the same clock how fast memory can be read and updated in a
-/// working set of the same size, and how many multiply-adds a core does at this lane width.
+/// Settles the scene, freezes its state and repeats one phase on it, or all phases in turn. Between repeats, it
+/// measures with the same clock how fast memory can be read and updated in a working set of the same size, and how
+/// many multiply-adds a core does at this lane width.
 ///
 /// Bytes are those that the code requests: 4 per float of a record read and again per impulse written, 4 per index,
 /// 32 per body row gathered, 16 per body written back; for pairs, collide and color, each input and output once.
