@@ -229,6 +229,9 @@ fn arrow(picture: &mut Picture, from: [f64; 2], to: [f64; 2], width: f64) {
     picture.items.push(Item::Polygon { points, fill: Some(IMPULSE), stroke: None, title: String::new() });
 }
 
+/// Width of a color bar with room for a label in the middle (pixels).
+const THREE_LABELS: f64 = 140.0;
+
 fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: (f64, f64), dt: f64) {
     let (bar_y, text_y, quarter) =
         (top + 34.0, top + 58.0, (f64::from(picture.size[0]) - 2.0 * MARGIN) / 4.0);
@@ -254,7 +257,9 @@ fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: 
             picture.rectangle([left, bar_y - 7.0], [step + 0.3, 14.0], ramp(share));
         }
         text(picture, x, text_y, Anchor::Start, "0".into());
-        text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * deepest, "m"));
+        if wide > THREE_LABELS {
+            text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * deepest, "m"));
+        }
         text(picture, x + wide, text_y, Anchor::End, si_short(deepest, "m"));
         text(picture, x, bar_y - 14.0, Anchor::Start, "penetration".into());
     } else {
