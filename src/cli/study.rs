@@ -28,8 +28,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Below the help.
 pub const EXAMPLES: &str = "\
-Without any budget option, each solver runs at half its standard budget, at that budget,
-and at its double. With some, every combination runs; what a solver ignores is left out.
+Without any budget option, each solver runs at half, once and twice its standard budget. With
+budget options, every combination runs; values that a solver ignores are dropped.
 A sweep runs at each solver's standard budget, in colored order at the widest native lanes,
 unless other options say so.
 

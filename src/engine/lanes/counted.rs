@@ -73,7 +73,7 @@ fn book(kind: Kind) {
 pub struct Counted(pub f32);
 
 impl Counted {
-    /// What this thread has done since it last asked.
+    /// Operations of this thread since the last call.
     pub fn take() -> Operations {
         BOOK.take()
     }

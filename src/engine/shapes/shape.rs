@@ -277,9 +277,8 @@ impl Shape {
         best + self.radius() * direction.normalize_or_zero()
     }
 
-    /// Half the least width of the shape (m): deeper overlap has passed its middle.
-    /// Infinite for a segment, which has no inside, so that the minimum over a
-    /// pair is that of the other shape.
+    /// Half the smallest width of the shape (m); deeper overlap is past its middle. Infinite for a segment, which has
+    /// no inside, so the minimum over a pair is that of the other shape.
     pub fn min_half_extent(&self) -> f32 {
         match self {
             Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => *radius,

@@ -113,7 +113,7 @@ pub struct StudyPlan {
     pub steps: Option<u32>,
     /// Most steps of a timing run.
     pub timing_steps: u32,
-    /// Timing runs of each setting.
+    /// Timing runs per setting.
     pub repeats: u32,
     /// Random seed of the order of timing runs, and of scenes that have one.
     pub seed: u64,
