@@ -248,7 +248,7 @@ mod tests {
         let mut other = of(&["b"], &[]);
         other.settings["seed"] = 9.into();
         let message = StudyFile::merged(vec![of(&["a"], &[]), other], &names).unwrap_err().to_string();
-        assert_eq!(message, "merge: two was run with other settings than one");
+        assert_eq!(message, "merge: two was run with different settings than one");
     }
 
     #[test]

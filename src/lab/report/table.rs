@@ -250,7 +250,7 @@ mod tests {
         assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
-        assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
+        assert!(text.contains("state differs from the error run: pgs, 1 sub, 8"));
         // No cell is blank.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();
