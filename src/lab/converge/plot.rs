@@ -26,7 +26,7 @@ const BOTTOM: i32 = 44;
 const RIGHT: i32 = 16;
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
-/// Distinct with any color vision (Okabe and Ito), and a grey.
+/// Distinct with any color vision (Okabe and Ito), and a gray.
 const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -99,7 +99,7 @@ fn rows(report: &Report) -> Vec<Row> {
             reached: |c| &c.rigid,
         });
         rows.push(Row {
-            title: format!("Each solver's own law, {start} start"),
+            title: format!("Solver's own law, {start} start"),
             start,
             residual: |p| p.own,
             reached: |c| &c.own,
@@ -234,7 +234,7 @@ fn decade(exponent: i32) -> String {
         n => format!("1e{n}"),
     }
 }
-/// What is said of lanes that are wider than what this build has instructions for.
+/// Note on lanes wider than the native ones of this build.
 fn emulated(lanes: usize) -> &'static str {
     if lanes > native_width().lanes() { ", emulated" } else { "" }
 }

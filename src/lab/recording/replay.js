@@ -232,19 +232,19 @@
       }
       // A bar of a round length.
       const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
-      const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
+      const meters = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
       c.fillStyle = "rgba(255,255,255,.8)";
-      c.fillRect(6, h - 30, metres * scale + 12, 26);
+      c.fillRect(6, h - 30, meters * scale + 12, 26);
       c.strokeStyle = c.fillStyle = "#1f2933";
       c.lineWidth = 1.5;
       c.beginPath();
       c.moveTo(12, h - 14);
       c.lineTo(12, h - 10);
-      c.lineTo(12 + metres * scale, h - 10);
-      c.lineTo(12 + metres * scale, h - 14);
+      c.lineTo(12 + meters * scale, h - 10);
+      c.lineTo(12 + meters * scale, h - 14);
       c.stroke();
       c.font = "11px system-ui, sans-serif";
-      c.fillText(si(metres, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
+      c.fillText(si(meters, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
     }
 
     // Limits of each curve over all recordings, so that panels compare.

@@ -9,11 +9,11 @@ use crate::lab::study::curve::solvers_of;
 use crate::lab::study::sweep::Swept;
 
 const LEGEND: &str = "\
-A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and three errors
-keep the tolerances of the scene (`simpulse scene NAME` lists them with their reasons): the greatest
+A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and all three errors
+are within the scene's tolerances (`simpulse scene NAME` lists them with their reasons): the maximum
 penetration; the contact-law residual, rms, in body weights; the distance to the scene's reference value
-(– none is known).  budget: substeps, and in each so many velocity, relaxation and position sweeps.
-µs/step: median, ± median deviation of a repeat; all settings of a scene were timed in turns.
+(– if none is known).  budget: substeps; then velocity, relaxation and position sweeps per substep.
+µs/step: median, ± median deviation of a repeat; the settings of a scene were timed interleaved.
 ";
 
 /// Whether these are records of a sweep.
@@ -82,7 +82,7 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
     text + &finish(rows, 1)
 }
 
-/// The values at which a solver is good enough, and at which it holds at all.
+/// The values at which a solver is good enough, and those at which it holds.
 fn reach(scene: &[Record], solver: &str, swept: Swept) -> String {
     let values = |keep: &dyn Fn(&Record) -> bool| -> Vec<f64> {
         let mut values: Vec<f64> =

@@ -1,4 +1,4 @@
-//! Which points bear, and what their loads of the last step do to the accelerations of bodies.
+//! Finds closed points, and applies their loads of the last step to the accelerations of bodies.
 //!
 //! A point is closed if its gap is a fraction of the slop, it moves along its normal no faster than what forces make of
 //! rest in a step, v ≤ dt (|a_a| + |a_b|), and it is still closed in the middle of the step: a load acts until its end, and one that acts
@@ -134,7 +134,7 @@ pub(super) fn arms_of<L: Lanes>(record: &[L], layout: &Layout, p: usize) -> [[L;
     [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])]
 }
 
-/// What impulses along n and t (N·s) do to a and b.
+/// Applies impulses along n and t (N·s) to a and b.
 #[inline(always)]
 pub(super) fn push<L: Lanes>([a, b]: [&mut [L; 8]; 2], [nx, ny]: [L; 2], arms: [[L; 2]; 2], [n, t]: [L; 2]) {
     let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));

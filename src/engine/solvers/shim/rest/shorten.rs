@@ -19,9 +19,9 @@
 //!
 //! # Overlap that was placed
 //!
-//! Bodies may be put into a world where they overlap. No load has made that overlap, and springs that see it throw bodies apart
-//! in the first step: a house of cards 2 mm in each other loses its top. So a contact that is found in the first step of one of its
-//! bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
+//! Bodies may be placed so that they overlap. No load has caused that overlap, and springs that see it throw bodies
+//! apart in the first step: a house of cards 2 mm in each other loses its top. So a contact that is found in the
+//! first step of one of its bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
 //!
 //! ```text
 //! d₀ ← max(d₀, s) τ/(τ + dt)
@@ -29,15 +29,16 @@
 //!
 //! # How deep springs see it
 //!
-//! Springs bear a load however deep its contact is ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap that no load has made is
-//! pushed out at the push speed alone: at the beginning of a step springs see a contact no deeper than
+//! Springs carry their load at any depth ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap
+//! that no load has made is pushed out at the push speed alone: at the beginning of a step springs see a contact no
+//! deeper than
 //!
 //! ```text
 //! u/(γ_m β) + 20 sag
 //! ```
 //!
-//! the depth from which the push speed u is all they give, and more as they bear a load. So what is
-//! thrown into another body is not thrown back.
+//! the depth at which they reach the push speed u, plus a depth that grows with their load. So a body thrown into
+//! another is not thrown back.
 
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
@@ -78,7 +79,7 @@ const EARNED: f32 = 20.0;
 /// second; shorter, it is thrown over at 240.
 const PLACED_TIME: f32 = 0.1;
 
-/// Batches between asking for contacts and reading them.
+/// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
 
 impl Pass for Shorten {
