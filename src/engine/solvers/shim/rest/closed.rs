@@ -102,12 +102,12 @@ fn close<L: Lanes>(
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // What is left of impulses is what statics does not know.
             let borne = if p == 0 { borne_0 } else { borne_1 }.max(zero);
+            let part = last[2 * p].select_positive(borne / last[2 * p], one);
             let at = layout.at(p, layout.normal_impulse);
-            record[at] = borne.neg_mul_add(h, record[at]);
+            record[at] = part.neg_mul_add(impulse[0], record[at]);
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
-                let part = last[2 * p].select_positive(borne / last[2 * p], zero);
-                record[at] = (part * last[2 * p + 1]).neg_mul_add(h, record[at]);
+                record[at] = part.neg_mul_add(impulse[1], record[at]);
             }
             push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
         }
@@ -119,6 +119,8 @@ fn close<L: Lanes>(
         let calm = (placed.max(zero) + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
         let calm = (L::splat(CALM_SPEED) - fastest).select_positive(calm, zero);
         let at_once = calm - L::splat(CALM_TIME);
+        let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
+        let at_once = is_pair.select_positive(at_once, zero);
         let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
         let placed = (-placed).select_positive(placed, calm);
         store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [placed, lead, borne[0], borne[1]]);

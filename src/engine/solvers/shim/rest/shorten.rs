@@ -24,7 +24,7 @@
 //! first step of one of its bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
 //!
 //! ```text
-//! d₀ ← max(d₀, s) τ/(τ + dt)
+//! d₀ ← min(max(d₀, s) τ/(τ + dt) + 20 µm, 0)
 //! ```
 //!
 //! # How deep springs see it
@@ -82,6 +82,9 @@ const PLACED_TIME: f32 = 0.1;
 /// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
 
+/// What goes of placed overlap in a step beyond that, so that it ends (m).
+const ENDS: f32 = 2e-5;
+
 impl Pass for Shorten {
     fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
         // Loads, separation and mass of each point, and the index of the contact.
@@ -129,7 +132,7 @@ fn shorten<L: Lanes>(
         if (-placed).any_positive() {
             let lowest = (0..layout.points)
                 .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
-            let goes = keeps * placed.max(lowest);
+            let goes = keeps.mul_add(placed.max(lowest), L::splat(ENDS)).min(zero);
             placed = (-placed).select_positive(goes, placed);
         }
         let is_single = if layout.points == 2 {
