@@ -234,7 +234,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         out += &format!("wrote {}\n", path.display());
     }
     match args.json {
-        true => print_json(&growth_json(&rows, &verdicts)),
+        true => print_json(&growth_json(&rows, &verdicts, waiting)),
         false => print(&out),
     }
 }

@@ -347,8 +347,8 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "phase_ns": phases,
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
-        "holds": found.broken.map_or("yes".to_string(), |b| b.to_string()),
-        "broken": value(&found.broken)?,
+        "holds": found.broken.map_or("yes", |b| b.mark.word()),
+        "failed_step": found.broken.map(|b| b.step),
         "not_checked": found.unchecked,
     }))
 }

@@ -89,7 +89,7 @@ pub struct StudyArgs {
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
-    /// Timing runs of each setting; the best of a scene run twice as often again [default: 3]
+    /// Rounds of timing, common to all settings of a scene [default: 3]
     #[arg(long)]
     pub repeats: Option<u32>,
     /// Random seed: of scenes that have one, and of the order of timing runs

@@ -79,7 +79,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
             (p.sweeps > 0).then_some(p.sweeps as f64)
         })?;
         panel(&root, (PANEL.0, y + HEADING), report, &solvers, row, "time (s), set-up excluded", |c, p| {
-            Some(1e-9 * c.ns_per_iteration? * f64::from(p.iterations)).filter(|&t| t > 0.0)
+            Some(1e-9 * c.iteration?.median_ns * f64::from(p.iterations)).filter(|&t| t > 0.0)
         })?;
     }
     root.present()?;

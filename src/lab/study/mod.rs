@@ -54,7 +54,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "friction_ramp",
     "arch",
     "card_house",
-    "pyramid:40",
+    "pyramid:30",
     "circle_pile:500",
 ];
 
