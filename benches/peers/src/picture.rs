@@ -8,7 +8,7 @@ use crate::race::Outcome;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use simpulse::lab::report::axes::{
-    Area, Drawn, Edges, INK, Scale, color, marker, wrapped, write, write_upwards,
+    Area, Drawn, Edges, INK, Scale, color, marker, with_dark, wrapped, write, write_upwards,
 };
 use simpulse::lab::report::units::si_short;
 
@@ -43,7 +43,7 @@ fn engine(contender: &Contender) -> Option<usize> {
 pub fn svg(scenes: &[(String, Vec<Outcome>)]) -> Result<String, String> {
     let mut text = String::new();
     draw(scenes, &mut text).map_err(|e| format!("peers.svg: {e}"))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {

@@ -3,7 +3,7 @@
 use super::growth::{Change, Row, Verdict};
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, write, write_upwards};
+use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, with_dark, write, write_upwards};
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, ratio, si};
 use plotters::element::DashedPathElement;
@@ -184,7 +184,7 @@ type Curve = (String, Vec<f64>);
 pub fn svg(rows: &[Row], title: &str) -> Result<String, Error> {
     let mut text = String::new();
     draw(rows, title, &mut text).map_err(|e| Error::invalid("growth.svg", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(rows: &[Row], title: &str, text: &mut String) -> Drawn {
