@@ -40,7 +40,7 @@ Examples:
   simpulse advise incline_slip --max-reference 1mm --solvers soft_step,pgs --lanes 8 --json > advice.json")]
 pub struct AdviseArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Penetration allowed, such as 1mm: what 99 % of contact points keep, and where the scene has to rest the deepest
     /// of the last second

@@ -41,7 +41,7 @@ Examples:
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
 pub struct RunArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Solver, budget and parameters
     #[command(flatten)]

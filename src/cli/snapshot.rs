@@ -29,7 +29,7 @@ Examples:
   simpulse snapshot arch --step 60 --solver pgs --velocity-iterations 4 -o arch.png --width 1600")]
 pub struct SnapshotArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// The step after which the frame is taken; 0 is the start
     #[arg(long, value_name = "N", default_value_t = 60)]

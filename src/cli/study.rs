@@ -45,7 +45,7 @@ Examples:
 #[derive(Args, Debug)]
 pub struct StudyArgs {
     /// Scenes
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = NonEmptyStringValueParser::new(), help = values::scenes_help())]
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = values::scene(), help = values::scenes_help())]
     pub scenes: Vec<String>,
     /// Solvers
     #[command(flatten)]

@@ -7,11 +7,12 @@ use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
+use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// A member of `--solvers`.
 #[derive(Clone, Debug)]
@@ -63,6 +64,14 @@ pub fn left_out(ran: &[&'static Variant]) -> String {
         [] => String::new(),
         names => format!("left out (--solvers all runs every solver): {}\n", names.join(", ")),
     }
+}
+
+/// The parser of scenes: a name, or the path of a file, which need not be text.
+pub fn scene() -> impl TypedValueParser<Value = String> {
+    OsStringValueParser::new().try_map(|given| match given.is_empty() {
+        true => Err("a name or a file is required"),
+        false => Ok(files::text_of(given)),
+    })
 }
 
 /// Help for one scene.
