@@ -35,14 +35,16 @@ pub fn text(report: &Report) -> String {
     align(&mut table);
     out += &format!("{table}\n");
     if report.curves.iter().any(|c| c.iteration.is_some()) {
-        out += "\nTime to a residual, set-up excluded; an iteration: median over the rounds, mean and longest:\n";
-        let mut table = self::table(&["per iteration", "mean", "longest"]);
+        out +=
+            "\nTime to a residual, set-up excluded; an iteration: median over the rounds, and quartiles:\n";
+        let mut table = self::table(&["per iteration", "quartiles"]);
         for (curve, law, reached) in each() {
             let Some(each) = curve.iteration else { continue };
             let mut row = head(curve, law);
             let time = |i: usize| duration(each.median_ns * f64::from(curve.points[i].iterations));
             row.extend(reached.first.map(|i| i.map_or(NEVER.into(), time)));
-            row.extend([each.median_ns, each.mean_ns, each.longest_ns].map(duration));
+            let [low, high] = each.quartiles_ns.map(duration);
+            row.extend([duration(each.median_ns), format!("{low} to {high}")]);
             table.add_row(row);
         }
         align(&mut table);

@@ -2,6 +2,7 @@
 
 use super::Schedule;
 use super::replay::{Replay, Start};
+use crate::lab::study::interleave::quantile;
 
 /// Shortest difference of two runs that is timed (ns), far above the clock's resolution.
 const TIMED_NS: f64 = 50_000.0;
@@ -11,10 +12,8 @@ const TIMED_NS: f64 = 50_000.0;
 pub struct IterationTime {
     /// Median over the rounds.
     pub median_ns: f64,
-    /// Mean over them.
-    pub mean_ns: f64,
-    /// The longest of them.
-    pub longest_ns: f64,
+    /// Quartiles over them: each round is a difference of two runs, so that a mean would be of what interrupted them.
+    pub quartiles_ns: [f64; 2],
 }
 
 /// Time of an iteration of each case.
@@ -37,9 +36,7 @@ pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<I
         .into_iter()
         .map(|mut s| {
             s.sort_by(f64::total_cmp);
-            let mean_ns = s.iter().sum::<f64>() / s.len().max(1) as f64;
-            let longest_ns = s.last().copied().unwrap_or(0.0);
-            IterationTime { median_ns: s[s.len() / 2], mean_ns, longest_ns }
+            IterationTime { median_ns: s[s.len() / 2], quartiles_ns: [0.25, 0.75].map(|p| quantile(&s, p)) }
         })
         .collect()
 }
