@@ -21,7 +21,7 @@ const HEADING: i32 = 30;
 /// Space for labels left of and below a panel, and to its right.
 const LEFT: i32 = 64;
 const BOTTOM: i32 = 44;
-const RIGHT: i32 = 16;
+const RIGHT: i32 = 28;
 /// Decades of residuals that are shown; what is outside is drawn at the edge.
 const DECADES: (i32, i32) = (-8, 1);
 
