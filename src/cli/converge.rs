@@ -9,6 +9,8 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::reference::frozen::Frozen;
+use crate::lab::report::axes::with_dark;
+use crate::lab::report::style::Style;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -112,7 +114,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let files = [
         ("converge.csv", table::csv(&report)?),
         ("converge.json", json.clone()),
-        ("converge.svg", plot::svg(&report)?),
+        ("converge.svg", with_dark(&plot::svg(&report, &|solver| Style::of(solver).rgb())?)),
     ];
     for (name, text) in &files {
         files::write(&args.out.join(name), text.as_bytes())?;

@@ -9,11 +9,15 @@ use super::warm::WarmStart;
 use super::{Curve, CurvePoint, Reached, Report};
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, GRID, INK, solver_color, with_dark, write};
+use crate::lab::picture;
 use crate::lab::units::si_short;
+use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 const PANEL: (i32, i32) = (560, 300);
 const LEGEND_LINE: i32 = 20;
@@ -22,6 +26,8 @@ const HEADING: i32 = 30;
 const LEFT: i32 = 64;
 const BOTTOM: i32 = 44;
 const RIGHT: i32 = 28;
+const INK: RGBColor = RGBColor(40, 40, 40);
+const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Decades of residuals that are shown; what is outside is drawn at the edge.
 const DECADES: (i32, i32) = (-8, 1);
 
@@ -35,14 +41,17 @@ struct Row {
     reached: fn(&Curve) -> &Reached,
 }
 
+/// The color of a solver by its name.
+pub type Colors<'a> = &'a dyn Fn(&str) -> picture::Color;
+
 /// The picture as SVG text.
-pub fn svg(report: &Report) -> Result<String, Error> {
+pub fn svg(report: &Report, colors: Colors) -> Result<String, Error> {
     let mut text = String::new();
-    draw(report, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
-    Ok(with_dark(&text))
+    draw(report, colors, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
+    Ok(text)
 }
 
-fn draw(report: &Report, text: &mut String) -> Drawn {
+fn draw(report: &Report, colors: Colors, text: &mut String) -> Drawn {
     let mut solvers: Vec<(&str, &str)> = Vec::new();
     for curve in &report.curves {
         if !solvers.contains(&(&curve.solver, curve.arithmetic)) {
@@ -56,7 +65,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
     let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
     write(&root, &format!("{}: residual against work", report.problem), (8, 18), 18, HPos::Left)?;
-    legend(&root, &solvers, report)?;
+    legend(&root, &solvers, report, colors)?;
     for (i, row) in rows.iter().enumerate() {
         let y = top + (HEADING + PANEL.1) * i as i32;
         write(&root, &row.title, (8, y + 16), 16, HPos::Left)?;
@@ -65,10 +74,10 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
             let text = format!("curves that coincide: {}", alike.join("; "));
             write(&root, &text, (size.0 - 16, y + 16), 12, HPos::Right)?;
         }
-        panel(&root, (0, y + HEADING), report, row, "constraint sweeps", |_, p| {
+        panel(&root, (0, y + HEADING), report, colors, row, "constraint sweeps", |_, p| {
             (p.sweeps > 0).then_some(p.sweeps as f64)
         })?;
-        panel(&root, (PANEL.0, y + HEADING), report, row, "time, set-up excluded", |c, p| {
+        panel(&root, (PANEL.0, y + HEADING), report, colors, row, "time, set-up excluded", |c, p| {
             Some(1e-9 * c.iteration?.median_ns * f64::from(p.iterations)).filter(|&t| t > 0.0)
         })?;
     }
@@ -99,8 +108,15 @@ fn rows(report: &Report) -> Vec<Row> {
 }
 
 /// The color of a curve: its solver's, whatever stage of it is drawn.
-fn color(solver: &str) -> RGBColor {
-    solver_color(solver.split([',', ' ', ':']).next().unwrap_or(solver))
+fn color(solver: &str, colors: Colors) -> RGBColor {
+    let picture::Color(r, g, b, _) = colors(solver.split(' ').next().unwrap_or(solver));
+    RGBColor(r, g, b)
+}
+
+fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
+    let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
+    area.draw(&Text::new(text.to_string(), at, style))?;
+    Ok(())
 }
 
 /// Solvers whose curves cover each other in a row, `a = b`.
@@ -123,10 +139,10 @@ fn coinciding(report: &Report, row: &Row) -> Vec<String> {
     found
 }
 
-fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report) -> Drawn {
+fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report, colors: Colors) -> Drawn {
     for (i, (solver, arithmetic)) in solvers.iter().enumerate() {
         let at = (12 + 275 * (i % 4) as i32, HEADING + 10 + LEGEND_LINE * (i / 4) as i32);
-        let style = color(solver).stroke_width(width(arithmetic));
+        let style = color(solver, colors).stroke_width(width(arithmetic));
         area.draw(&PathElement::new(vec![at, (at.0 + 26, at.1)], style))?;
         let name = if *arithmetic == "f32" { solver.to_string() } else { format!("{solver} ({arithmetic})") };
         write(area, &name, (at.0 + 32, at.1), 14, HPos::Left)?;
@@ -170,7 +186,15 @@ fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBColor) -> Dra
     Ok(())
 }
 
-fn panel(area: &Area, corner: (i32, i32), report: &Report, row: &Row, title: &str, across: Across) -> Drawn {
+fn panel(
+    area: &Area,
+    corner: (i32, i32),
+    report: &Report,
+    colors: Colors,
+    row: &Row,
+    title: &str,
+    across: Across,
+) -> Drawn {
     let (left, top) = (corner.0 + LEFT, corner.1);
     let (right, bottom) = (corner.0 + PANEL.0 - RIGHT, corner.1 + PANEL.1 - BOTTOM);
     // Where the start makes no difference to a solver, its cold curve stands for both.
@@ -208,7 +232,7 @@ fn panel(area: &Area, corner: (i32, i32), report: &Report, row: &Row, title: &st
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write(area, title, ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     for curve in curves {
-        let color = color(&curve.solver);
+        let color = color(&curve.solver, colors);
         let at = |p: &CurvePoint| {
             let residual = (row.residual)(p).filter(|r| r.is_finite())?;
             let x = along(across(curve, p)?, range, left, right);
