@@ -1,10 +1,24 @@
-//! A SIMD structure-of-arrays 2D rigid-body laboratory: which contact solver, how many
-//! iterations, how fast, and how wrong?
+//! A 2D rigid-body engine in SIMD lanes, and a laboratory for contact solvers: which solver, how many iterations, how fast,
+//! and how wrong?
 //!
-//! **As a library:** start with [`engine`], which says how to build for your CPU, which bits are promised, and how bodies are
-//! added, moved, queried and removed. [`changelog`] lists changes.
+//! ```
+//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse::engine::{solvers, world::{Settings, World}};
 //!
-//! # Three storeys
+//! let mut world = World::new(Settings::new(solvers::find("shim")?));
+//! world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(20.0, 1.0)?))?;
+//! let ball = world.add_body(&BodyDef::dynamic([0.0, 3.0]).with(ShapeDef::circle(0.5)?))?;
+//! for _ in 0..120 {
+//!     world.step()?;
+//! }
+//! println!("{:?}", world.bodies.origin(ball.index()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! **As a library:** start with [`engine`]: how to build for your CPU, which bits are promised, and how to add, move,
+//! query and remove bodies. [`changelog`] lists changes.
+//!
+//! # Three layers
 //!
 //! ```text
 //! cli       commands: arguments in, files and text out         (feature `cli`)
@@ -14,7 +28,7 @@
 //! engine    shapes, contacts, batches, solvers, world          (always)
 //! ```
 //!
-//! Imports point downwards only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
+//! Imports point downward only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
 //! `default-features = false` leaves just that.
 //!
 //! # The pipeline
@@ -47,9 +61,8 @@
 //! # Reading order
 //!
 //! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method,
-//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, [`engine::lanes`] what it is
-//! made of. `lab::scenes` says what is simulated and what is known about it, `lab::metrics` how
-//! errors are measured.
+//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on [`engine::lanes`].
+//! `lab::scenes` has the scenes with their known values, `lab::metrics` measures errors.
 
 // Printing panics where a reader has left: what the program prints goes through `cli::output`.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

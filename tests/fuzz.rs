@@ -26,7 +26,7 @@ use rand::RngExt;
 use simpulse::lab::scenes::{self, CATALOG};
 use std::path::Path;
 
-/// Catalogue scenes small enough to be parents.
+/// Catalog scenes small enough to be parents.
 fn scene_seeds() -> Vec<Vec<u8>> {
     const MOST_BYTES: usize = 6000;
     let small = ["disc_column:3", "stack:2", "pyramid:3", "circle_pile:12"];

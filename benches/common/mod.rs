@@ -21,7 +21,7 @@ pub fn settled(scene: &str, solver: &str, width: LaneWidth) -> World {
 pub fn stable(scene: &str, solver: &str, width: LaneWidth) -> Option<World> {
     let mut settings = Settings::new(solvers::find(solver).expect("a solver of the table")).exactly(width);
     settings.timed = true;
-    let scene = scenes::load(scene).expect("a scene of the catalogue").scene;
+    let scene = scenes::load(scene).expect("a scene of the catalog").scene;
     let mut world = scene.build(settings).expect("a valid scene");
     for _ in 0..30 {
         world.step().ok()?;

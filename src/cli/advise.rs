@@ -22,13 +22,12 @@ use std::process::ExitCode;
 
 /// Find the cheapest setting within given tolerances on a scene
 ///
-/// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid
-/// of doublings first, then values in between. Settings that can only be slower than one already found are
-/// skipped. The best few are timed again in turn, and the fastest of those that meet every
-/// limit is printed with all its errors, the runners-up, and the command that runs it.
+/// Tries solvers, constraint orders, budgets and, where contacts are soft, their stiffness: a grid of doublings
+/// first, then values between them. Settings that can only be slower than one already found are skipped. The best few
+/// are timed again, interleaved, and the fastest setting that meets every limit is printed with all its errors, the
+/// runners-up, and the command that runs it.
 ///
-/// Exit code 0: there is one; 1: there is none, and the nearest is printed; 2: a request that
-/// cannot be met.
+/// Exit code 0: a setting meets all limits; 1: none does, and the nearest is printed; 2: the request is invalid.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Lengths are in nm, um, mm, cm or m, times in ns, us, ms or s; a distance to the
@@ -42,21 +41,21 @@ pub struct AdviseArgs {
     /// Scene
     #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
-    /// Penetration allowed, such as 1mm: what 99 % of contact points keep, and where the scene has to rest the deepest
-    /// of the last second
+    /// Largest penetration allowed, such as 1mm: of 99 % of all contact points, and of every point in the last second
+    /// where the scene has to rest
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub max_penetration: Option<String>,
-    /// Median time of a step allowed, such as 500us
+    /// Largest median time of a step allowed, such as 500us
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub max_time: Option<String>,
-    /// Distance to the scene's reference value allowed
+    /// Largest distance to the scene's reference value allowed
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub max_reference: Option<String>,
-    /// Contact-law residual allowed, root mean square in the weight of the lighter body × step
+    /// Largest contact-law residual allowed: root mean square, in units of the lighter body's weight × step
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub max_residual: Option<String>,
-    /// Speed allowed over the last second, after a minute, where the scene has to rest [default: half a hundredth of a
-    /// body per second]
+    /// Largest rms speed allowed after one minute, where the scene has to rest [default: 0.5 % of a body size per
+    /// second]
     #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
     pub max_rest_speed: Option<String>,
     /// Solvers
@@ -72,7 +71,7 @@ pub struct AdviseArgs {
     /// Steps of the runs that measure errors [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
-    /// Timing runs of each setting of the last comparison
+    /// Timing runs per setting in the final comparison
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub repeats: u32,
     /// Time limit of the search (s)
@@ -202,31 +201,31 @@ fn text(plan: &Plan, advice: &Advice) -> String {
             text += &rejected(plan, advice);
             text += &match advice.runner_up() {
                 Some(next) => format!("runner-up: {}, {}\n", name(next), loses(next, best)),
-                None => "nothing else that was compared keeps the limits\n".to_string(),
+                None => "no other setting in the final comparison meets the limits\n".to_string(),
             };
             text +=
                 &format!("limits on {}: {}\n\n{}", plan.scene, limits(plan, unit), evidence(best, advice));
         }
         (None, Some(nearest)) => {
             text += &format!("{}: {}\n", plan.scene, limits(plan, unit));
-            text += "no setting that was tried keeps the limits\n\nnearest: ";
+            text += "none of the settings tried meets the limits\n\nnearest: ";
             text += &format!("{}\n{}\n", name(nearest), evidence(nearest, advice));
             let over = match nearest.excess.is_finite() {
-                true => format!("it is over its worst limit by a factor of {}", digits(nearest.excess)),
+                true => format!("it exceeds its worst limit by a factor of {}", digits(nearest.excess)),
                 false => format!("it {}", nearest.fails(&plan.limits).unwrap_or("failed".into())),
             };
             text += &format!("{over}\n");
         }
-        (None, None) => text += "nothing was tried: the time was up\n",
+        (None, None) => text += "nothing was tried: the time limit was reached\n",
     }
     text += &format!("\n{}", finalists(plan, advice));
     let waited = advice.finalists.iter().filter_map(|t| Some(t.sample.as_ref()?.waited)).fold(0.0, f64::max);
     text += &waiting::note(Some(waited));
     text += &format!(
-        "\ntried {} settings; left out {} that should not be cheaper{}\n",
+        "\ntried {} settings; skipped {} that cannot be cheaper{}\n",
         advice.trials.len(),
         advice.left_out,
-        if advice.is_cut_short { "; the time was up before the rest" } else { "" }
+        if advice.is_cut_short { "; the time limit was reached before the rest" } else { "" }
     );
     text
 }

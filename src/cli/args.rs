@@ -44,10 +44,10 @@ Examples:
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {
-    /// What to do; a study where none is given.
+    /// The command; a study if none is given.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Choices for the study that runs without a command.
+    /// Options of the study that runs without a command.
     #[command(flatten)]
     pub study: StudyArgs,
 }
@@ -81,7 +81,7 @@ pub enum Command {
     Scene(SceneArgs),
     /// Describe the columns of every CSV file
     Columns(ListArgs),
-    /// Print completions for a shell
+    /// Print shell completions
     #[command(after_help = COMPLETION_EXAMPLES)]
     Completions(CompletionArgs),
 }
@@ -101,7 +101,7 @@ pub struct CompletionArgs {
     pub shell: Shell,
 }
 
-/// A scene to look at.
+/// Arguments of `simpulse scene`.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// Scene
@@ -113,7 +113,7 @@ pub struct SceneArgs {
     /// Print JSON instead of text: the scene in the file format
     #[arg(long)]
     pub json: bool,
-    /// Random seed of scenes that have one
+    /// Random seed, for scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
 }

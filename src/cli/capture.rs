@@ -16,17 +16,17 @@ use std::process::ExitCode;
 
 /// Freeze the contact problem of one step of a scene
 ///
-/// Runs the scene up to the given step and writes the contact problem that this step is about to
-/// solve: masses, velocities, Jacobians, gaps, friction and warm-start impulses. What the
-/// simulation stores in f32 is kept to the last bit. If a reference solution can be found and
-/// certified, it is written too; if not, the problem is written without it.
+/// Runs the scene up to the given step and writes the contact problem that this step is about to solve: masses,
+/// velocities, Jacobians, gaps, friction and warm-start impulses. What the simulation stores in f32 is kept to the
+/// last bit. If a reference solution can be found and certified, it is written too; otherwise the problem is written
+/// without one.
 ///
 /// The file is for `simpulse converge`, which runs every solver on exactly this problem.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
   simpulse capture pyramid:10 --step 120 -o pyramid.frozen
-      A pyramid that has come to rest in two seconds.
+      A pyramid that has come to rest after two seconds.
   simpulse capture my_scene.json --step 30 -o impact.frozen --solver pgs --velocity-iterations 50
       The same, but with the steps before it solved more accurately.")]
 pub struct CaptureArgs {

@@ -8,14 +8,14 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Compare two studies: two commits, two machines, two settings
+/// Compare two studies: of two commits, machines or settings
 ///
 /// Pairs the settings that both studies have and lists scenes that no longer hold, and errors and
 /// times that changed beyond the noise. Exit code 1 if anything became worse by more than the threshold.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
-  simpulse study --out before          … change something, then
+  simpulse study --out before          then change something
   simpulse study --out after
   simpulse compare before after
   simpulse compare before after --threshold 20% --relative    on another machine
@@ -27,10 +27,10 @@ pub struct CompareArgs {
     /// Folder of the second study, or its study.json
     #[arg(value_name = "AFTER")]
     pub after: PathBuf,
-    /// Growth of a time or an error from which it is a regression, as 0.1 or 10%
+    /// Smallest increase of a time or an error that counts as a regression, such as 0.1 or 10%
     #[arg(long, default_value = "5%", value_name = "SHARE", value_parser = share)]
     pub threshold: f64,
-    /// Judge times relative to the median of all: for another machine, or a slower day
+    /// Compare times relative to the median change: for studies from different machines
     #[arg(long)]
     pub relative: bool,
     /// Print every change
@@ -42,7 +42,7 @@ pub struct CompareArgs {
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    let refused = || format!("'{text}' is no share: give a number above 0, as 0.1 or 10%");
+    let refused = || format!("'{text}' is not a share: give a number above 0, such as 0.1 or 10%");
     let value = match text.strip_suffix('%') {
         Some(percent) => percent.trim().parse::<f64>().map(|p| p / 100.0),
         None => text.parse(),

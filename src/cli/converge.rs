@@ -17,11 +17,10 @@ use std::process::ExitCode;
 
 /// Count the iterations every solver needs on one frozen problem
 ///
-/// Runs every solver on exactly the same contact problem, with 1, 2, 3, … iterations, in natural,
-/// colored and shuffled order, from zero and warm. Warm starts are the impulses of the step before, if
-/// the problem has them; otherwise those of its certified reference, each changed by up to 10 %, as if the loads of
-/// the step before differed by as much. Solvers with internal state first run 60 steps on the previous step's
-/// problem. The output says which solver has no warm curve, and why.
+/// Runs every solver on exactly the same contact problem, with 1, 2, 3, … iterations, in natural, colored and
+/// shuffled order, from zero and warm. Warm starts are the impulses of the step before, if the problem has them;
+/// otherwise those of its certified reference, each changed by up to 10 %. Solvers with internal state first run 60
+/// steps on the previous step's problem. The output says which solver has no warm curve, and why.
 ///
 /// Prints the iterations, sweeps and times to residuals 1e-1 to 1e-6, the asymptotic rate, and the
 /// distance of the velocities from the certified reference. A dash means that a tolerance was not
@@ -45,25 +44,25 @@ pub struct ConvergeArgs {
     /// Frozen problem (a file, not ending in .json), or a scene as for `simpulse capture`
     #[arg(value_name = "FILE|SCENE", value_parser = values::scene())]
     pub problem: String,
-    /// Step to freeze if a scene is given, from 1
+    /// Step to freeze if a scene is given, counted from 1
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
     pub step: u64,
     /// Solvers
     #[command(flatten)]
     pub solvers: Solvers,
-    /// Most iterations
+    /// Maximum iterations
     #[arg(long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub max_iterations: u32,
-    /// Lanes of colored order
+    /// Lanes in colored order
     #[command(flatten)]
     pub lanes: Lanes,
-    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// Seed of the shuffled order
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Timing runs of each curve; 0 for no times
+    /// Timing runs per curve; 0 skips timing
     #[arg(long, value_name = "N", default_value_t = 15)]
     pub repeats: u32,
     /// Folder for converge.csv, converge.json and converge.svg

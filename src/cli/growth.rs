@@ -23,12 +23,11 @@ use std::process::ExitCode;
 
 /// Measure the cost of a contact from a thousand contacts to a million
 ///
-/// Builds the scene in several sizes, settles each for some steps, holds them still and times whole
-/// steps of all of them in turn. A scene that has a size is grown by it; a scene with a given size, or
-/// without one, is copied side by side, so that there are many small islands. Prints time per
-/// contact by phase with the errors beside, memory per contact and per body, and whether each phase
-/// stays flat (latency- or compute-bound), steps where its data leave a cache (bandwidth-bound), or
-/// grows faster than n log n. Writes growth.csv and growth.svg.
+/// Builds the scene in several sizes, settles each for some steps, freezes them and times whole steps of all of them,
+/// interleaved. A scene that has a size is built larger; a scene with a given size, or without one, is copied side by
+/// side into many small islands. Prints time per contact and phase with the errors, memory per contact and per body,
+/// and whether each phase stays flat (latency- or compute-bound), steps where its data leave a cache
+/// (bandwidth-bound), or grows faster than n log n. Writes growth.csv and growth.svg.
 ///
 /// From one size to the next, the cost per contact may grow by as much as memory of the phase's
 /// working set is read more slowly (measured), and by ln n₂/ln n₁; 15 % and twice the spread are
@@ -38,13 +37,13 @@ use std::process::ExitCode;
 Examples:
   simpulse growth
   simpulse growth --scene pyramid:10 --contacts 1e3,1e4,1e5
-      Copies of a pyramid of 55 boxes: the same contacts in small islands.
+      Copies of a pyramid of 55 boxes: as many contacts, in small islands.
   simpulse growth --scene circle_pile --solver pgs --lanes 16 --out results/growth")]
 pub struct GrowthArgs {
     /// A scene of `simpulse scenes`: without a size it is grown, with one it is copied
     #[arg(long, default_value = "pyramid", value_name = "SCENE", value_parser = values::scene())]
     pub scene: String,
-    /// Contacts to aim at
+    /// Numbers of contacts to aim at
     #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "1e3,3e3,1e4,3e4,1e5,3e5,1e6")]
     pub contacts: Vec<String>,
     /// Solver, budget and parameters
@@ -53,10 +52,10 @@ pub struct GrowthArgs {
     /// Lanes
     #[command(flatten)]
     pub lanes: Lanes,
-    /// Steps before a scene is held still
+    /// Steps before a scene is frozen
     #[arg(long, default_value_t = 8, value_name = "STEPS")]
     pub settle: u32,
-    /// Timing runs of each size
+    /// Timing runs per size
     #[arg(long, default_value_t = 7, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: u32,
     /// Folder for growth.csv and growth.svg
@@ -159,10 +158,10 @@ fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
 const CONTACTS_PER_BODY: f64 = 3.0;
 const BYTES_PER_CONTACT: f64 = 1250.0;
 
-/// Steps that one timing run of a size comes to, with bringing the state back.
+/// Steps of one timing run of a size, including those that restore the state.
 const STEPS_PER_REPEAT: u32 = 4;
 
-/// What all sizes take together. What is too large for the memory is left out one by one, with a word.
+/// The worlds of all sizes. Sizes that do not fit in memory are skipped, with a message.
 fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate {
     let possible = |target: &&f64| **target <= CONTACTS_PER_BODY * MAX_BODIES as f64;
     let contacts: f64 = targets.iter().filter(possible).sum();
@@ -193,17 +192,15 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     for (done, target) in targets.into_iter().enumerate() {
         bar.show(done, parts, format!("settling {target} contacts"));
         let Some(scene) = family.scene(target)? else {
-            notes += &format!("left out: {target} contacts, more or less than {} can have\n", args.scene);
+            notes += &format!("skipped: {target} contacts is outside what {} can have\n", args.scene);
             continue;
         };
         // What a contact took so far, what settling takes, and the scene itself.
         let bytes = |e: &Entry| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
         let expected = entries.last().map_or(0.0, bytes) * target;
         if free_memory().is_some_and(|free| expected > MEMORY_SHARE * free) {
-            notes += &format!(
-                "left out: {target} contacts, which would take about {:.0} MB of memory\n",
-                1e-6 * expected
-            );
+            notes +=
+                &format!("skipped: {target} contacts would take about {:.0} MB of memory\n", 1e-6 * expected);
             continue;
         }
         let what = format!("settling {}: {} bodies, {} steps", scene.name, scene.bodies.len(), args.settle);
@@ -211,11 +208,11 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         let mut world: World = scene.build(settings.clone())?;
         match settled(&mut world, args.settle, OBSERVED_STEPS) {
             Ok(errors) => entries.push(Entry { scene: scene.name, world, errors }),
-            Err(failure) => notes += &format!("left out: {}: {failure}\n", scene.name),
+            Err(failure) => notes += &format!("skipped: {}: {failure}\n", scene.name),
         }
     }
     let Measurement { rows, memory, waiting } = measure(&mut entries, args.repeats, &|round| {
-        bar.show(parts - (args.repeats - round) as usize, parts, "whole steps on held states");
+        bar.show(parts - (args.repeats - round) as usize, parts, "whole steps on frozen states");
     });
     drop(bar);
     drop(entries);

@@ -1,4 +1,4 @@
-//! SIGINT, SIGTERM and SIGHUP: nothing half-written stays behind, and what is finished is kept.
+//! SIGINT, SIGTERM and SIGHUP: no half-written file stays behind, and finished results are kept.
 
 use crate::lab::files;
 use std::process::exit;
@@ -16,7 +16,7 @@ type Rescue = Box<dyn FnOnce() + Send>;
 
 static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
 
-/// From now on a signal runs what [`on_interrupt`] was last given, removes temporary files and ends the process
+/// From now on a signal runs the last closure given to [`on_interrupt`], removes temporary files and ends the process
 /// with code 130.
 pub fn install() {
     // Without a handler (there is one already, or the system has none) signals do what they always do.
@@ -54,7 +54,7 @@ static WRITING: Mutex<()> = Mutex::new(());
 pub struct Writing(#[allow(dead_code)] MutexGuard<'static, ()>);
 
 impl Guard {
-    /// Nothing is rescued any more: results are being written, and a signal lets that end.
+    /// Stops rescuing partial results: the final ones are being written, and a signal waits for that.
     pub fn finish(self) -> Writing {
         let writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         drop(self);

@@ -1,4 +1,4 @@
-//! `simpulse merge`: the parts of a study, put together.
+//! `simpulse merge`: merges the parts of a study.
 
 use super::output::print;
 use super::study;
@@ -11,10 +11,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Put the parts of a study together
+/// Merge the parts of a study
 ///
-/// `study --shard I/N` runs every N-th scene, so that a study can be spread over N machines or jobs. Scenes
-/// are never split, so all times of a scene come from one machine; the result says where its times come from.
+/// `study --shard I/N` runs every N-th scene, so that a study can be spread over N machines or jobs. Scenes are never
+/// split, so all times of a scene come from one machine; the result names the machines.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -25,7 +25,7 @@ pub struct MergeArgs {
     /// Folders of the parts, or their study.json files
     #[arg(value_name = "PART", required = true)]
     pub parts: Vec<PathBuf>,
-    /// Put together what there is, though scenes are missing
+    /// Merge even if scenes are missing
     #[arg(long)]
     pub partial: bool,
     /// Print the tables of every scene after the answer
@@ -46,12 +46,12 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode, Error> {
     let whole = StudyFile::merged(parts, &names)?;
     if !whole.missing_scenes.is_empty() && !args.partial {
         let missing = whole.missing_scenes.join(", ");
-        let message = format!("no part has {missing}; --partial puts together what there is");
+        let message = format!("no part has {missing}; --partial merges without it");
         return Err(Error::invalid("merge", message));
     }
     files::prepare_folder(&args.out)?;
     let _lock = files::Lock::of(&args.out)?;
-    // Those of another study there.
+    // Results of another study there.
     html::write_recordings(&args.out, &[])?;
     let paths = report::write_study(&args.out, &whole)?;
     if args.json {

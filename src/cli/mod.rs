@@ -63,7 +63,7 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(code) => code,
-        // A reader that has left has seen what it wanted.
+        // A closed pipe (`| head`) is not an error.
         Err(Error::Io { source, .. }) if source.kind() == ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
             note(&format!("error: {}\n", one_line(&error.to_string())));
@@ -99,7 +99,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
     }
 }
 
-/// A study; after it, what the CPU has and this build does not use.
+/// A study; then CPU features that this build does not use.
 fn full_study(args: &study::StudyArgs) -> Result<ExitCode, Error> {
     let code = study::run(args)?;
     if let Some(line) = unused_cpu_features() {
@@ -183,8 +183,7 @@ fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
     print(&format!("* in the default study; --solvers all runs every solver\n{lines}\n{}", parameters()))
 }
 
-/// What `--set` and `--sweep` take: each parameter with its range and what it does, where solvers differ in
-/// that, several times.
+/// The parameters of `--set` and `--sweep`, each with its range and meaning; several lines where solvers differ.
 fn parameters() -> String {
     let mut lines: Vec<String> = Vec::new();
     for p in VARIANTS.iter().flat_map(|v| v.parameters) {
@@ -254,7 +253,7 @@ fn described(scene: &Description) -> String {
     for demand in &scene.demands {
         text += &format!("; {}", demand.meaning());
     }
-    text += "\ntolerances of a plausible run; a tight one keeps a tenth of them, an exact one a hundredth\n";
+    text += "\ntolerances of a plausible run; a tight run keeps 10 % of them, an exact run 1 %\n";
     let own = scene.tolerances;
     let unit = scene.reference.map_or("", |(_, _, unit)| unit);
     let lines = [

@@ -1,5 +1,4 @@
-//! What is printed: text and JSON to standard output, notes to standard error. A reader that has
-//! left (`| head -1`) is not an error.
+//! Text and JSON go to standard output, notes to standard error. A closed pipe (`| head -1`) is not an error.
 
 use crate::lab::error::Error;
 use crate::lab::files::is_standard_output;
@@ -17,7 +16,7 @@ pub fn print(text: &str) -> Result<ExitCode, Error> {
     }
 }
 
-/// An answer beside files: to standard error where one of them goes to standard output.
+/// An answer printed in addition to files: to standard error if one of the files is standard output.
 pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -> Result<ExitCode, Error> {
     if files.into_iter().any(is_standard_output) {
         note(text);
@@ -26,17 +25,17 @@ pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -
     print(text)
 }
 
-/// What happens, and errors, to standard error; nobody need read it.
+/// Notes and errors, to standard error; write failures are ignored.
 pub fn note(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// The same as JSON. What is not finite is a word there: [`finite`].
+/// The same as JSON. Non-finite numbers become words: [`finite`].
 pub fn print_json(value: &Value) -> Result<ExitCode, Error> {
     print(&format!("{value:#}\n"))
 }
 
-/// Anything that can be serialised.
+/// Anything that can be serialized.
 pub fn value(of: &impl serde::Serialize) -> Result<Value, Error> {
     serde_json::to_value(of).map_err(|e| Error::invalid("json", e.to_string()))
 }

@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
-/// Measure the claims of papers/claims.md again
+/// Re-measure the claims of papers/claims.md
 ///
-/// Each row of its first table has a command, the figure that is read from the command's JSON, and the range in which the
-/// figure is expected. Prints every figure; exit code 1 if one is outside its range. With --write the figures in the file
-/// are replaced. The figures do not depend on the clock.
+/// Each row of its first table has a command, the figure that is read from the command's JSON, and the range in which
+/// the figure is expected. Prints every figure; exit code 1 if one is outside its range. With --write the figures in
+/// the file are replaced. The figures do not depend on timing.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -47,7 +47,7 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// None for lines that are no rows of the table. Errors: a range that cannot be read.
+    /// None for lines that are not rows of the table. Errors: a range that cannot be read.
     fn parse(line: usize, text: &'a str) -> Result<Option<Self>, Error> {
         let Some(inner) = text.strip_prefix("| ").and_then(|text| text.strip_suffix(" |")) else {
             return Ok(None);
@@ -60,7 +60,10 @@ impl<'a> Row<'a> {
         let range = expected.split(" to ").map(|bound| bound.trim().parse::<f64>());
         let expected = range.collect::<Result<Vec<_>, _>>().ok().and_then(|range| range.try_into().ok());
         let expected = expected.ok_or_else(|| {
-            Error::invalid(format!("line {}", line + 1), format!("'{}' is no range 'low to high'", cells[3]))
+            Error::invalid(
+                format!("line {}", line + 1),
+                format!("'{}' is not a range 'low to high'", cells[3]),
+            )
         })?;
         Ok(Some(Row { line, command, figure, expected, cells }))
     }

@@ -1,4 +1,4 @@
-//! `simpulse profile`: one phase of a step, again and again.
+//! `simpulse profile`: repeats one phase of a step.
 
 use super::output::{note, print, print_json};
 use super::settled;
@@ -18,20 +18,19 @@ use std::process::ExitCode;
 
 /// Repeat one phase of a step and compare it with the roofline
 ///
-/// Settles the scene, holds its state still and repeats one phase on it, or every one in turn. Between
-/// repeats, it measures with the same clock how fast memory can be read and updated in a
-/// working set of the same size, and how many multiply-adds a core does at this lane width.
+/// Settles the scene, freezes its state and repeats one phase on it, or all phases in turn. Between repeats, it
+/// measures with the same clock how fast memory can be read and updated in a working set of the same size, and how
+/// many multiply-adds a core does at this lane width.
 ///
-/// Bytes are those that the code requests: 4 per float of a record read and again per impulse written,
-/// 4 per index, 32 per body row gathered, 16 per body written back; for pairs, collide and color what
-/// goes in once and what comes out once. Operations are counted, by running the same
-/// kernel on a lane that counts: a multiply-add is two, a division or root one, minima, maxima and
-/// selections none. Counts follow the source; the compiler removes about 2 % as dead code.
-/// Of prepare and restitution only what is done in lanes is counted.
+/// Bytes are those that the code requests: 4 per float of a record read and again per impulse written, 4 per index,
+/// 32 per body row gathered, 16 per body written back; for pairs, collide and color, each input and output once.
+/// Operations are counted, by running the same kernel on a lane that counts: a multiply-add is two, a division or
+/// root one, minima, maxima and selections none. Counts follow the source; the compiler removes about 2 % as dead
+/// code. In prepare and restitution only operations in lanes are counted.
 ///
-/// Velocities and impulses that repeats change are brought back every 100 repeats, outside of the
-/// times. In pairs and color every repeat searches all pairs and recomputes colors, which a step does only
-/// where many shapes left their bounds and where a contact came or went.
+/// Velocities and impulses that repeats change are restored every 100 repeats, outside the measured time. In pairs
+/// and color every repeat searches all pairs and recomputes colors; a step does so only when many shapes left their
+/// bounds, or contacts appeared or disappeared.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -51,7 +50,7 @@ pub struct ProfileArgs {
     /// The phase to repeat, or `all` in turn
     #[arg(long, default_value = "all", value_name = "PHASE", value_parser = phase())]
     pub phase: Which,
-    /// Time of the measurement (s)
+    /// Duration of the measurement (s)
     #[arg(long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
     pub seconds: f64,
     /// Solver, budget and parameters
@@ -60,16 +59,16 @@ pub struct ProfileArgs {
     /// Lanes
     #[command(flatten)]
     pub lanes: Lanes,
-    /// Steps before the state is held still
+    /// Steps before the state is frozen
     #[arg(long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
     /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Measure nothing but the phase
+    /// Skip the measurement of memory bandwidth and arithmetic
     #[arg(long)]
     pub no_ceilings: bool,
-    /// Draw operations per byte against operations per second
+    /// Write the roofline plot (SVG): operations per byte against operations per second
     #[arg(long, value_name = "FILE.svg")]
     pub roofline: Option<PathBuf>,
     /// Print JSON instead of text
@@ -125,7 +124,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
         return Err(Error::invalid("seconds", message));
     }
     if args.roofline.is_some() && args.no_ceilings {
-        return Err(Error::invalid("roofline", "needs the ceilings that --no-ceilings leaves out"));
+        return Err(Error::invalid("roofline", "needs the ceilings that --no-ceilings skips"));
     }
     let settings = settings(args)?;
     let scene = open_scene(&args.scene, args.seed, None, None)?.scene;

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar that says what runs; it goes when it is dropped.
+/// A progress bar; it disappears when dropped.
 pub struct Bar(ProgressBar);
 
 impl Default for Bar {
@@ -12,7 +12,7 @@ impl Default for Bar {
 }
 
 impl Bar {
-    /// Nothing is drawn before the first call of [`Bar::show`], or where nobody looks.
+    /// Nothing is drawn before the first call of [`Bar::show`], nor when standard error is not a terminal.
     pub fn new() -> Self {
         let bar = ProgressBar::new(1);
         let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
@@ -20,14 +20,14 @@ impl Bar {
         Bar(bar)
     }
 
-    /// The same for one of many short steps: told of a hundred of them, so that it costs nothing.
+    /// As `show`, for one of many short steps: updated every hundred steps, so that it costs nothing.
     pub fn step(&self, done: usize, total: usize, what: &str) {
         if done.is_multiple_of(total.div_ceil(100)) {
             self.show(done, total, what);
         }
     }
 
-    /// So much is done, and this is under way.
+    /// Sets the work done so far and the name of what runs.
     pub fn show(&self, done: usize, total: usize, what: impl Into<String>) {
         self.0.set_length(total as u64);
         self.0.set_position(done as u64);

@@ -8,10 +8,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Make the page of a study again, from its records
+/// Rebuild the page of a study from its records
 ///
-/// Reads study.json of the folder, and if they are there verify.json (`simpulse verify --json > DIR/verify.json`) and
-/// the recordings of the study; writes report.html.
+/// Reads study.json of the folder and, if present, verify.json (`simpulse verify --json > DIR/verify.json`) and the
+/// recordings; writes report.html.
 #[derive(Args, Debug)]
 pub struct ReportArgs {
     /// Folder of a study

@@ -1,4 +1,4 @@
-//! `simpulse run`: one scene, one solver; times per phase, errors, and what happened as CSV.
+//! `simpulse run`: one scene, one solver; times per phase, errors, and trajectories as CSV.
 
 use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
@@ -29,10 +29,9 @@ use std::process::ExitCode;
 
 /// Run one scene with one solver; print its time and its errors
 ///
-/// Prints the figures to act on: the time of a step and of its longest phase, the greatest
-/// penetration, the contact-law residual, the distance to the scene's reference value, the speed that
-/// is left at rest, the change of energy, and whether the scene holds. `--all` prints everything that
-/// is measured.
+/// Prints the key figures: the time of a step and of its longest phase, the maximum penetration, the contact-law
+/// residual, the distance to the scene's reference value, the residual speed at rest, the change of energy, and
+/// whether the scene holds. `--all` prints the rest.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -46,8 +45,8 @@ pub struct RunArgs {
     /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
-    /// Lanes per instruction [default: as many as the colours fill and this build has instructions for, in natural
-    /// order 1; wider ones are emulated]
+    /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in natural
+    /// order; wider ones are emulated]
     #[arg(long, value_name = "N", value_parser = values::lanes())]
     pub lanes: Option<LaneWidth>,
     /// Constraint order
@@ -62,22 +61,22 @@ pub struct RunArgs {
     /// Random seed of scenes that have one
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Write step,time,body,x,y,angle,vx,vy,omega; angles count whole turns
+    /// Write a CSV of step,time,body,x,y,angle,vx,vy,omega; angles include whole turns
     #[arg(long, value_name = "FILE.csv")]
     pub state: Option<PathBuf>,
-    /// Write contact points with their impulses (N·s over the step)
+    /// Write a CSV of contact points with their impulses (N·s over the step)
     #[arg(long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
     /// Write a recording for `simpulse replay`
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Keep contact points and impulses in the recording, too
+    /// Also record contact points and impulses
     #[arg(long, requires = "record")]
     pub record_contacts: bool,
-    /// Write every K-th step [default: of CSV files the last step only, of a recording all]
+    /// Write every K-th step [default: the last step only in CSV files, every step in a recording]
     #[arg(long, value_name = "K")]
     pub every: Option<u32>,
-    /// Stop fast bodies at what they would pass: continuous collision [default: the solver's]
+    /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
     /// Print all phases, counts and errors
@@ -135,7 +134,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
         let (scene, solver) = (scene.name.clone(), world.settings.solver.name.into());
         let caption = Caption { scene, solver, setting: how(&world) };
-        // Begun now, so that a file that cannot be written is refused before the run.
+        // Created now, so that a file that cannot be written is reported before the run.
         Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
     });
     let mut recorder = recorder.transpose()?;
@@ -183,7 +182,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
     }
     drop(bar);
-    // Metrics empty the caches: times come from passes of their own, and the bits say that it is the same run.
+    // Metrics evict the caches, so times come from separate runs; equal bits show that they are the same run.
     let own = Settings { record_impulses: false, ..world.settings.clone() };
     let times = Times::measure(scene, own, world.state_hash())?;
     let truth = loaded.truth.as_ref().map(TruthError::of);
@@ -210,7 +209,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.map(PathBuf::as_path), &(text + &written))
 }
 
-/// What the run will take: its errors are measured, and then it is timed.
+/// Estimate of the run: one pass for errors, others for times.
 fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     let bodies = scene.bodies.len();
     let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
@@ -235,21 +234,21 @@ pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -
 }
 
 impl Found {
-    /// The eight figures that people act on, by what they say.
+    /// The eight key figures, and what to do about each.
     ///
-    /// | figure | what one does about it |
+    /// | figure | what to do about it |
     /// |---|---|
     /// | time of a step | whether the budget can be afforded at all |
     /// | longest phase | whether fewer sweeps, more lanes or another broad phase would help |
-    /// | greatest penetration | more substeps or stiffer contacts: it is what is seen |
-    /// | contact-law residual | more sweeps: loads and friction are as good as this |
-    /// | distance to reference value | another solver: a small residual of the wrong law is wrong, too |
-    /// | holds | nothing else counts where it does not |
-    /// | residual speed | whether bodies can be put to sleep, or jitter |
-    /// | energy change | damping: gained energy ends in an explosion, lost energy looks like syrup |
+    /// | greatest penetration | more substeps or stiffer contacts: overlap is what people see |
+    /// | contact-law residual | more sweeps: loads and friction are no better than this |
+    /// | distance to reference value | another solver: a small residual of the wrong law is still wrong |
+    /// | holds | if it does not, no other figure matters |
+    /// | residual speed | whether bodies could sleep, or jitter |
+    /// | energy change | damping: a gain ends in an explosion, a loss looks viscous |
     ///
-    /// All others (mean and percentiles of penetration, parts of the residual, momentum, creep, counts)
-    /// explain one of these, and are for those who look for a cause: `--all`.
+    /// All others (mean and percentiles of penetration, parts of the residual, momentum, creep, counts) explain one
+    /// of these: `--all`.
     fn figures(&self) -> String {
         let e = &self.errors;
         let line = |name: &str, value: String, note: String| {
@@ -258,7 +257,7 @@ impl Found {
         let sample = &self.times.sample;
         let (longest, share) = self.times.longest();
         let reference = match &self.truth {
-            None => line("distance to reference value", "–".into(), "none is known".into()),
+            None => line("distance to reference value", "–".into(), "none known".into()),
             Some(t) => {
                 let known = format!("{} = {}", t.quantity, si(t.expected, t.unit));
                 let distance = t.error.map_or("not reached".into(), |e| si(e, t.unit));
@@ -279,7 +278,7 @@ impl Found {
                 if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },
                 si(e.penetration(self.rests), "m"),
                 format!(
-                    "greatest {}; {} flown into before a contact",
+                    "greatest {}; {} when first found",
                     si(e.penetration_max, "m"),
                     si(e.flight_depth_max, "m")
                 ),
@@ -290,15 +289,15 @@ impl Found {
                 "weights of the lighter body × step".into(),
             ),
             reference,
-            "behaviour\n".to_string(),
+            "behavior\n".to_string(),
             line("holds", holds, when),
             line("residual speed, last second", si(e.rest_velocity, "m/s"), "rms".into()),
-            line("energy change", ratio(e.energy_change), "relative; positive is gained".into()),
+            line("energy change", ratio(e.energy_change), "relative; positive is a gain".into()),
         ]
         .concat()
             + &unchecked
             + &self.times.note()
-            + "--all prints every figure\n"
+            + "--all prints the rest\n"
     }
 }
 
@@ -379,7 +378,7 @@ fn head(world: &World, scene: &Scene) -> String {
 fn counts(world: &World) -> String {
     let c = &world.counts;
     format!(
-        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colours, {} overflowing, \
+        "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
          {:.0} % of lanes filled, {} bytes of records\n",
         c.pairs,
         c.contacts,
@@ -401,7 +400,7 @@ fn truth_line(truth: &TruthError) -> String {
     }
 }
 
-/// A CSV file that appears when it is whole.
+/// A CSV file that appears once it is complete.
 struct CsvFile {
     writer: csv::Writer<Pending>,
     path: String,
@@ -426,7 +425,7 @@ impl CsvFile {
     }
 }
 
-/// A line per body: origin, angle with all turns since the start, velocity of the centre of mass.
+/// A line per body: origin, angle with all turns since the start, velocity of the center of mass.
 fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
@@ -438,7 +437,7 @@ fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> 
     Ok(())
 }
 
-/// A line per contact point: geometry at the start of the step, where the centres of mass
+/// A line per contact point: geometry at the start of the step, where the centers of mass
 /// were at `starts`; impulses on body b over the step.
 fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
     for contact in &world.contacts {

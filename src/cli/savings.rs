@@ -1,4 +1,4 @@
-//! `simpulse savings`: what kernels gain by leaving out what a scene does not have.
+//! `simpulse savings`: what kernels gain from specialization.
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
@@ -14,12 +14,12 @@ use clap::Args;
 use serde_json::json;
 use std::process::ExitCode;
 
-/// Measure what kernels save by leaving out features that a scene does not have
+/// Measure what kernels save by dropping features that a scene does not use
 ///
-/// Kernels are specialised at compile time by what a scene can need: friction, a second contact point,
-/// rotation, restitution. Here each feature that a scene does not have is forced on, alone and all
-/// together, and timed in turn with the kernel that the scene gets. Scenes with fewer than 100
-/// contacts are left out: there the start of a sweep costs more than the sweep.
+/// Kernels are specialized at compile time by the features of a scene: friction, a second contact point, rotation,
+/// restitution. Each feature that a scene does not use is forced on, alone and all together, and timed interleaved
+/// with the kernel that the scene gets. Scenes with fewer than 100 contacts are skipped: there the start of a sweep
+/// costs more than the sweep.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -44,7 +44,7 @@ pub struct SavingsArgs {
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
-    /// Timing runs of each setting
+    /// Timing runs per setting
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub repeats: u32,
     /// Random seed: of scenes that have one, and of the order of timing runs

@@ -19,9 +19,8 @@ use std::process::ExitCode;
 
 /// Draw one frame of a scene as SVG or PNG
 ///
-/// Bodies are coloured by their deepest overlap. Every contact point has its normal and an arrow
-/// for the impulse of the step on the upper of its two bodies; poses, points and overlaps are those
-/// after the step.
+/// Bodies are colored by their deepest overlap. Every contact point has its normal and an arrow for the impulse of
+/// the step on the upper of its two bodies; poses, points and overlaps are those after the step.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +30,7 @@ pub struct SnapshotArgs {
     /// Scene
     #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
-    /// The step after which the frame is taken; 0 is the start
+    /// Step after which the frame is taken; 0 is the start
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub step: u32,
     /// File to write: .svg or .png; `-` is standard output, as SVG

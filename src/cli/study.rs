@@ -1,4 +1,4 @@
-//! `simpulse study`: the main job, also in parts.
+//! `simpulse study`: compares solvers, whole or in parts.
 
 use super::interrupt::on_interrupt;
 use super::output::{note, print};
@@ -28,9 +28,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Below the help.
 pub const EXAMPLES: &str = "\
-Without any budget option, each solver runs at half its standard budget, at that budget,
-and at its double. With some, every combination runs; what a solver ignores is left out.
-A sweep runs at each solver's standard budget, in coloured order at the widest native lanes,
+Without any budget option, each solver runs at half, once and twice its standard budget. With
+budget options, every combination runs; values that a solver ignores are dropped.
+A sweep runs at each solver's standard budget, in colored order at the widest native lanes,
 unless other options say so.
 
 Examples:
@@ -57,8 +57,8 @@ pub struct StudyArgs {
     /// Constraint orders [default: both]
     #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
-    /// Treatments of impacts: own is the solver's, waves are waves of impacts before the step, none lets nothing
-    /// bounce. On scenes where nothing bounces only the first one runs [default: own,waves; in a sweep own]
+    /// Impact laws: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off.
+    /// Scenes where nothing bounces run the first one only [default: own,waves; in a sweep own]
     #[arg(long, value_delimiter = ',', value_name = "TREATMENT,…", value_parser = values::impacts())]
     pub impacts: Vec<Impacts>,
     /// Substeps to try
@@ -73,17 +73,17 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
-    /// Parameters of solvers, as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
-    /// A curve per solver: one quantity takes several values and everything else stays as it is. It is a
-    /// parameter of solvers (contact-hertz), substeps, iterations (velocity sweeps; position sweeps of solvers
-    /// without), velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every
-    /// shape), or mass-ratio (scene mass_ratio)
+    /// A curve per solver: one quantity takes several values, all else stays fixed. It is a solver parameter
+    /// (contact-hertz), substeps, iterations (velocity sweeps; position sweeps if a solver has no others),
+    /// velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every shape), or mass-ratio
+    /// (scene mass_ratio)
     #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
     pub sweep: Option<Sweep>,
-    /// Tolerances in the place of each scene's own, as penetration=5mm,residual=0.05,reference=0.1
-    /// (`simpulse scene NAME` lists them; the reference value's in its own unit)
+    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse scene NAME`
+    /// lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]
@@ -95,7 +95,7 @@ pub struct StudyArgs {
     /// Random seed: of scenes that have one, and of the order of timing runs
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Short runs, nothing repeated: a look at everything in seconds
+    /// Short runs without repeats: an overview in seconds
     #[arg(long)]
     pub quick: bool,
     /// Print the tables of every scene after the answer
@@ -104,7 +104,7 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
-    /// Run part I of N: every N-th scene; `simpulse merge` puts the parts together
+    /// Run part I of N: every N-th scene; `simpulse merge` joins the parts
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Folder for the results
@@ -148,7 +148,7 @@ impl StudyArgs {
     }
 }
 
-/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that is no limit.
+/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that cannot be a limit.
 fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
     let mut tolerances = GivenTolerances::default();
     for text in given {
@@ -248,7 +248,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     drop(bar);
     let study = StudyFile::new(&plan, records, elsewhere);
     let replays = telling::recordings(&plan, &study.records)?;
-    // From here on files of an earlier study are replaced: a signal waits until all of them are.
+    // From here on files of an earlier study are replaced; a signal waits until that is complete.
     let guard = guard.finish();
     let replays = html::write_recordings(&args.out, &replays)?;
     let mut paths = report::write_study(&args.out, &study)?;
@@ -261,7 +261,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     print(&text(&study, plan.steps, &args.out, &paths, args.verbose))
 }
 
-/// Leaves out solvers that do not have the swept quantity, and says so.
+/// Skips solvers that do not have the swept quantity, with a message.
 fn keep_concerned(sweep: &Sweep, solvers: &mut Vec<&'static Variant>) -> String {
     let (own, others): (Vec<_>, Vec<_>) = solvers.iter().copied().partition(|v| sweep.concerns(v));
     if own.is_empty() {
@@ -272,7 +272,7 @@ fn keep_concerned(sweep: &Sweep, solvers: &mut Vec<&'static Variant>) -> String 
     let names: Vec<&str> = others.iter().map(|v| v.name).collect();
     match names.is_empty() {
         true => String::new(),
-        false => format!("left out, without {}: {}\n", sweep.name, names.join(", ")),
+        false => format!("skipped, without {}: {}\n", sweep.name, names.join(", ")),
     }
 }
 
@@ -301,7 +301,7 @@ fn keep(plan: &StudyPlan, out: &Path, records: Vec<Record>, elsewhere: Vec<Strin
     }
     // Scenes are finished in the order of the plan.
     let missing = plan.scenes[done.min(all)..].iter().cloned().chain(elsewhere).collect();
-    // Recordings there are of another study.
+    // Existing recordings belong to another study.
     if let Err(error) = html::write_recordings(out, &[]) {
         return format!("interrupted; finished scenes could not be written: {error}\n");
     }

@@ -8,7 +8,7 @@ use crate::lab::study::interleave::{Sample, median, time_in_turns};
 use crate::lab::units::{digits, si};
 use std::time::{Duration, Instant};
 
-/// Passes over the run, and how long all of them may take together before fewer will do.
+/// Passes over the run, and the total time above which fewer are made.
 const PASSES: u32 = 3;
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -61,7 +61,8 @@ impl Times {
         (name, ns / whole.max(1.0))
     }
 
-    /// The phase that has most of the longest step of the clocked pass, its number from 1, and its share of that step (1).
+    /// The phase that takes most of the longest step of the clocked pass, its number from 1, and its share of that
+    /// step (1).
     fn longest_step(&self) -> Option<(&'static str, usize, f64)> {
         let whole = |i: usize| self.phases.iter().map(|times| times[i]).sum::<f64>();
         let count = self.phases.first().map_or(0, Vec::len);
@@ -84,12 +85,12 @@ impl Times {
         text
     }
 
-    /// What makes the times worth less.
+    /// Warnings about the quality of the times.
     pub fn note(&self) -> String {
         let mut text = String::new();
         if self.sample.waited > 0.01 {
             text += &format!(
-                "the timed thread waited for a processor {:.0} % of the time; that is left out\n",
+                "the timed thread waited for a processor {:.0} % of the time; waiting is not counted\n",
                 100.0 * self.sample.waited
             );
         }

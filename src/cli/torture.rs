@@ -1,4 +1,4 @@
-//! `simpulse torture`: scenes at random, by family and seed, and what no solver may do in them.
+//! `simpulse torture`: random scenes, by family and seed, and checks that every solver has to pass.
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
@@ -23,26 +23,25 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Draw scenes at random and count what no solver may do in them
+/// Run random scenes and count failures that no solver may have
 ///
-/// Ten families of scenes that are hard in ten ways: drops, stacks of large mass ratios, fast bodies, mixed
-/// surfaces, pistons and stirrers, overlaps, extreme steps, centimetres beside a hundred metres, plates and
-/// needles, far from the origin. Every scene runs under every solver, on all cores; poses alone are judged,
-/// in double precision. A scene fails if it diverges, makes energy, flings a body, lets one escape from its
-/// walls, ends with bodies inside each other or does not come to rest where it should. The same seed draws
-/// the same scenes.
+/// Ten families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
+/// stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from the origin.
+/// Every scene runs under every solver, on all cores; only poses are checked, in double precision. A scene fails if
+/// it diverges, gains energy, flings a body, lets one escape from its walls, ends with bodies inside each other or
+/// does not come to rest when it should. The same seed gives the same scenes.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
   simpulse torture                                     a thousand scenes
   simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; the same again goes on where it stopped
   simpulse torture --families driven,fast --solvers soft_step,box2d,rapier --keep failed/
-  simpulse torture --only driven:17 --keep failed/     one scene again, and its minimised file")]
+  simpulse torture --only driven:17 --keep failed/     one scene again, and its minimized file")]
 pub struct TortureArgs {
     /// Scenes, over all families
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub scenes: u32,
-    /// Random seed: everything is drawn from it
+    /// Random seed of all scenes
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Families of scenes [default: all]
@@ -54,16 +53,16 @@ pub struct TortureArgs {
     /// Solvers; the default solver where none are given
     #[command(flatten)]
     pub solvers: Solvers,
-    /// Stop fast bodies at what they would pass: continuous collision [default: the solver's]
+    /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
-    /// Write every scene that fails, minimised, into this folder
+    /// Write every failing scene, minimized, into this folder
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
-    /// Write a line of JSON for every scene and solver; scenes that are there already are not run again
+    /// Write one line of JSON per scene and solver; scenes already in the file are not run again
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
-    /// Exit with code 1 where a solver fails more scenes than this
+    /// Exit with code 1 if a solver fails more scenes than this
     #[arg(long, value_name = "N")]
     pub allow: Option<u32>,
     /// Threads [default: all cores]
@@ -80,7 +79,7 @@ impl TortureArgs {
         Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own }
     }
 
-    /// What a solver is called in rows: with what is not its default.
+    /// The name of a solver in rows, with options that differ from its default.
     fn name(&self, solver: &Variant) -> String {
         match self.continuous {
             Some(true) if !solver.continuous => format!("{}, continuous", solver.name),
@@ -94,7 +93,7 @@ fn family_value() -> impl TypedValueParser<Value = &'static Family> {
     PossibleValuesParser::new(FAMILIES.iter().map(|f| f.name)).try_map(|name| family(&name))
 }
 
-/// A scene that waits for its turn.
+/// A scene in the queue.
 type Job = (&'static Family, u32, &'static Variant);
 
 /// Runs the command.
@@ -154,12 +153,12 @@ fn chosen(args: &TortureArgs) -> Result<Vec<(&'static Family, u32)>, Error> {
         let families = if args.families.is_empty() { all() } else { args.families.clone() };
         return Ok(Campaign { seed: args.seed, families, scenes: args.scenes }.list());
     };
-    let invalid = || Error::invalid("--only", format!("'{only}' is not FAMILY:NUMBER, as 'drops:17'"));
+    let invalid = || Error::invalid("--only", format!("'{only}' is not FAMILY:NUMBER, such as 'drops:17'"));
     let (name, number) = only.split_once(':').ok_or_else(invalid)?;
     Ok(vec![(family(name)?, number.parse().map_err(|_| invalid())?)])
 }
 
-/// The rows of a log, and the log to go on with. A last line that was cut off is left out.
+/// The rows of a log, and the log to append to. A truncated last line is dropped.
 fn opened(path: &Path) -> Result<(Vec<Row>, Option<File>), Error> {
     let text = match path.exists() {
         true => read_to_string(path).map_err(Error::io(path))?,
@@ -170,7 +169,7 @@ fn opened(path: &Path) -> Result<(Vec<Row>, Option<File>), Error> {
     for (k, line) in text[..whole].lines().enumerate() {
         let row = serde_json::from_str(line).map_err(|e| Error::Format {
             path: path.to_path_buf(),
-            message: format!("line {} is not of a campaign: {e}", k + 1),
+            message: format!("line {} was not written by `torture --log`: {e}", k + 1),
         })?;
         rows.push(row);
     }
@@ -213,7 +212,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// One scene under one solver; kept, minimised, if it fails and a folder is given.
+/// One scene under one solver; kept, minimized, if it fails and a folder is given.
 fn one(
     args: &TortureArgs,
     family: &'static Family,

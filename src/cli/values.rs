@@ -1,5 +1,4 @@
-//! What options may be: one meaning per option in every command, every list of values in the help
-//! and in the message about a wrong one.
+//! Values of options: an option means the same in every command; help and error messages list all its values.
 
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -36,7 +35,7 @@ fn solvers_help() -> String {
 }
 
 impl Solvers {
-    /// Each once, in the order given; the default list where none are given.
+    /// Each once, in the order given; the default list if none are given.
     pub fn chosen(&self) -> Vec<&'static Variant> {
         if self.solvers.is_empty() {
             return default_solvers();
@@ -57,12 +56,12 @@ impl Solvers {
     }
 }
 
-/// A line that names the solvers that the default list leaves out, where that ran.
+/// A line that names the solvers that the default list does not run.
 pub fn left_out(ran: &[&'static Variant]) -> String {
     let ran: Vec<&str> = ran.iter().map(|v| v.name).collect();
     match study::left_out(&ran).as_slice() {
         [] => String::new(),
-        names => format!("left out (--solvers all runs every solver): {}\n", names.join(", ")),
+        names => format!("not run (--solvers all runs every solver): {}\n", names.join(", ")),
     }
 }
 
@@ -76,7 +75,7 @@ pub fn scene() -> impl TypedValueParser<Value = String> {
 
 /// Help for one scene.
 pub fn scene_help() -> String {
-    format!("Scene, with a size after a colon where it has one, or a .json file: {}", scene_names())
+    format!("Scene, with an optional size after a colon, or a .json file: {}", scene_names())
 }
 
 /// Help for several scenes.
@@ -136,13 +135,12 @@ pub fn impacts() -> impl TypedValueParser<Value = Impacts> {
 /// `--impacts` of commands that take one treatment.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ImpactArgs {
-    /// What happens where bodies hit each other: own is the solver's treatment, waves are waves of impacts
-    /// before the step, none lets nothing bounce
+    /// Impact law: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off
     #[arg(long, default_value = "own", value_name = "TREATMENT", value_parser = impacts())]
     pub impacts: Impacts,
 }
 
-/// Each width once, from the narrowest; `own` where none are given.
+/// Each width once, from the narrowest; `own` if none are given.
 pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
     if given.is_empty() {
         return own;
@@ -171,7 +169,7 @@ pub struct SettingArgs {
     /// Position sweeps per substep [default: the solver's]
     #[arg(long, value_name = "N")]
     pub position_iterations: Option<u32>,
-    /// Parameters of the solver, as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// Impacts
@@ -201,7 +199,7 @@ impl SettingArgs {
         Ok(Settings { budget, parameters, impacts: self.impacts.impacts, ..Settings::new(self.solver) })
     }
 
-    /// The budget. Errors: one that the solver cannot work with; sweeps that it does not make.
+    /// The budget. Errors: one that the solver cannot run with; sweeps that it does not make.
     pub fn budget(&self) -> Result<Budget, Error> {
         let own = self.solver.budget;
         let given = [

@@ -1,4 +1,4 @@
-//! `simpulse verify`: hard cases with known truths, against every solver.
+//! `simpulse verify`: hard cases with known answers, against every solver.
 
 use super::output::{self, finite, print_json};
 use super::progress::Bar;
@@ -44,7 +44,7 @@ pub struct VerifyArgs {
     /// Print JSON instead of text: everything that was measured
     #[arg(long)]
     pub json: bool,
-    /// Only list the cases: tolerances, and what is required of the default solver
+    /// List the cases with their tolerances and what is required of the default solver, without running them
     #[arg(long)]
     pub list: bool,
     /// Threads; the results do not depend on them
@@ -80,7 +80,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
 /// Mean time of a case on one Zen 5 core (s).
 const SECONDS_PER_CASE: f64 = 0.25;
 
-/// 1 if the default solver ran and broke a promise.
+/// 1 if the default solver ran and failed a required case.
 fn exit_code(matrix: &Matrix) -> ExitCode {
     match matrix.broken_promises(DEFAULT) {
         Some(broken) if !broken.is_empty() => ExitCode::FAILURE,
@@ -162,11 +162,11 @@ fn text(matrix: &Matrix) -> String {
     }
     let others = CASES.len() - matrix.cases.len();
     let left =
-        if others > 0 { format!("left out: {others} of {} cases\n", CASES.len()) } else { String::new() };
+        if others > 0 { format!("not run: {others} of {} cases\n", CASES.len()) } else { String::new() };
     text + &skipped() + &left
 }
 
-/// What all solvers have in common; none where they differ.
+/// The value that all solvers share; none if they differ.
 fn common(cells: &[Cell], value: impl Fn(&Finding) -> f64) -> Option<f64> {
     let mut values = cells.iter().filter_map(|cell| match cell {
         Cell::Found(finding) => Some(value(finding)),

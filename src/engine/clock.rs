@@ -70,6 +70,19 @@ impl Phase {
 }
 
 /// Time of each phase of the last step, and of the whole step.
+///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// use simpulse::engine::clock::Phase;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::find("pgs")?) });
+/// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
+/// world.step()?;
+/// for phase in Phase::ALL {
+///     println!("{:<12} {} ns", phase.name(), world.timings.phase_ns[phase as usize]);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timings {
     /// Nanoseconds per phase, indexed by `Phase as usize`.
@@ -85,8 +98,9 @@ impl Timings {
     }
 }
 
-/// What the passes of one phase request, where that is counted.
+/// Memory requests of the passes of one phase, if counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Requested {
     /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
     /// rows written.
@@ -95,9 +109,9 @@ pub struct Requested {
     pub bytes: [f64; 2],
 }
 
-/// Which phases of a step run: all of them, or one alone, again and again, on the records of a
-/// step that was prepared before.
+/// Which phases of a step run: all, or one alone on the records of an earlier step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[doc(hidden)]
 pub struct PhaseFilter {
     /// The only phase that runs; none: all do.
     pub only: Option<Phase>,
@@ -118,6 +132,7 @@ impl PhaseFilter {
 
 /// Adds the time since the last lap to a phase, and counts laps; reads no clock while it is off.
 #[derive(Debug)]
+#[doc(hidden)]
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
@@ -162,7 +177,7 @@ impl Clock {
         self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
     }
 
-    /// What has been booked.
+    /// The times so far.
     pub(crate) fn requested(&self) -> Requested {
         self.requested
     }
@@ -172,7 +187,7 @@ impl Clock {
         self.laps
     }
 
-    /// Books the time since the last lap on `phase`.
+    /// Adds the time since the last lap to `phase`.
     #[inline]
     pub fn lap(&mut self, phase: Phase) {
         if let Some((_, last)) = &mut self.start {
@@ -202,8 +217,9 @@ impl Clock {
     }
 }
 
-/// Time that this thread was ready to run and did not, since it began. None where the system does
-/// not say; what a hypervisor takes is not in it.
+/// Time that this thread was ready but not running, since it started. None where the system does not report it; time
+/// taken by a hypervisor is not included.
+#[doc(hidden)]
 pub fn waited() -> Option<Duration> {
     parse_wait(&std::fs::read_to_string("/proc/thread-self/schedstat").ok()?)
 }

@@ -27,12 +27,11 @@ use crate::engine::lanes::held;
 /// or kinematic body is read but never written.
 pub const EXEMPT: u32 = u32::MAX;
 
-/// Most colors: the bits of a mask. With a mask per body the lowest free
-/// color of an edge is one OR and one bit count, where lists or a table of
-/// color × body would search.
+/// Maximum number of colors: the bits of a mask. With a mask per body the lowest free color of an edge is one OR and
+/// one bit count, where lists or a table of color × body would search.
 pub const MAX_COLORS: usize = u64::BITS as usize;
 
-/// The color of edges that got none.
+/// The color of edges without a color.
 pub const OVERFLOW: u8 = u8::MAX;
 
 /// A coloring of edges and the buffers to make the next one.
@@ -105,7 +104,7 @@ impl Coloring {
         }
     }
 
-    /// Makes the next call of [`Self::assign`] recompute the colors whatever its arguments.
+    /// Forces the next call of [`Self::assign`] to recompute the colors.
     pub fn forget(&mut self) {
         self.starts.clear();
     }
@@ -116,7 +115,7 @@ impl Coloring {
         small + held(&self.edges) + held(&self.used)
     }
 
-    /// Whether the coloring is that of these edges.
+    /// Whether the coloring belongs to these edges.
     pub fn is_current(&self, edges: &[[u32; 2]], body_count: usize) -> bool {
         self.body_count == body_count && self.edges == edges && !self.starts.is_empty()
     }

@@ -8,10 +8,10 @@ use glam::Vec2;
 #[repr(C)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ManifoldPoint {
-    /// From the centre of mass of body a to the contact point, world axes (m): midway between both surfaces, or
+    /// From the center of mass of body a to the contact point, world axes (m): midway between both surfaces, or
     /// on that of b if a is static or kinematic.
     pub anchor_a: Vec2,
-    /// From the centre of mass of body b to the same point, world axes (m).
+    /// From the center of mass of body b to the same point, world axes (m).
     pub anchor_b: Vec2,
     /// Signed gap along the normal (m); negative is overlap.
     pub separation: f32,
@@ -38,6 +38,24 @@ pub struct Manifold {
 
 /// Two shapes close enough to touch: eight quads, two cache lines.
 ///
+/// ```
+/// # use simpulse_engine as simpulse;
+/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("shim")?) };
+/// let mut world = World::new(settings);
+/// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
+/// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+/// for _ in 0..60 {
+///     world.step()?;
+/// }
+/// let contact = &world.contacts[0];
+/// let load: f32 = contact.step_impulse.iter().map(|[normal, _]| normal / world.settings.dt).sum();
+/// let deepest = contact.manifold.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
+/// // A box of 1 kg weighs 10 N.
+/// assert!((load - 10.0).abs() < 0.01 && deepest < 1e-4, "{load} N, {deepest} m");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// The narrow phase writes the first five in lanes and preparation reads them in lanes, so their
 /// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -61,16 +79,17 @@ pub struct Contact {
     /// Per point, normal and tangential impulse summed over the step (N·s);
     /// only kept while `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner, infinite on a
-    /// face; both 0 where nothing is round. Only found for solvers that ask for them.
+    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner,
+    /// infinite on a face; both 0 where nothing is round. Only computed for solvers that request them.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub radii: [f32; 2],
-    /// Fills the second cache line.
+    /// Padding to two cache lines.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub unused: f32,
 }
 
-/// Quads of a [`Contact`], and which of them holds what.
+/// Layout of a [`Contact`] in quads.
+#[doc(hidden)]
 pub mod quad {
     /// Quads per contact.
     pub const STRIDE: usize = size_of::<super::Contact>() / 16;

@@ -1,21 +1,21 @@
-//! What a caller of the engine can get wrong.
+//! Errors of the engine's callers.
 //!
 //! Hot loops are infallible. A simulation that diverges is an *outcome*
 //! ([`crate::engine::world::Divergence`]), not an error.
 
 use std::fmt;
 
-/// A value or a name that the engine refuses.
+/// A value or a name that the engine rejects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// A value is out of its range.
+    /// A value out of its range.
     Invalid {
         /// Where the value stands, for example `vertices`.
         place: String,
-        /// What is wrong with it, with the value itself.
+        /// The reason, with the value.
         message: String,
     },
-    /// A handle whose body was removed.
+    /// A handle of a removed body.
     Removed {
         /// The index that the body had.
         body: usize,
@@ -32,7 +32,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The same about a value inside `place`; other errors know where they are.
+    /// Prefixes the place of an invalid value with `place`; other errors stay as they are.
     pub fn within(self, place: &str) -> Self {
         match self {
             Error::Invalid { place: inner, message } => {

@@ -1,6 +1,5 @@
-//! The engine of simpulse as a crate of its own, so that its kernels are compiled once: not again
-//! for the unit tests of the laboratory, nor after a change to it. `simpulse` re-exports the one
-//! module, and its path is the same from every storey.
+//! The engine of simpulse as its own crate, so that its kernels are compiled once, independent of the laboratory.
+//! `simpulse` re-exports its one module, [`engine`]; start there.
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 

@@ -1,5 +1,4 @@
-#![doc = include_str!("README.md")]
-//! # Example
+//! The engine: it advances bodies with shapes by one step at a time.
 //!
 //! ```
 //! # use simpulse_engine as simpulse;
@@ -18,16 +17,19 @@
 //! assert!((world.bodies.position_y[top.index()] - 0.5).abs() < 1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+#![doc = include_str!("README.md")]
 
 pub mod bodies;
 pub mod broadphase;
 pub mod clock;
+#[doc(hidden)]
 pub mod coloring;
 pub mod constraints;
 pub mod contacts;
 pub mod continuous;
 pub mod error;
 pub mod lanes;
+#[doc(hidden)]
 pub mod narrowphase;
 pub mod params;
 pub mod shapes;

@@ -12,7 +12,7 @@ pub const SPECULATIVE_DISTANCE: f32 = 4.0 * LINEAR_SLOP;
 /// has moved that far. Larger: more candidates. Smaller: more searches.
 pub const AABB_MARGIN: f32 = 0.1;
 
-/// Fraction of the overlap that Baumgarte stabilisation removes per step (1).
+/// Fraction of the overlap that Baumgarte stabilization removes per step (1).
 pub const BAUMGARTE: f32 = 0.3;
 
 /// Stiffness of a soft contact between two dynamic bodies (Hz); contacts with
@@ -22,7 +22,7 @@ pub const CONTACT_HERTZ: f32 = 30.0;
 /// A soft contact's frequency is capped at this fraction of the substep rate (1).
 pub const CONTACT_HERTZ_FRACTION: f32 = 0.125;
 
-/// The same of solvers without substeps (1).
+/// The same for solvers without substeps (1).
 pub const CONTACT_HERTZ_FRACTION_OF_STEP: f32 = 1.0 / 3.0;
 
 /// Damping ratio of a soft contact (1): far above critical, so that it does not bounce.
@@ -31,35 +31,35 @@ pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
 /// Fastest speed at which overlap is pushed apart (m/s).
 pub const MAX_PUSH_SPEED: f32 = 3.0;
 
-/// Most overlap that one position sweep removes at a point (m): more would turn bodies
-/// further than a linearised contact can follow.
+/// Largest overlap that one position sweep removes at a point (m): more would turn bodies further than a linearized
+/// contact can follow.
 pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 
 /// Approach speeds above this bounce (m/s), where a source has no other.
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 
-/// Most vertices of a convex polygon.
+/// Maximum number of vertices of a convex polygon.
 pub const MAX_POLYGON_VERTICES: usize = 8;
 
-/// Friction coefficient where a scene gives none (1).
+/// Default friction coefficient (1).
 pub const DEFAULT_FRICTION: f64 = 0.6;
 
-/// Density where a scene gives none (kg/m²).
+/// Default density (kg/m²).
 pub const DEFAULT_DENSITY: f64 = 1.0;
 
-/// Gravity where a scene gives none (m/s²).
+/// Default gravity (m/s²).
 pub const DEFAULT_GRAVITY: [f64; 2] = [0.0, -10.0];
 
-/// Step where a scene gives none (s).
+/// Default step (s).
 pub const DEFAULT_DT: f64 = 1.0 / 60.0;
 
-/// Bodies that approach each other faster than this (m/s) hit each other.
+/// Approach speed above which a contact reports a hit (m/s).
 pub const HIT_SPEED: f32 = 1.0;
 
 /// Bodies faster than this (m/s) or, in rad/s, spinning faster than this, have diverged.
 pub const DIVERGED_SPEED: f32 = 1.0e5;
 
-/// How much work one step may do.
+/// The work of one step.
 ///
 /// Each solver reads the fields that its schedule has and ignores the rest;
 /// its row in [`crate::engine::solvers::VARIANTS`] says which.
@@ -76,29 +76,29 @@ pub struct Budget {
     pub position_iterations: u32,
 }
 
-/// Most parameters that a solver has.
+/// Maximum number of parameters of a solver.
 pub const MAX_PARAMETERS: usize = 8;
 
-/// A number that a solver can be given, beside its budget.
+/// A tunable number of a solver, in addition to its budget.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Name for settings, records and the command line, in `snake_case`.
     pub name: &'static str,
     /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// Value where none is given.
+    /// Default value.
     pub default: f32,
-    /// Least and greatest value.
+    /// Smallest and largest value.
     pub range: [f32; 2],
-    /// What it does, in one line.
+    /// Its effect, in one line.
     pub meaning: &'static str,
-    /// Values that a search for a good setting tries; empty where the standard one is kept.
+    /// Values that `simpulse advise` tries; empty to keep the default.
     pub trials: &'static [f32],
 }
 
-/// What several solvers can be given.
+/// Parameters that several solvers share.
 impl Parameter {
-    /// Share of the overlap that Baumgarte stabilisation removes.
+    /// Share of the overlap that Baumgarte stabilization removes.
     pub const BAUMGARTE: Parameter = Parameter {
         name: "baumgarte",
         unit: "",
@@ -147,7 +147,7 @@ impl Parameter {
     /// Fastest speed at which overlap is pushed apart, [`MAX_PUSH_SPEED`].
     pub const PUSH_SPEED: Parameter = Parameter::push_speed(MAX_PUSH_SPEED);
 
-    /// The same, with a standard value (m/s) of the solver's own.
+    /// The same with another default (m/s).
     pub const fn push_speed(default: f32) -> Parameter {
         Parameter {
             name: "push_speed",

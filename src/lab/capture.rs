@@ -25,7 +25,19 @@ use crate::engine::world::World;
 use crate::lab::reference::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
 use glam::Vec2;
 
-/// The problem of the coming step, under this name.
+/// The problem of the coming step, under this name. Solve it with [`reference`](crate::lab::reference::certify::reference).
+///
+/// ```
+/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::lab::{capture::capture, reference::certify, scenes};
+///
+/// let mut world = scenes::load("stack:3")?.scene.build(Settings::new(solvers::find("pgs")?))?;
+/// world.step()?;
+/// let problem = capture(&mut world, "step 2 of a stack");
+/// let exact = certify::reference(&problem).map_err(|_| "no method certifies it")?;
+/// assert_eq!(exact.impulses.len(), problem.contacts.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// Finds the contacts of the step, but moves nothing. Static bodies are left out; bodies keep
 /// their order, contacts are sorted by shape pair. Where nothing in the scene can turn a body,

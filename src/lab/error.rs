@@ -11,8 +11,7 @@ const LONGEST: usize = 400;
 /// Longest name for which a similar one is looked for (bytes): memory and time grow with it.
 pub(in crate::lab) const LONGEST_MISSPELT: usize = 100;
 
-/// What a caller can get wrong, each variant carrying the offending value. Every message is one
-/// line, whatever the value is.
+/// Errors of the caller; each variant carries the offending value. Every message is one line, whatever the value is.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be read or written.
@@ -20,7 +19,7 @@ pub enum Error {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file is not of the expected form.
@@ -28,7 +27,7 @@ pub enum Error {
     Format {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with line and column where they are known.
+        /// The reason, with line and column if known.
         message: String,
     },
     /// A value is out of its range.
@@ -36,7 +35,7 @@ pub enum Error {
     Invalid {
         /// Where the value stands, for example `bodies[3].shapes[0].density`.
         place: String,
-        /// What is wrong with it, with the value itself.
+        /// The reason, with the value.
         message: String,
     },
     /// A name that is not in its table.

@@ -1,4 +1,4 @@
-//! What a run will take, before it starts: time and memory from bodies, steps and settings.
+//! Estimates before a run: time and memory from bodies, steps and settings.
 //!
 //! Figures are of pyramids (three contacts of two points per body) on one Zen 5 core, rounded; scenes with
 //! fewer contacts take a fraction of it, other machines a few times as much. That is enough to tell
@@ -60,7 +60,7 @@ impl Estimate {
     pub fn note(&self, what: &str, free: Option<f64>) -> Result<String, Error> {
         if let Some(free) = free.filter(|&free| self.bytes > free) {
             let message =
-                format!("needs about {} of memory, where {} are free", bytes(self.bytes), bytes(free));
+                format!("needs about {} of memory, but {} are free", bytes(self.bytes), bytes(free));
             return Err(Error::invalid(what, message));
         }
         if self.seconds <= LONG && self.bytes <= LARGE {
@@ -118,7 +118,7 @@ mod tests {
         assert_eq!(of(600.0, 0.5).note("x", None).unwrap(), "x: about 10 min and 512 MiB of memory\n");
         assert_eq!(of(1.0, 5.0).note("x", None).unwrap(), "x: about 1 s and 5.0 GiB of memory\n");
         let refused = of(1.0, 50.0).note("x", Some(of(0.0, 20.0).bytes)).unwrap_err().to_string();
-        assert_eq!(refused, "x: needs about 50 GiB of memory, where 20 GiB are free");
+        assert_eq!(refused, "x: needs about 50 GiB of memory, but 20 GiB are free");
         assert_eq!(of(2.0, 1.0).then(of(3.0, 0.5)), of(5.0, 1.0));
     }
 

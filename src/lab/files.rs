@@ -1,9 +1,8 @@
 //! Result files: all or nothing.
 //!
-//! A regular file is written under a temporary name in its own folder and renamed when it is whole,
-//! so that an interrupted run leaves no half file; a link is followed, and the file that it leads to is
-//! replaced. What is not a regular file (a device, a pipe, `/dev/stdout`) is written through, and
-//! `-` is standard output.
+//! A regular file is written under a temporary name in its own folder and renamed when it is complete, so an
+//! interrupted run leaves no partial file. Links are followed, and their target is replaced. Devices, pipes and
+//! `/dev/stdout` are written directly; `-` is standard output.
 //!
 //! Temporary names are kept in a list until they are gone, so that a signal can remove them
 //! ([`remove_temporaries`]).
@@ -251,7 +250,7 @@ impl Lock {
         match file.try_lock() {
             Ok(()) => {}
             Err(std::fs::TryLockError::WouldBlock) => {
-                let message = "another study writes into it; give another folder with --out";
+                let message = "another study is writing there; give another folder with --out";
                 return Err(Error::invalid(folder.display().to_string(), message));
             }
             // A system without locks: two studies are the user's to keep apart.
@@ -322,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_in_use_is_refused_by_name_and_free_afterwards() {
+    fn a_folder_in_use_is_refused_by_name_and_free_afterward() {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::of(folder.path()).unwrap();
         let message = Lock::of(folder.path()).unwrap_err().to_string();

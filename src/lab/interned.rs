@@ -1,7 +1,7 @@
 //! Names that live as long as the program, read from records.
 //!
-//! Names of solvers, quantities and units are `&'static str` where they are made. Reading a record gives
-//! the same type back: every name is kept once, and there are few.
+//! Names of solvers, quantities and units are `&'static str` where they are made. Reading a record returns the same
+//! type: every name is stored once, and there are few.
 
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeSet;

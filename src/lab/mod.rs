@@ -1,7 +1,7 @@
 #![doc = include_str!("README.md")]
 //! # From code
 //!
-//! A scene as JSON, run under a solver, its errors measured, and a metric of one's own:
+//! Run a scene from JSON under a solver, measure its errors, and add your own metric:
 //!
 //! ```
 //! use simpulse::engine::{solvers, world::Settings};
@@ -28,7 +28,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A study, and its CSV:
+//! Run a study and read its CSV:
 //!
 //! ```
 //! use simpulse::engine::solvers::find;
@@ -50,7 +50,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! One step's contact problem, its exact solution, and the sweeps that solvers need to come to it:
+//! Freeze the contact problem of one step and solve it exactly:
 //!
 //! ```
 //! use simpulse::engine::{solvers, world::Settings};
@@ -66,9 +66,24 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # Floors
+//! Save a world as JSON and load it; it continues with the same bits:
 //!
-//! Each imports from those before it only:
+//! ```
+//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse::lab::scenes;
+//!
+//! let mut world = scenes::load("stack:3")?.scene.build(Settings::new(solvers::find("soft_step")?))?;
+//! world.step()?;
+//! let mut copy: World = serde_json::from_str(&serde_json::to_string(&world)?)?;
+//! world.step()?;
+//! copy.step()?;
+//! assert_eq!(copy.state_hash(), world.state_hash());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Layers
+//!
+//! Each module imports only from those above it:
 //!
 //! ```text
 //! error                          what can go wrong
@@ -104,5 +119,6 @@ pub mod report;
 pub mod scenes;
 pub mod study;
 pub mod torture;
+#[doc(hidden)]
 pub mod units;
 pub mod verify;

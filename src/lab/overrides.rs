@@ -1,7 +1,7 @@
-//! Parameters of solvers as they are given by name: `contact_hertz=60`.
+//! Solver parameters by name: `contact_hertz=60`.
 //!
-//! Several solvers are often run side by side, so a list of overrides reaches those that have the
-//! parameter and must reach at least one.
+//! Several solvers often run together, so an override applies to those that have the parameter, and must apply to at
+//! least one.
 
 use crate::engine::params::Parameters;
 use crate::engine::solvers::{VARIANTS, Variant};

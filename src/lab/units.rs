@@ -1,4 +1,4 @@
-//! Human-readable numbers, three digits with the prefix that fits; and reading them.
+//! Formatting of numbers with three digits and an SI prefix, and parsing.
 
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
@@ -115,9 +115,9 @@ mod tests {
 
     #[test]
     fn prefixes_fit_and_do_not_round_to_a_thousand() {
-        let metres: Vec<_> =
+        let meters: Vec<_> =
             [0.0, 1.234, 0.0123, 4.56e-5, 9.996e-4, 2e-13, -3e-9, 5e4].map(|x| si(x, "m")).to_vec();
-        assert_eq!(metres, ["0 m", "1.23 m", "12.3 mm", "45.6 µm", "1.00 mm", "0 m", "-3.00 nm", "50.0 km"]);
+        assert_eq!(meters, ["0 m", "1.23 m", "12.3 mm", "45.6 µm", "1.00 mm", "0 m", "-3.00 nm", "50.0 km"]);
         assert_eq!(
             (si(0.00123, ""), si(0.0, ""), si(0.5, "1")),
             ("1.2e-3".into(), "0".into(), "5.0e-1".into())

@@ -21,7 +21,7 @@ fn degrees(edges: &[[u32; 2]]) -> [usize; BODIES] {
 /// Body pairs, some sides exempt; few bodies, so that long lists overflow.
 fn graph() -> impl Strategy<Value = Vec<[u32; 2]>> {
     let body = || prop_oneof![8 => 0u32..BODIES as u32, 1 => Just(EXEMPT)];
-    let edge = (body(), body()).prop_filter_map("a body is no neighbour of itself", |(a, b)| {
+    let edge = (body(), body()).prop_filter_map("a body is no neighbor of itself", |(a, b)| {
         (a != b || a == EXEMPT).then_some([a, b])
     });
     prop_oneof![proptest::collection::vec(edge.clone(), 0..60), proptest::collection::vec(edge, 500..1500)]
@@ -115,7 +115,7 @@ fn a_star_overflows() {
     coloring.assign(&edges, 1001);
     assert_eq!(coloring.colors(), MAX_COLORS);
     assert_eq!(coloring.overflow(), (64..1000).collect::<Vec<u32>>());
-    // The overflow of the star's centre says nothing about its points.
+    // The overflow of the star's center says nothing about its points.
     let mut more = edges;
     more.push([999, 1000]);
     coloring.assign(&more, 1001);

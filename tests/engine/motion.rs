@@ -59,7 +59,7 @@ fn free_fall_is_the_discrete_parabola() {
     }
 }
 
-/// Free spin (A16): θ = ω t when turned exactly, atan(ω h)/(ω h) of it when normalised.
+/// Free spin (A16): θ = ω t when turned exactly, atan(ω h)/(ω h) of it when normalized.
 #[test]
 fn free_spin_turns_by_the_angle_of_its_update() {
     for update in [RotationUpdate::Exact, RotationUpdate::Normalized] {

@@ -8,14 +8,14 @@ use simpulse::engine::contacts::Manifold;
 use simpulse::engine::narrowphase::{collide, collide_in_step, epa, gjk};
 use simpulse::engine::shapes::{Pose, Shape};
 
-/// Shapes are within a few metres of each other, so this keeps every point.
+/// Shapes are within a few meters of each other, so this keeps every point.
 const FAR: f32 = 1.0e6;
 
 /// Relative rounding of a separation: rotation, translation and dot product of a
 /// coordinate are some ten operations of 2⁻²⁴ each.
 const ROUNDING: f64 = 1.0e-6;
 
-/// Half a millimetre in favour of a's face between flush faces (`REFERENCE_TOLERANCE`).
+/// Half a millimeter in favor of a's face between flush faces (`REFERENCE_TOLERANCE`).
 const FLUSH_PREFERENCE: f64 = 5.0e-4;
 
 /// Vertices closer than this take the face's normal (`VERTEX_TOLERANCE`).
@@ -168,7 +168,7 @@ fn rounded_corners_meet_along_the_line_between_them() {
 }
 
 #[test]
-fn centred_circles_have_no_lever_arm() {
+fn centered_circles_have_no_lever_arm() {
     let (small, large) = (Shape::circle("c", Vec2::ZERO, 0.3), Shape::circle("c", Vec2::ZERO, 7.0));
     let (small, large) = (small.expect("valid"), large.expect("valid"));
     for k in 0..100 {
@@ -187,7 +187,7 @@ fn degenerate_positions_have_the_stated_normal() {
     let m = collide(&ball, &at(1.0, 1.0), &ball, &at(1.0, 1.0), 0.02);
     assert_eq!((m.normal, m.points[0].separation), (v(0.0, 1.0), -1.0));
 
-    // Centred in a 4 × 2 box: out of a long face; nearer to the right face: out of that.
+    // Centered in a 4 × 2 box: out of a long face; nearer to the right face: out of that.
     let block = rectangle(2.0, 1.0);
     let m = collide(&block, &at(0.0, 0.0), &ball, &at(0.0, 0.0), 0.02);
     assert_eq!((m.normal.y.abs(), m.points[0].separation), (1.0, -1.5));
@@ -199,7 +199,7 @@ fn degenerate_positions_have_the_stated_normal() {
     let m = collide(&segment, &at(0.0, 0.0), &ball, &at(1.0, 0.0), 0.02);
     assert_eq!((m.normal, m.points[0].separation), (v(0.0, 1.0), -0.5));
 
-    // Two boxes at one place: half a metre each way.
+    // Two boxes at one place: half a meter each way.
     let unit = rectangle(0.5, 0.5);
     let m = collide(&unit, &at(0.0, 0.0), &unit, &at(0.0, 0.0), 0.02);
     assert_eq!((m.count, separation(&m), m.normal.length()), (2, -1.0, 1.0));

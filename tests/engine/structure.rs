@@ -1,4 +1,4 @@
-//! What the tree promises to a reader: imports point downwards, every solver has a row, every
+//! What the tree promises to a reader: imports point downward, every solver has a row, every
 //! source an entry, every path named in `papers/README.md` a file.
 
 use simpulse::engine::solvers::VARIANTS;
@@ -24,7 +24,7 @@ fn files(folder: &Path) -> Vec<(PathBuf, String)> {
     found
 }
 
-/// The code of a file: without comments and without its unit tests, which may look upwards.
+/// The code of a file: without comments and without its unit tests, which may look upward.
 fn code(text: &str) -> String {
     let text = text.split("#[cfg(test)]").next().unwrap_or(text);
     let lines = text.lines().map(|line| line.split("//").next().unwrap_or(line));
@@ -67,7 +67,7 @@ fn named_after<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
     named
 }
 
-/// Rooms of a storey from the ground up; those on one floor do not import each other.
+/// Rooms of a story from the ground up; those on one floor do not import each other.
 const ENGINE: &[&[&str]] = &[
     &["error", "params", "lanes"],
     &["clock", "shapes", "contacts", "coloring"],

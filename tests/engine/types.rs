@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 /// Records: unit vector from a to b (2), error of the distance (m), effective mass (kg), impulse (N·s).
 const STRIDE: usize = 5;
 
-/// Centres of mass of bodies a and b at a fixed distance: (v_b − v_a)·u + β C/h = 0.
+/// Centers of mass of bodies a and b at a fixed distance: (v_b − v_a)·u + β C/h = 0.
 #[derive(Debug)]
 struct Rods {
     ends: Vec<[u32; 2]>,
@@ -202,7 +202,7 @@ fn rods_take_part_in_sweeps_that_sum_up() {
     }
 }
 
-/// In one sweep that sums up, a rod sees nothing of what its neighbours do.
+/// In one sweep that sums up, a rod sees nothing of what its neighbors do.
 #[test]
 fn one_jacobi_sweep_moves_the_neighbours_of_what_moves_and_no_others() {
     let speeds = |solver: &str| {

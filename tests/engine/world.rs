@@ -248,7 +248,7 @@ fn a_moved_ground_is_found_where_it_is() {
     );
 }
 
-/// Every shape, turned, moved off centre and far from the origin, against rays and points.
+/// Every shape, turned, moved off center and far from the origin, against rays and points.
 #[test]
 fn rays_end_where_points_are_inside() {
     for (far, kind) in
@@ -310,7 +310,7 @@ fn a_box_query_is_exact() {
     let line =
         world.add_body(&BodyDef::fixed([0.0; 2]).with(ShapeDef::segment([2.0, 0.0], [4.0, 2.0]).unwrap()));
     let queries = world.queries();
-    // The corner of the box at 45° from the centre: the disc reaches to 0.7071 on both axes.
+    // The corner of the box at 45° from the center: the disc reaches to 0.7071 on both axes.
     assert_eq!(queries.bodies_in([0.70, 0.70], [1.5, 1.5]).unwrap(), [disc]);
     assert_eq!(queries.bodies_in([0.71, 0.71], [1.5, 1.5]).unwrap(), []);
     // The line from (2, 0) to (4, 2) passes (3, 1).

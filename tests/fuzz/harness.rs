@@ -71,7 +71,7 @@ pub fn run(target: &Target, inputs: u64) {
     let summary = |count, accepted, kinds, slowest: Duration| {
         let (name, time) = (target.name, clock.read() - start);
         format!(
-            "{name}: {time:.0?}, {count} inputs, {accepted} accepted, {kinds} kinds of behaviour, slowest {slowest:.1?}"
+            "{name}: {time:.0?}, {count} inputs, {accepted} accepted, {kinds} kinds of behavior, slowest {slowest:.1?}"
         )
     };
     while seconds.map_or(count < inputs, |s| clock.read() - start < s) {
@@ -130,7 +130,7 @@ pub fn run(target: &Target, inputs: u64) {
     assert!(reports.is_empty(), "{}", reports.join("\n"));
 }
 
-/// The judgement, with a panic as something wrong.
+/// The judgment, with a panic as something wrong.
 fn judge(target: &Target, input: &[u8], salt: u64) -> Result<String, String> {
     QUIET.set(true);
     let verdict = catch_unwind(AssertUnwindSafe(|| (target.judge)(input, salt)));

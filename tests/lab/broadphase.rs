@@ -83,7 +83,7 @@ fn boxes_at_one_place() {
     assert_eq!(check(&points).len(), 60 * 59 / 2);
 }
 
-/// 21 boxes per row, each within a margin of its neighbours, on a ground of half extents (100, 1).
+/// 21 boxes per row, each within a margin of its neighbors, on a ground of half extents (100, 1).
 #[test]
 fn pyramid_on_a_ground() {
     let margin = 0.02;
@@ -96,7 +96,7 @@ fn pyramid_on_a_ground() {
             proxies.push(boxed([x - margin, row as f32 - margin], [size, size], proxies.len() as u32));
         }
     }
-    // Ground 21; per row of k boxes k − 1 neighbours and 2(k − 1) supports of the row above.
+    // Ground 21; per row of k boxes k − 1 neighbors and 2(k − 1) supports of the row above.
     assert_eq!(check(&proxies).len(), 21 + (1..=21).map(|k| 3 * (k - 1)).sum::<usize>());
 }
 
@@ -381,7 +381,7 @@ fn body_def(kind: BodyKind, position: [f64; 2]) -> BodyDef {
     }
 }
 
-/// One of each shape, off centre.
+/// One of each shape, off center.
 fn assortment() -> [Shape; 5] {
     let (a, b) = (Vec2::new(-0.5, 0.2), Vec2::new(2.0, 0.3));
     [

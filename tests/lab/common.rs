@@ -16,7 +16,7 @@ pub fn with_width(variant: &'static Variant, width: LaneWidth) -> Settings {
     Settings::new(variant).exactly(width)
 }
 
-/// A scene of the catalogue, or `crowded_plate`: one dynamic plate under more bodies than
+/// A scene of the catalog, or `crowded_plate`: one dynamic plate under more bodies than
 /// there are colors, so that contacts overflow, on a kinematic plate that moves sideways.
 pub fn scene(name: &str) -> Scene {
     if name != "crowded_plate" {

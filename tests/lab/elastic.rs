@@ -17,7 +17,7 @@ fn row(
 ) -> Vec<SceneBody> {
     let mut bodies = Vec::new();
     for (k, angle) in angles.iter().enumerate() {
-        // At 1.2 m, none longer than 0.5 m on either side of its centre.
+        // At 1.2 m, none longer than 0.5 m on either side of its center.
         let x = 1.2 * k as f64;
         let shape = SceneShape::rectangle(0.45, 0.2 * slenderness[k]).friction(friction).restitution(e);
         let [vx, vy] = velocities[k];

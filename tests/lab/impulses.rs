@@ -89,7 +89,7 @@ fn parted(friction: f64) -> [f64; 2] {
 #[test]
 fn shim_parts_passing_bodies_without_changing_angular_momentum() {
     let [off, given] = parted(1e-6);
-    // Half of a push by a centimetre at a reduced mass of 0.39 kg, less what the frame of the middle lets them part by
+    // Half of a push by a centimeter at a reduced mass of 0.39 kg, less what the frame of the middle lets them part by
     // themselves in the first step, u² τ dt/ℓ = 3² · (13/28)/60 · (1/60)/0.95 = 1.2 mm.
     assert!(given > 0.4 * 0.39 * 0.01 * 3.0 && off < 0.02 * given, "{off} of {given}");
     // Nothing turns a frictionless disc.

@@ -18,7 +18,7 @@ const STEPS: u32 = 40;
 struct Symmetry {
     name: &'static str,
     image: fn(&Scene, f64) -> Scene,
-    /// Centre of a body of the image, back in the scene.
+    /// Center of a body of the image, back in the scene.
     back: fn([f64; 2], f64) -> [f64; 2],
     /// From a number in 0..1, what the other two are given.
     amount: fn(f64) -> f64,

@@ -347,7 +347,7 @@ fn speed_from_nowhere_is_a_blow_up() {
     }
 }
 
-/// Near 10⁸ m from its centre of mass the box has no width left in 32 bits. Overlap was told in
+/// Near 10⁸ m from its center of mass the box has no width left in 32 bits. Overlap was told in
 /// half widths of the thinnest shape, and so was infinite.
 #[test]
 fn a_shape_without_width_has_finite_errors() {

@@ -51,7 +51,7 @@ fn moved(name: &str, by: f64) -> Vec<SceneBody> {
     bodies
 }
 
-/// What a step does to a pile does not depend on another one in the same world: places agree to what other colours, and so another
+/// What a step does to a pile does not depend on another one in the same world: places agree to what other colors, and so another
 /// order of its contacts, leave in a second.
 #[test]
 fn a_pile_knows_nothing_of_another() {
@@ -91,7 +91,7 @@ fn statics_leaves_a_stack_where_it_is() {
             world.step().unwrap();
             for body in 0..world.bodies.len() {
                 let moved = (world.bodies.pose(body).position - before.pose(body).position).length();
-                // 20 µm at each contact below: bodies are a metre high, or two rows of a pyramid are.
+                // 20 µm at each contact below: bodies are a meter high, or two rows of a pyramid are.
                 let levels = before.pose(body).position.y.max(0.0).ceil();
                 assert!(
                     moved <= 2e-5 * levels + 1e-6,

@@ -355,7 +355,7 @@ fn growth_writes_a_row_per_size() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(text.contains("whole step:") && text.contains("contacts^"), "{text}");
         // Size 10⁷ does not exist: said, and no failure.
-        assert_eq!(text.contains("left out: 10000000"), scene == "stack", "{text}");
+        assert_eq!(text.contains("skipped: 10000000"), scene == "stack", "{text}");
         let csv = std::fs::read_to_string(folder.path().join("g/growth.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + rows, "{csv}");
         let mut reader = csv::Reader::from_reader(csv.as_bytes());

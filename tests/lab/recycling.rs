@@ -24,7 +24,7 @@ fn found_again(scene: &Scene, world: &World) -> Vec<Contact> {
 #[test]
 fn kept_manifolds_follow_their_bodies() {
     // A pile at rest, a box that stops sliding, and boxes that turn with a drum, where a face of b may have turned by
-    // 0.2 rad under a corner that has moved by 0.05 m with its centre and by 0.2 rad about it, at 0.177 m.
+    // 0.2 rad under a corner that has moved by 0.05 m with its center and by 0.2 rad about it, at 0.177 m.
     let mut differing = 0;
     for (name, steps, bound) in
         [("pyramid:8", 120, 2e-6), ("sliding_stop", 20, 2e-6), ("tumbler", 40, (0.05 + 0.2 * 0.177) * 0.2)]

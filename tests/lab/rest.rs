@@ -246,7 +246,7 @@ fn speeds_at_rest_with_positions_in_f32() {
 }
 
 /// Boxes of 100 to 300 times the mass that have fallen on pyramids rock at first. What preload would do to them by following
-/// their loads to and fro keeps them rocking for minutes, at some centimetres per second.
+/// their loads to and fro keeps them rocking for minutes, at some centimeters per second.
 #[test]
 #[ignore = "known not to hold: they rock at up to 0.2 m/s, see papers/shim.md"]
 fn heavy_boxes_on_pyramids_come_to_rest() {

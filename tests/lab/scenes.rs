@@ -1,4 +1,4 @@
-//! Scenes: the file format, the catalogue, and what every scene promises.
+//! Scenes: the file format, the catalog, and what every scene promises.
 
 use proptest::prelude::*;
 use simpulse::engine::bodies::BodyKind;
@@ -225,7 +225,7 @@ fn truths_expect_what_arithmetic_says() {
     }
 }
 
-/// Runs a scene of the catalogue to its end; the final error of its truth.
+/// Runs a scene of the catalog to its end; the final error of its truth.
 fn error_after_run(name: &str, solver: &str, substeps: u32, record_impulses: bool) -> Option<f64> {
     let Loaded { scene, truth, .. } = load(name).unwrap_or_else(|e| panic!("{e}"));
     let mut settings =

@@ -170,7 +170,7 @@ fn schema_and_reading_agree_on_every_member() {
             assert_eq!(schema, reading || beyond, "{place} = {value}");
             if reading { accepted += 1 } else { refused += 1 }
         }
-        // Left out, and misspelt.
+        // Left out, and misspelled.
         let (parent, name) = place.rsplit_once('/').unwrap();
         let mut changed = scene();
         if let Some(object) = changed.pointer_mut(parent).and_then(Value::as_object_mut) {
@@ -178,7 +178,7 @@ fn schema_and_reading_agree_on_every_member() {
             assert_eq!(by_schema(&changed), by_reading(&changed), "{place} left out");
             let object = changed.pointer_mut(parent).and_then(Value::as_object_mut).unwrap();
             object.insert(format!("{name}x"), value);
-            assert!(!by_schema(&changed) && !by_reading(&changed), "{place} misspelt");
+            assert!(!by_schema(&changed) && !by_reading(&changed), "{place} misspelled");
         }
     }
     assert!(accepted > 50 && refused > 200, "{accepted} {refused}");

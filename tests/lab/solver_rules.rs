@@ -181,7 +181,7 @@ fn a_pass_at_the_end_of_the_step_gives_back_the_speed_of_its_beginning() {
     assert!((world.bodies.velocity_y[1] - 4.0).abs() < 1e-5, "{}", world.bodies.velocity_y[1]);
 }
 
-/// The contact point of a disc stays below its centre however fast it rolls: a disc at 20 rad/s
+/// The contact point of a disc stays below its center however fast it rolls: a disc at 20 rad/s
 /// rolls as deep as it rests. (An anchor that turned with the disc, as a corner's does, would rise by
 /// r (1 − cos ω h) within a step, 12 mm here in the last of four substeps, and the disc would follow.)
 #[test]

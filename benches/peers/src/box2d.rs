@@ -210,7 +210,7 @@ impl Engine for Box2d {
 
 impl Drop for Box2d {
     fn drop(&mut self) {
-        // SAFETY: no id of this world is used afterwards.
+        // SAFETY: no id of this world is used afterward.
         unsafe { b2DestroyWorld(self.world) };
     }
 }

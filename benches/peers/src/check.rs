@@ -37,7 +37,7 @@ pub struct Errors {
     pub lost: f64,
     /// Root mean square of √(2 E_kin/M) (m/s).
     pub rms_velocity: f64,
-    /// Highest centre of a dynamic body at the end (m).
+    /// Highest center of a dynamic body at the end (m).
     pub top: f64,
     /// Farthest that a dynamic body is from where it started (m).
     pub moved: f64,
@@ -62,7 +62,7 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// For a scene of the catalogue. Errors: a scene that is not valid.
+    /// For a scene of the catalog. Errors: a scene that is not valid.
     pub fn new(Loaded { scene, truth, .. }: Loaded) -> Result<Self, String> {
         let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
         let mirror = scene.build(settings).map_err(|e| e.to_string())?;
@@ -171,7 +171,7 @@ impl Checker {
     }
 }
 
-/// Centres of the dynamic bodies (m).
+/// Centers of the dynamic bodies (m).
 fn centers(world: &World) -> impl Iterator<Item = [f64; 2]> {
     let bodies = &world.bodies;
     let dynamic = (0..bodies.len()).filter(|&i| bodies.is_dynamic(i));

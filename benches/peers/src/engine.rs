@@ -26,11 +26,11 @@ pub trait Engine {
 
 /// A body after a step, in the bits the engine holds.
 pub struct State {
-    /// Centre of mass (m).
+    /// Center of mass (m).
     pub position: [f32; 2],
     /// (cos θ, sin θ)
     pub rotation: [f32; 2],
-    /// Of the centre of mass (m/s).
+    /// Of the center of mass (m/s).
     pub velocity: [f32; 2],
     /// rad/s
     pub angular_velocity: f32,
@@ -43,7 +43,7 @@ pub enum Stage {
     Pairs,
     /// Narrow phase and impulse matching.
     Collide,
-    /// Colours, lanes or islands. Box2D: `solverSetup`, as its colours are kept up in `Collide`.
+    /// Colors, lanes or islands. Box2D: `solverSetup`, as its colors are kept up in `Collide`.
     Color,
     /// Constraint records.
     Prepare,

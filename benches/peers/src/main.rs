@@ -85,7 +85,7 @@ fn run(args: &Args) -> Result<(), String> {
     let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
     let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
         [] => SCENES.to_vec(),
-        // Any other scene of the catalogue may fall as it likes.
+        // Any other scene of the catalog may fall as it likes.
         names => names.iter().map(|name| row(name).unwrap_or((name, 300, false))).collect(),
     };
     let contenders = engine::contenders(args.quick);

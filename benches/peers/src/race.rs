@@ -161,7 +161,7 @@ struct Runner {
     clocked: Vec<Breakdown>,
 }
 
-/// Runs a scene of the catalogue for `steps` steps, `repeats` times, with `seed` where it has one; `stands` tells the check that
+/// Runs a scene of the catalog for `steps` steps, `repeats` times, with `seed` where it has one; `stands` tells the check that
 /// nothing may fall. Errors: an unknown scene, or one that an engine cannot hold.
 pub fn race(
     name: &str,

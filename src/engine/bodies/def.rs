@@ -1,4 +1,4 @@
-//! What a body is made of, and which values it may have.
+//! Definitions of bodies and shapes, and the valid ranges of their values.
 
 use super::BodyKind;
 use crate::engine::error::Error;
@@ -34,7 +34,7 @@ pub struct ShapeDef {
     pub restitution: f64,
 }
 
-/// What a body is made of, and how it starts.
+/// Definition of a body: its shapes and initial state.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -54,7 +54,7 @@ pub struct BodyDef {
     pub position: [f64; 2],
     /// rad
     pub angle: f64,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub velocity: [f64; 2],
     /// rad/s
     pub angular_velocity: f64,
@@ -66,14 +66,14 @@ pub struct BodyDef {
     pub angular_damping: f64,
     /// Bodies of the same non-zero group do not collide.
     pub group: i32,
-    /// Where it is fast, dynamic bodies stop it, too, see [`crate::engine::continuous`].
+    /// With continuous collision, dynamic bodies stop it as well, see [`crate::engine::continuous`].
     pub bullet: bool,
     /// Shapes that move as one.
     pub shapes: Vec<ShapeDef>,
 }
 
 impl ShapeDef {
-    /// A shape of standard density and friction that does not bounce.
+    /// A shape with default density and friction, without restitution.
     pub fn new(shape: Shape) -> Self {
         ShapeDef { shape, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
     }
@@ -147,7 +147,7 @@ impl ShapeDef {
 }
 
 impl BodyDef {
-    /// A body at rest at `position` (m), neither turned nor damped.
+    /// A body at rest at `position` (m), at angle 0, undamped.
     pub fn new(kind: BodyKind, position: [f64; 2], shapes: Vec<ShapeDef>) -> Self {
         BodyDef {
             kind,
@@ -174,12 +174,27 @@ impl BodyDef {
         BodyDef::new(BodyKind::Static, position, Vec::new())
     }
 
-    /// A body that moves with its given velocity, whatever it meets, at `position` (m), without shapes.
+    /// A body that keeps its given velocity in every collision, at `position` (m), without shapes.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let belt = BodyDef::kinematic([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?).with_velocity([1.0, 0.0]);
+    /// world.add_body(&belt)?;
+    /// let cargo = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+    /// for _ in 0..60 {
+    ///     world.step()?;
+    /// }
+    /// // Friction has brought the box to the speed of the belt.
+    /// assert!((world.bodies.velocity_x[cargo.index()] - 1.0).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn kinematic(position: [f64; 2]) -> Self {
         BodyDef::new(BodyKind::Kinematic, position, Vec::new())
     }
 
-    /// With one shape more.
+    /// Adds a shape.
     pub fn with(mut self, shape: ShapeDef) -> Self {
         self.shapes.push(shape);
         self
@@ -190,7 +205,7 @@ impl BodyDef {
         BodyDef { angle, ..self }
     }
 
-    /// With this velocity of the centre of mass (m/s).
+    /// With this velocity of the center of mass (m/s).
     pub fn with_velocity(self, velocity: [f64; 2]) -> Self {
         BodyDef { velocity, ..self }
     }
@@ -200,7 +215,7 @@ impl BodyDef {
         BodyDef { angular_velocity, ..self }
     }
 
-    /// Mass (kg), centre (m, in the body's frame) and inertia (kg·m²) of all shapes.
+    /// Mass (kg), center (m, in the body's frame) and inertia (kg·m²) of all shapes.
     pub fn mass(&self) -> MassProperties {
         combine(&self.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
     }

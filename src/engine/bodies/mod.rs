@@ -16,16 +16,16 @@ pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
 pub enum BodyKind {
     /// Never moves.
     Static,
-    /// Moves with its given velocity, whatever it meets.
+    /// Keeps its given velocity in every collision.
     Kinematic,
     /// Moved by forces and contacts.
     Dynamic,
 }
 
-/// The name of a body of a [`World`](crate::engine::world::World).
+/// Identifies a body of a [`World`](crate::engine::world::World).
 ///
-/// It stays valid while the body exists, whatever else is added or removed. After the body is removed its index may go to
-/// a new one; the generation tells the two apart, so that an old handle is an error and never another body.
+/// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed body may
+/// be reused; the generation distinguishes the two, so an old handle gives an error and never another body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BodyHandle {
@@ -43,9 +43,9 @@ impl BodyHandle {
 /// State of all bodies, one array per quantity, `[len]` each.
 #[derive(Clone, Debug, Default)]
 pub struct Bodies {
-    /// Centre of mass (m).
+    /// Center of mass (m).
     pub position_x: LaneVec,
-    /// Centre of mass (m).
+    /// Center of mass (m).
     pub position_y: LaneVec,
     /// Low part of the position (m): x is `position_x + position_x_lo`. See [`Bodies::advance`].
     pub position_x_lo: LaneVec,
@@ -78,15 +78,15 @@ pub struct Bodies {
     pub linear_damping: LaneVec,
     /// 1/s
     pub angular_damping: LaneVec,
-    /// From the body's origin to its centre of mass, body axes (m).
+    /// From the body's origin to its center of mass, body axes (m).
     pub local_center: Vec<Vec2>,
     /// How each body moves.
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub group: Vec<i32>,
-    /// Whether dynamic bodies stop it, where it is fast.
+    /// Whether dynamic bodies stop it under continuous collision.
     pub bullet: Vec<bool>,
-    /// Whether a body is made of discs about its centre of mass: turning it moves no contact.
+    /// Whether a body is made of discs about its center of mass: turning it moves no contact.
     pub round: Vec<bool>,
 }
 
@@ -137,7 +137,7 @@ impl Bodies {
         self.bullet[i] = def.bullet;
     }
 
-    /// Moves body `i`: the origin of its frame to `origin` (m), its angle to `angle` (rad). `center` is its centre of mass
+    /// Moves body `i`: the origin of its frame to `origin` (m), its angle to `angle` (rad). `center` is its center of mass
     /// in its frame (m).
     pub(crate) fn place(&mut self, i: usize, origin: [f64; 2], angle: f64, center: [f64; 2]) {
         let ((sin, cos), [cx, cy]) = (angle.sin_cos(), center);
@@ -199,7 +199,7 @@ impl Bodies {
         ]
     }
 
-    /// Pose of the centre of mass of body `i`.
+    /// Pose of the center of mass of body `i`.
     pub fn pose(&self, i: usize) -> Pose {
         Pose {
             position: Vec2::new(self.position_x[i], self.position_y[i]),
@@ -207,8 +207,8 @@ impl Bodies {
         }
     }
 
-    /// Poses of the centres of mass of bodies `a` and `b`, from a's position: the difference of
-    /// the positions includes their low parts, so that it is as good far out as at the origin.
+    /// Poses of the centers of mass of bodies `a` and `b`, from a's position: the difference of the positions
+    /// includes their low parts, so the result is as accurate far from the origin as near it.
     #[inline]
     pub fn relative_poses(&self, a: usize, b: usize) -> [Pose; 2] {
         let x = (self.position_x[b] - self.position_x[a]) + (self.position_x_lo[b] - self.position_x_lo[a]);
@@ -222,9 +222,9 @@ impl Bodies {
 
     /// Moves body `i` by `delta` (m).
     ///
-    /// A position of f32 alone stands still once a step's motion is below half its last
-    /// digit: 30 nm at 1 m, 4 mm at 100 km. So what the sum rounds away is kept in the low part,
-    /// by Knuth's two-sum, which is exact whatever the two magnitudes are.
+    /// A position of f32 alone stands still once a step's motion is below half its last digit: 30 nm at 1 m, 4 mm at
+    /// 100 km. So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is exact for any
+    /// magnitudes.
     #[inline]
     pub fn advance(&mut self, i: usize, delta: Vec2) {
         let add = |sum: &mut f32, lo: &mut f32, delta: f32| {
@@ -238,12 +238,12 @@ impl Bodies {
         add(&mut self.position_y[i], &mut self.position_y_lo[i], delta.y);
     }
 
-    /// Velocity of the centre of mass of body `i` (m/s).
+    /// Velocity of the center of mass of body `i` (m/s).
     pub fn velocity(&self, i: usize) -> Vec2 {
         Vec2::new(self.velocity_x[i], self.velocity_y[i])
     }
 
-    /// Centre of mass of body `i` (m), with all the digits there are.
+    /// Center of mass of body `i` (m), in full precision.
     pub fn center(&self, i: usize) -> [f64; 2] {
         [
             f64::from(self.position_x[i]) + f64::from(self.position_x_lo[i]),

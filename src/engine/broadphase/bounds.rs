@@ -5,7 +5,7 @@
 //! apart are further apart than the narrow phase looks.
 //!
 //! **The test.** Let a shape be the core points c in its body's frame, grown by a radius; x the
-//! body's centre of mass and R its rotation as a unit complex number. From a reference pose
+//! body's center of mass and R its rotation as a unit complex number. From a reference pose
 //! (x₀, R₀) to (x, R) a core point moves by (x − x₀) + (R − R₀)c, and multiplying by R − R₀ scales
 //! lengths by |R − R₀|. With reach r = max |c| the bounds therefore move, on every side, by no
 //! more than
@@ -26,7 +26,7 @@
 //! and a thousandth of itself for all of them.
 //!
 //! **The margin.** A margin saves searches while a body stays in it, and costs a candidate for
-//! every neighbour that is near and does not touch. So it is a fraction of the shape and at most
+//! every neighbor that is near and does not touch. So it is a fraction of the shape and at most
 //! [`AABB_MARGIN`]; and nothing for a shape that would cross it within [`LASTS`] steps, which
 //! would be searched for all the same, and nothing for static bodies.
 //!
@@ -171,7 +171,7 @@ impl FatBoxes {
     }
 }
 
-/// How far `tight` is inside of `fat` on the side where it is least, less what rounding may take.
+/// Smallest margin between `tight` and `fat` over all sides, less possible rounding.
 fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
     let low = (tight.min - fat.min).min_element();
     let high = (fat.max - tight.max).min_element();

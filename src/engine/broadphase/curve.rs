@@ -6,7 +6,7 @@ pub const BITS: u32 = 10;
 /// Distance along Hilbert's curve of a cell of the square of 2^[`BITS`] cells.
 ///
 /// From the largest quadrants to the smallest: the curve passes the quadrants (0,0), (0,1),
-/// (1,1), (1,0), mirrored in the first and the last so that it joins its neighbours.
+/// (1,1), (1,0), mirrored in the first and the last so that it joins its neighbors.
 pub fn hilbert(mut x: u32, mut y: u32) -> u32 {
     let mut along = 0;
     for bit in (0..BITS).rev() {
@@ -45,7 +45,7 @@ pub fn sort_digit(from: &[[u32; 2]], to: &mut Vec<[u32; 2]>, shift: u32) {
 mod tests {
     use super::*;
 
-    /// Neighbours on the curve are neighbours in the square, and every cell is passed once.
+    /// Neighbors on the curve are neighbors in the square, and every cell is passed once.
     #[test]
     fn the_curve_is_hilberts() {
         let side = 1u32 << BITS;

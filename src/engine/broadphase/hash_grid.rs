@@ -20,7 +20,7 @@
 //! with its own grid. A proxy looks for partners on its own level and on all
 //! coarser ones, where (1) holds with the coarser h.
 //!
-//! **Buckets.** Sixteen neighbouring cells of a row form a block, and blocks are
+//! **Buckets.** Sixteen neighboring cells of a row form a block, and blocks are
 //! hashed: a row of two or three cells is one contiguous run of entries, or two
 //! where it crosses a block. Hashing whole rows instead would be one run always,
 //! but proxies spaced by the table's size would all share a bucket.
@@ -287,7 +287,7 @@ impl Search<'_> {
     ///
     /// Other rows may share the buckets and are met through their own. Of row
     /// y itself no stranger is let in: the cells that (1) leaves in question
-    /// are four neighbours at most, and those never share a bucket.
+    /// are four neighbors at most, and those never share a bucket.
     #[inline]
     fn row(&mut self, entry: &Entry, level: &Level, y: i32, x0: i32, x1: i32) {
         let (first, last) = (level.bucket(x0, y), level.bucket(x1, y));

@@ -1,10 +1,9 @@
-//! Broad phase: which pairs of shapes are close enough to look at.
+//! Broad phase: finds pairs of shapes whose bounds overlap.
 //!
-//! Every kind gives the same sorted list, so the choice changes time and nothing else:
-//! [`all_pairs`] is the definition, [`HashGrid`] keeps nothing, [`Tree`] keeps its order and its
-//! list. [`FatBoxes`] say which shapes have to be looked at in a step at all, and a step in which
-//! none has left its fat box searches nothing. Nanoseconds per proxy (Zen 5, 16 lanes) for the
-//! scenes in motion, with the share of proxies that left their fat boxes:
+//! Every kind gives the same sorted list, so the choice changes only the time: [`all_pairs`] is the definition,
+//! [`HashGrid`] keeps no state, [`Tree`] keeps its order and its list. [`FatBoxes`] determine which shapes need a
+//! search; a step in which none has left its fat box searches nothing. Nanoseconds per proxy (Zen 5, 16 lanes) for
+//! the scenes in motion, with the share of proxies that left their fat boxes:
 //!
 //! ```text
 //!                     proxies   pairs   moved    grid    tree
@@ -16,8 +15,8 @@
 //! junkyard             8 262    1 223    95 %      45      12
 //! ```
 //!
-//! So the tree is ahead in all of them. Rebuilding its order takes another 15 to 40 ns per proxy,
-//! which puts the grid ahead where proxies jump to other places at every step, and are dense.
+//! So the tree is faster in all of them. Rebuilding its order takes another 15 to 40 ns per proxy, so the grid is
+//! faster in dense scenes whose proxies jump in every step.
 
 mod all_pairs;
 mod bounds;
@@ -36,7 +35,7 @@ pub use tree::Tree;
 
 use crate::engine::shapes::Aabb;
 
-/// What the broad phase knows of one shape.
+/// A shape in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proxy {
     /// Bounds, grown by whatever the narrow phase looks ahead (m).

@@ -17,7 +17,7 @@ pub enum Region {
         origin: [f32; 2],
         /// Reciprocals of its direction.
         inverse: [f32; 2],
-        /// How far it looks (m).
+        /// Distance that it searches (m).
         reach: f32,
     },
 }

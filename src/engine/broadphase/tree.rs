@@ -1,16 +1,16 @@
 //! A packed tree of boxes, sixteen children to a node, kept from step to step.
 //!
 //! **Tree.** The leaves hold the proxies in the order of a space-filling curve, sixteen each; a
-//! node holds the bounds of sixteen neighbours of the level below. There are no links: the
+//! node holds the bounds of sixteen neighbors of the level below. There are no links: the
 //! children of node k are the nodes 16k to 16k + 15 of the next level. A query tests all children
 //! of a node at once, in lanes.
 //!
 //! **Motion.** A proxy keeps its place in the order when it moves, and the bounds above it follow
-//! (refit). Bodies that move together stay neighbours, so the order lasts for many steps. It is
+//! (refit). Bodies that move together stay neighbors, so the order lasts for many steps. It is
 //! rebuilt when the perimeters of the leaves, which say how many a query enters, have grown by
 //! [`REBUILD_THRESHOLD`].
 //!
-//! **Curve.** Hilbert's, through the centres, in a square of 2^[`BITS`] cells. Proxies far larger
+//! **Curve.** Hilbert's, through the centers, in a square of 2^[`BITS`] cells. Proxies far larger
 //! than most would stretch the leaf that they share with small ones, so they come first, together.
 //!
 //! **Pairs.** Where few proxies moved, their pairs leave the list and are searched for, one proxy

@@ -13,6 +13,7 @@
 
 pub mod impacts;
 pub mod kernels;
+#[doc(hidden)]
 pub mod numerics;
 pub mod records;
 pub mod step;

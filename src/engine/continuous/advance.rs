@@ -8,7 +8,7 @@
 //! s c,   c = max(−v·n, 0) + |Δθ_a| r_a + |Δθ_b| r_b                               (1)
 //! ```
 //!
-//! with r the farthest point from the centre of mass. So t may advance by (d − δ)/c without passing the distance δ
+//! with r the farthest point from the center of mass. So t may advance by (d − δ)/c without passing the distance δ
 //! (conservative advancement). The middle of b is at least its half width w farther along n than its surface is, and it
 //! moves along n by no more than −v·n for the rest of the step, however b turns. So where
 //!
@@ -32,11 +32,11 @@ const FAR: f32 = 1e9;
 
 /// A shape on its way through the step.
 pub struct Mover<'s> {
-    /// In the frame of its body's centre of mass.
+    /// In the frame of its body's center of mass.
     pub shape: &'s Shape,
-    /// Of the centre of mass at the start.
+    /// Of the center of mass at the start.
     pub pose: Pose,
-    /// Of the centre of mass over the step (m).
+    /// Of the center of mass over the step (m).
     pub way: Vec2,
     /// Over the step (rad).
     pub turn: f32,
@@ -58,14 +58,14 @@ impl Mover<'_> {
     }
 }
 
-/// Farthest point of a shape from its body's centre of mass (m).
+/// Farthest point of a shape from its body's center of mass (m).
 pub fn reach(shape: &Shape) -> f32 {
     let mut reach = 0.0_f32;
     shape.for_each_vertex(|v| reach = reach.max(v.length()));
     reach + shape.radius()
 }
 
-/// The part of the step at which `b` is as near to `a` as a contact, if its middle would get through it afterwards and
+/// The part of the step at which `b` is as near to `a` as a contact, if its middle would get through it afterward and
 /// that is before `limit`; else `limit`.
 pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
     let width = b.shape.min_half_extent().min(reach(b.shape));
@@ -129,7 +129,7 @@ mod tests {
         // 1 mm above the floor, sinking by 2 mm.
         let slider = mover(&small, 0.0, 0.101, [5.0, -0.002], 0.0);
         assert_eq!(impact(&next, &mover(&small, 0.0, 0.11, [5.0, -0.002], 0.0), 1.0), 1.0);
-        // Nearer than half a millimetre at the joint it is: corner against corner has no side (a limit, see the module).
+        // Nearer than half a millimeter at the joint it is: corner against corner has no side (a limit, see the module).
         assert!(impact(&next, &slider, 1.0) < 0.4);
         // Against its side it is.
         let low = mover(&small, 0.0, -0.3, [5.0, 0.0], 0.0);

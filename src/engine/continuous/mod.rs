@@ -1,18 +1,18 @@
-//! Continuous collision: a step of a fast body ends where it would pass through something.
+//! Continuous collision: a fast body stops where it would pass through a surface.
 //!
-//! A contact is known once two shapes are [near](crate::engine::params::SPECULATIVE_DISTANCE). A body that moves
-//! farther in a step than half its own width may be past the middle of another one, or past all of it, before there
-//! ever was a contact. So after the solver has moved the bodies, and before their poses are written, the way of each
-//! such body is followed, and cut where its middle would get through a surface; the next step finds a contact there. Its
-//! velocity stays, so that restitution and friction find what they need.
+//! A contact exists once two shapes are [near](crate::engine::params::SPECULATIVE_DISTANCE) each other. A body that
+//! moves farther in a step than half its own width may be past the middle of another body, or completely past it,
+//! before there is a contact. So after the solver has moved the bodies, and before their poses are written, the path
+//! of each such body is traced and cut where its center would pass a surface; the next step finds a contact there.
+//! The velocity stays, so restitution and friction act as usual.
 //!
-//! Static and kinematic shapes stop every fast body; dynamic ones stop those that ask for it
-//! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). What a slow body does to a fast one is left to
-//! contacts, as is the turn of a rod, whose middle goes nowhere. Nor does a slow body's middle get into something static,
-//! whatever presses it.
+//! Static and kinematic shapes stop every fast body; dynamic shapes stop bullets only
+//! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod, whose
+//! center does not move, may pass through a thin wall. In addition, the center of a slow body never enters a static
+//! shape, whatever presses it.
 //!
-//! **Cost.** One comparison a body; for a fast one, its bounds against those of all fixed shapes, and a few distances for
-//! those that it may meet. One lane: the same bits at every width.
+//! **Cost.** One comparison per body; for a fast body, a test of its bounds against those of all fixed shapes, and a
+//! few distance computations for those that it may hit. Scalar code, so the bits are the same at every width.
 //!
 //! **Source.** Conservative advancement: `mirtich1996`.
 
@@ -28,10 +28,12 @@ use advance::{Mover, impact};
 use glam::Vec2;
 use std::ops::Range;
 
-/// What is known of the bodies of a world, and the fast ones of the last step.
+/// The bodies of a world, and the fast ones of the last step.
 #[derive(Clone, Debug, Default)]
+#[doc(hidden)]
 pub struct Continuous {
-    /// How far a body may move in a step without a look, squared (m²): half its least width. Infinite unless dynamic.
+    /// Squared distance that a body may move in a step without a test (m²): half its smallest width. Infinite unless
+    /// dynamic.
     safe_squared: Vec<f32>,
     /// First shape of each body, and one more.
     first_shape: Vec<u32>,
@@ -43,6 +45,7 @@ pub struct Continuous {
 
 /// What moves, as [`Continuous::shorten`] needs it.
 #[derive(Clone, Copy)]
+#[doc(hidden)]
 pub struct Moving<'w> {
     /// At the start of the step.
     pub bodies: &'w Bodies,
@@ -158,7 +161,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
     impact(&mover(a, body_a, pose_a), &mover(b, body_b, pose_b), limit)
 }
 
-/// Bounds of a shape over the step: those of the disc about its centre of mass that holds it however it turns.
+/// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.
 fn swept(moving: Moving<'_>, rows: &[BodyRow], shape: usize) -> Aabb {
     let body = moving.proxies[shape].body as usize;
     let reach = advance::reach(&moving.shapes[shape]);

@@ -1,8 +1,8 @@
-//! What is pressed into something static stops where its middle would get in.
+//! Stops bodies that are pressed into a static shape before their center enters it.
 //!
 //! Where a piston leaves a body no room, all of its contacts give way, and a body that is past the middle of a wall is
 //! pushed out of it on the other side. What cannot move wins: with the depth d of a contact with a static shape, its
-//! normal n towards the body, the body's way δ over the step and w half its least width,
+//! normal n toward the body, the body's way δ over the step and w half its least width,
 //!
 //! ```text
 //! d − n·δ ≤ max(w, 2 slop),                                                        (1)
@@ -55,7 +55,7 @@ mod tests {
         for kind in [BodyKind::Static, BodyKind::Kinematic, BodyKind::Dynamic] {
             bodies.push(&BodyDef::new(kind, [0.0; 2], Vec::new()), &mass);
         }
-        // Half a metre wide on each side; a wall below whose normal is up.
+        // Half a meter wide on each side; a wall below whose normal is up.
         let safe = [f32::INFINITY, f32::INFINITY, 0.25];
         let way = |body_a: u32, separation: f32, y: f32| {
             let points = [ManifoldPoint { separation, ..Default::default() }; 2];

@@ -3,9 +3,9 @@
 //! The kernels are written once for any [`Lanes`]; run with [`Counted`] they do on one lane what
 //! they do on sixteen, and every operation is booked. A thread has one book.
 //!
-//! What is counted is what the text does. A compiler leaves out what nobody reads: in a sweep the
-//! tangential part of a motion (3 of some 140 operations against a dynamic body), and against a
-//! static one also the sine and versine of its turn (10 of some 100).
+//! Counts follow the source. A compiler removes dead code: in a sweep the tangential part of a motion (3 of some 140
+//! operations against a dynamic body), and against a static one also the sine and versine of its turn (10 of some
+//! 100).
 
 use super::index::LaneIndex;
 use super::quads::Quad;
@@ -73,7 +73,7 @@ fn book(kind: Kind) {
 pub struct Counted(pub f32);
 
 impl Counted {
-    /// What this thread has done since it last asked.
+    /// Operations of this thread since the last call.
     pub fn take() -> Operations {
         BOOK.take()
     }

@@ -1,10 +1,10 @@
 //! A stack frame that begins at a cache line.
 //!
-//! What a kernel cannot hold in registers it keeps on the stack, 32 or 64 bytes at a time. The compiler aligns a
-//! frame to 16, unless a local variable needs more: that registers lack it learns only when the frame pointer, by
-//! which it could align, is given away. Then of those 32 bytes every second piece may cross a cache line, of those 64
-//! every one; and where a page ends within the frame, one of them may cross it, which costs some forty cycles in
-//! every batch. Whether one does is by chance of the process, as the system places its stack: one time in five.
+//! A kernel spills what does not fit in registers to the stack, 32 or 64 bytes at a time. The compiler aligns a frame
+//! to 16, unless a local variable needs more: that registers lack it learns only when the frame pointer, by which it
+//! could align, is given away. Then of those 32 bytes every second piece may cross a cache line, of those 64 every
+//! one; and where a page ends within the frame, one of them may cross it, which costs some forty cycles in every
+//! batch. Whether one does is by chance of the process, as the system places its stack: one time in five.
 
 use std::hint::black_box;
 

@@ -1,14 +1,13 @@
 //! Lanes: the vector operations that kernels need, at widths 1, 4, 8 and 16.
 //!
-//! One trait, [`Lanes`], holds what the kernels use and nothing else, so that a kernel is written
-//! once and compiled at every width, with the same bits lane by lane.
+//! One trait, [`Lanes`], has exactly the operations that kernels use, so that a kernel is written once and compiled
+//! at every width, with the same bits in each lane.
 //!
-//! Kernels gather and scatter by [`LaneIndex`], indices with a bound, and no index of theirs is out of
-//! place: it panics instead. What is unsafe in that is in `quads.rs` and `rows.rs`, and nothing of
-//! it depends on who implements [`Lanes`].
+//! Kernels gather and scatter by [`LaneIndex`], indices with a checked bound; an index out of bounds panics. The
+//! unsafe code for this is in `quads.rs` and `rows.rs`, and does not depend on implementations of [`Lanes`].
 //!
-//! Which instructions a width becomes is decided at build time by the target
-//! CPU; [`native_width`] tells the widest that is not emulated.
+//! The target CPU of the build decides which instructions a width uses; [`native_width`] is the widest that is not
+//! emulated.
 
 mod aligned;
 mod counted;

@@ -69,7 +69,7 @@ pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
     let _ = (values, range);
 }
 
-/// Asks for records of `STRIDE` quads, up to two cache lines of each, before they are needed.
+/// Prefetches records of `STRIDE` quads, up to two cache lines each.
 #[inline(always)]
 pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterator<Item = u32>) {
     for i in index {
@@ -78,7 +78,7 @@ pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterato
     }
 }
 
-/// Asks for the cache line of quad `OFFSET` of record `i` of `STRIDE` quads before it is needed.
+/// Prefetches the cache line of quad `OFFSET` of record `i` of `STRIDE` quads.
 #[inline(always)]
 pub fn prefetch_quad<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) {
     #[cfg(target_arch = "x86_64")]
@@ -303,7 +303,7 @@ macro_rules! registers {
                 }
             }
 
-            /// Keeps a transposed register whole: without it the optimiser splits the
+            /// Keeps a transposed register whole: without it the optimizer splits the
             /// transpose into 128-bit shuffles, one set per extracted lane.
             #[inline(always)]
             fn barrier(mut v: $register) -> $register {

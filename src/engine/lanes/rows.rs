@@ -11,7 +11,7 @@
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
 
-/// What sweeps read and write of a body: its velocity and its motion since the step began.
+/// A body as sweeps read and write it: its velocity, and its displacement since the start of the step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct BodyRow {

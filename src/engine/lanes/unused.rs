@@ -1,12 +1,12 @@
-//! What this CPU has and this build does not use.
+//! CPU features that this build does not use.
 
 use super::{native_width, target_features};
 
-/// One line that says which vector instructions this CPU has and this build does not use, and what to add; none if it uses
-/// what there is.
+/// One line that names the vector instructions that this CPU has and this build does not use, and the line to add;
+/// none if the build uses all of them.
 ///
-/// Cargo does not pass the build flags of a library on to those who use it, and a plain build for x86-64 knows SSE2 alone:
-/// 4 lanes where a recent CPU has 16. Looks at the CPU once, in nanoseconds.
+/// Cargo does not pass the build flags of a library on to its users, and a plain build for x86-64 uses SSE2 only: 4
+/// lanes where a recent CPU has 16. Looks at the CPU once, in nanoseconds.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;

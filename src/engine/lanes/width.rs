@@ -1,6 +1,6 @@
-//! How many lanes there are, and which of them this build has instructions for.
+//! Lane widths, and the native one of the build.
 
-/// How many contacts one instruction processes.
+/// Number of contacts that one instruction processes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LaneWidth {
     /// Scalar code.

@@ -80,7 +80,7 @@ impl Shapes {
 /// Pairs of one kind, one entry each in every list.
 #[derive(Clone, Debug, Default)]
 pub struct Jobs {
-    /// What the caller calls the pair.
+    /// The caller's index of the pair.
     pub name: Vec<u32>,
     /// Bodies of a and b.
     pub bodies: [Vec<u32>; 2],
@@ -129,13 +129,12 @@ impl Jobs {
     }
 }
 
-/// What the kernels read besides the jobs.
+/// Inputs of the kernels besides the jobs.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
-    /// What bodies move and turn by in the coming step, and a little longer, if nothing hinders them: `[x, y, θ, 0]`
-    /// (m, rad), by body.
+    /// Motion of bodies in the coming step, and slightly longer, without contacts: `[x, y, θ, 0]` (m, rad), by body.
     pub ways: &'a [Quad],
     /// Whether radii of curvature are found, and what rolls.
     pub rolling: Option<Rolling>,

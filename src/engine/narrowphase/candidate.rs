@@ -11,9 +11,9 @@ pub struct Candidate {
     pub shapes: [u32; 2],
     /// Their bodies.
     pub bodies: [u32; 2],
-    /// What the narrow phase calls the shapes.
+    /// The narrow phase's indices of the shapes.
     pub numbers: [u32; 2],
-    /// Centres of mass farther apart than the root of this cannot be in touch (m²).
+    /// Centers of mass farther apart than the root of this cannot be in touch (m²).
     pub reach_squared: f32,
     /// Mixed Coulomb coefficient.
     pub friction: f32,

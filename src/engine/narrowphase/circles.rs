@@ -3,7 +3,7 @@
 //! # Circles that pass
 //!
 //! A step sees a gap along the normal n of its beginning. Two circles that pass each other on the way Δ of one step, and
-//! of the substep that a sweep at its end looks ahead, are farther apart than that says: with the distance ℓ of their centres and Δ = (Δ_n, Δ_t), at the end
+//! of the substep that a sweep at its end looks ahead, are farther apart than that says: with the distance ℓ of their centers and Δ = (Δ_n, Δ_t), at the end
 //!
 //! ```text
 //! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)
@@ -20,7 +20,7 @@ use crate::engine::params::LINEAR_SLOP;
 /// Shares of the slop: from which term on circles pass, and what gap they then have at the end (1).
 pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
 
-/// The gap (m) of two circles whose centres are `distance` apart (m) and that move by `way` against each other in the
+/// The gap (m) of two circles whose centers are `distance` apart (m) and that move by `way` against each other in the
 /// coming step (m); see the [module](self).
 #[inline(always)]
 pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
@@ -46,7 +46,7 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
     gap.min(closest + slop).select_positive(raised, gap)
 }
 
-/// When two centres that are `distance` apart (m) are `reach` apart, as a part of their way, and positive if they come so
+/// When two centers that are `distance` apart (m) are `reach` apart, as a part of their way, and positive if they come so
 /// close: |d + u t| = R. `toward` is the product d·u, `squared` u².
 #[inline(always)]
 pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L; 2] {
@@ -57,7 +57,7 @@ pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L
     [product / comes.select_positive(sum, L::splat(1.0)), comes]
 }
 
-/// What a solver that turns the frames of round contacts asks of the narrow phase.
+/// Request of a solver that turns the frames of round contacts.
 ///
 /// A contact rolls if its gap changes by less than [`Rolling::limit`] in the coming step. Its gap is that of the step's
 /// beginning, as its normal turns with it; that of another one is [`passing`].
@@ -91,7 +91,7 @@ pub fn in_step<L: Lanes>(
     let touch = touch.on_held(held);
     let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
     let gap = rolling.rolls(dot(touch.normal, way)).select_positive(touch.separation[0], gap);
-    // Centres in one place have no direction to turn.
+    // Centers in one place have no direction to turn.
     let radii = pair.size.map(|size| distance.select_positive(size[2], L::zero()));
     (touch.with_gap(gap), radii)
 }
@@ -102,7 +102,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     with_distance(pair, speculative).0
 }
 
-/// The same, and the distances of the centres (m).
+/// The same, and the distances of the centers (m).
 #[inline(always)]
 pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<L>, L) {
     let (zero, one) = (L::zero(), L::splat(1.0));
@@ -129,10 +129,10 @@ pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<
 }
 
 impl<L: Lanes> Touch<L> {
-    /// The same contact with its point between the surfaces of circles of radius `size` about these centres (m, from
-    /// the centres of mass).
+    /// The same contact with its point between the surfaces of circles of radius `size` about these centers (m, from
+    /// the centers of mass).
     ///
-    /// From each centre by its own radius: for circles centred on their bodies both anchors are multiples of the normal,
+    /// From each center by its own radius: for circles centered on their bodies both anchors are multiples of the normal,
     /// and friction is all that turns them.
     #[inline(always)]
     fn with_anchors(self, center_a: [L; 2], center_b: [L; 2], size: [L; 2]) -> Self {

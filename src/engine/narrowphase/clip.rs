@@ -1,7 +1,7 @@
 //! A reference face and an incident face, in lanes: the points of their contact.
 //!
 //! Coordinates (N, T) are along the outward normal n of the reference face and along t = n⊥, with
-//! their origin near b's centre of mass, so that what is small keeps its digits where a is the
+//! their origin near b's center of mass, so that what is small keeps its digits where a is the
 //! large ground. The reference face runs from `low` to `high` along T at height `top`; the incident
 //! face, the one of the other hull most opposed to n, from its left end (large T) to its right one.
 //!
@@ -41,9 +41,9 @@ const GRAZE: f32 = 0.25;
 pub struct Faces<L> {
     /// n, in world axes.
     pub normal: [L; 2],
-    /// From the centre of mass of b to where N = T = 0, in world axes (m).
+    /// From the center of mass of b to where N = T = 0, in world axes (m).
     pub origin: [L; 2],
-    /// From the centre of mass of a to that of b, in world axes (m).
+    /// From the center of mass of a to that of b, in world axes (m).
     pub centers: [L; 2],
     /// Where positive, the reference face is b's.
     pub flip: L,

@@ -18,9 +18,9 @@ use glam::DVec2;
 pub struct Distance {
     /// m; 0 where the cores share a point.
     pub distance: f64,
-    /// Nearest point of a, from a's centre of mass, world axes (m).
+    /// Nearest point of a, from a's center of mass, world axes (m).
     pub point_a: DVec2,
-    /// Nearest point of b, from a's centre of mass, world axes (m).
+    /// Nearest point of b, from a's center of mass, world axes (m).
     pub point_b: DVec2,
     /// Unit vector from a to b; zero where the distance is.
     pub normal: DVec2,
@@ -66,7 +66,7 @@ pub(super) struct Support {
     point_b: DVec2,
 }
 
-/// The vertices of both cores, world axes, from a's centre of mass.
+/// The vertices of both cores, world axes, from a's center of mass.
 pub(super) struct Cores {
     a: Vec<DVec2>,
     b: Vec<DVec2>,

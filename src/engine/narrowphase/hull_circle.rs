@@ -1,8 +1,8 @@
-//! A rounded hull and a circle, in lanes: the nearest point of the core to the circle's centre.
+//! A rounded hull and a circle, in lanes: the nearest point of the core to the circle's center.
 //!
-//! The face farthest below the centre carries that point (see [`super::hulls`], with a single
-//! point for the other hull). With h the height of the centre over that face, and o by how far it
-//! is past one of its ends, the centre is h n + o n⊥ from it: along n itself over the face, so
+//! The face farthest below the center carries that point (see [`super::hulls`], with a single
+//! point for the other hull). With h the height of the center over that face, and o by how far it
+//! is past one of its ends, the center is h n + o n⊥ from it: along n itself over the face, so
 //! that long segments round nothing, and inside the core.
 
 use super::circles::{PASSING, Rolling, arrival};
@@ -14,7 +14,7 @@ use crate::engine::params::LINEAR_SLOP;
 /// Hulls as a, circles as b.
 pub struct HullCircle<L> {
     hull: Hull<L>,
-    /// The circle's centre in its body's frame, and its radius (m).
+    /// The circle's center in its body's frame, and its radius (m).
     circle: ([L; 2], L),
     /// Slots in use.
     count: usize,
@@ -35,7 +35,7 @@ impl<L: Lanes> HullCircle<L> {
         self.circle = ([place[0], place[1]], size[2]);
     }
 
-    /// How the circle's centre moves in the frame of the hull where bodies move by `[x, y, θ, 0]` (m, rad).
+    /// Displacement of the circle's center in the frame of the hull when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
     fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = rotate(poses.rotation[1], self.circle.0);
@@ -124,8 +124,8 @@ impl<L: Lanes> HullCircle<L> {
         }
         let normal = rotate(rotation_a, normal);
         let between = poses.centers;
-        // From the circle's centre: for a circle centred on its body the anchor is a multiple of the
-        // normal, and friction is all that turns it. a's follows from the centres of mass.
+        // From the circle's center: for a circle centered on its body the anchor is a multiple of the
+        // normal, and friction is all that turns it. a's follows from the centers of mass.
         let arm = half.mul_add(separation, radius);
         let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
         let anchor_a = [anchor_b[0] + between[0], anchor_b[1] + between[1]];

@@ -12,7 +12,7 @@
 //! the closest pair is (face, q) if q projects between v₁ and v₂, else the face's end and the
 //! nearest point of the other hull. What becomes of the two faces, [`super::clip`] says.
 //!
-//! **Coordinates** are along a's axes from b's centre of mass: only b's corners are turned.
+//! **Coordinates** are along a's axes from b's center of mass: only b's corners are turned.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
@@ -21,7 +21,7 @@ use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, Touch, dot, perp, rotate, unrotate};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 
-/// Hulls a and b and the incident one of the two, along a's axes from b's centre of mass.
+/// Hulls a and b and the incident one of the two, along a's axes from b's center of mass.
 pub struct Hulls<L> {
     hulls: [Hull<L>; 2],
     incident: Hull<L>,
@@ -166,8 +166,8 @@ impl<L: Lanes> Face<L> {
     }
 }
 
-/// What feature ids call the two ends of the face at `slot`: its number and the next; for a capsule
-/// or segment (`flat` positive) 0 at a and 1 at b.
+/// Feature ids of the two ends of the face at `slot`: its number and the next; for a capsule or segment (`flat`
+/// positive) 0 at a and 1 at b.
 #[inline(always)]
 fn names<L: Lanes>(slot: L, last: L, flat: L) -> [L; 2] {
     let one = L::splat(1.0);

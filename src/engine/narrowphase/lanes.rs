@@ -1,4 +1,4 @@
-//! What the narrow phase reads and writes in lanes.
+//! Data that the narrow phase reads and writes in lanes.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::lanes::{LaneIndex, Lanes, Quad};
@@ -10,7 +10,7 @@ use glam::Vec2;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct PoseRow {
-    /// Centre of mass and what it is short of: `[x, y, x rest, y rest]` (m).
+    /// Center of mass and what it is short of: `[x, y, x rest, y rest]` (m).
     pub position: [f32; 4],
     /// `[cos θ, sin θ, 1 if no impulse moves it, 0]`
     pub rotation: [f32; 4],
@@ -24,7 +24,7 @@ impl PoseRow {
     }
 }
 
-/// What kernels tell apart in a shape.
+/// Properties of a shape that kernels distinguish.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Class {
     /// A polygon with four right angles.
@@ -102,7 +102,7 @@ impl ShapeRow {
 /// The poses of two bodies, in lanes.
 #[derive(Clone, Copy)]
 pub struct Poses<L> {
-    /// From the centre of mass of a to that of b (m).
+    /// From the center of mass of a to that of b (m).
     pub centers: [L; 2],
     /// Rotations of a and b, (cos, sin).
     pub rotation: [[L; 2]; 2],
@@ -162,7 +162,7 @@ impl<L: Lanes> ShapePair<L> {
 }
 
 impl<L: Lanes> ShapePair<L> {
-    /// How the shapes' centres move against each other where bodies move by `[x, y, θ, 0]` (m, rad).
+    /// Relative displacement of the shapes' centers when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
     pub fn way(&self, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = |k: usize| rotate(self.poses.rotation[k], [self.place[k][0], self.place[k][1]]);
@@ -170,7 +170,7 @@ impl<L: Lanes> ShapePair<L> {
     }
 }
 
-/// How the point at `r[1]` from the centre of b moves against that at `r[0]` from a's, along world axes (m).
+/// Displacement of the point at `r[1]` from the center of b relative to that at `r[0]` from a's, world axes (m).
 #[inline(always)]
 pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
     let of =
@@ -185,9 +185,9 @@ pub struct Touch<L> {
     pub normal: [L; 2],
     /// Points in use: 0, 1 or 2.
     pub count: L,
-    /// Per point, from the centre of mass of a (m).
+    /// Per point, from the center of mass of a (m).
     pub anchor_a: [[L; 2]; 2],
-    /// Per point, from the centre of mass of b (m).
+    /// Per point, from the center of mass of b (m).
     pub anchor_b: [[L; 2]; 2],
     /// Per point, signed gap (m).
     pub separation: [L; 2],
@@ -207,7 +207,7 @@ impl<L: Lanes> Touch<L> {
 
     /// Without contacts of flush faces that are apart and graze each other. In a step, in which contacts look ahead,
     /// they would stop a box that slides over a floor of tiles at the side of the next one, which it overlaps by
-    /// micrometres.
+    /// micrometers.
     #[inline(always)]
     pub fn without_grazes(self) -> Self {
         Touch { count: self.passes.select_positive(L::zero(), self.count), ..self }

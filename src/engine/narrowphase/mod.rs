@@ -9,7 +9,7 @@
 //!
 //! Only the difference of the positions enters, so a scene loses nothing far
 //! from the origin beyond the rounding of that difference. Coordinates are then
-//! relative to b's centre of mass: where one body is large it is the ground,
+//! relative to b's center of mass: where one body is large it is the ground,
 //! which is a, and what is small about the contact keeps its digits.
 //!
 //! [`gjk`] and [`epa`] answer the same questions independently, in `f64`,
@@ -45,12 +45,12 @@ use hull_circle::HullCircle;
 use hulls::Hulls;
 use lanes::{Poses, ShapePair, ShapeRow, Touch};
 
-/// Contact of shape `a` with shape `b`, each in the frame of its body's centre of mass.
+/// Contact of shape `a` with shape `b`, each in the frame of its body's center of mass.
 ///
 /// The normal points from a to b, in world axes. Points farther apart than
 /// `speculative_distance` (m, ≥ 0) are left out; without points the manifold is the
 /// default one. Each point lies midway between the two surfaces; `anchor_a − anchor_b`
-/// is the difference of the centres of mass, to rounding.
+/// is the difference of the centers of mass, to rounding.
 ///
 /// `feature_id` is `vertex of a | vertex of b << 8` for two hulls: each end of the
 /// contact is named by the vertex of a and the vertex of b that bound it there, so the
@@ -58,8 +58,8 @@ use lanes::{Poses, ShapePair, ShapeRow, Touch};
 /// circle there is only one point, and its id is always 0.
 ///
 /// Where the geometry does not define a normal, it is still a unit vector: (0, 1) for
-/// coincident circle centres, the left side of a → b for a circle centred on a segment
-/// or capsule axis, the nearest face for a circle centred in a polygon.
+/// coincident circle centers, the left side of a → b for a circle centered on a segment
+/// or capsule axis, the nearest face for a circle centered in a polygon.
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
@@ -81,7 +81,7 @@ pub fn collide_in_step(
         .map_or_else(Manifold::default, |touch| touch.without_grazes().manifold())
 }
 
-/// What [`collide_in_step`] finds, with grazes; none for two segments.
+/// The result of [`collide_in_step`], including grazes; none for two segments.
 fn touch(
     [a, b]: [&Shape; 2],
     [pose_a, pose_b]: [&Pose; 2],

@@ -1,7 +1,7 @@
 //! Two rounded rectangles, in lanes: what [`super::hulls`] does, in closed form and without branches.
 //!
-//! A rectangle is its centre, an axis u, and half extents along u and u⊥. All four of its faces
-//! face along ±u or ±u⊥, so with d from the centre of a to that of b, the face of a toward b
+//! A rectangle is its center, an axis u, and half extents along u and u⊥. All four of its faces
+//! face along ±u or ±u⊥, so with d from the center of a to that of b, the face of a toward b
 //! along axis w is farthest from b by
 //!
 //! ```text
@@ -62,7 +62,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let u_i = [pick(u_a[0], u_b[0]), pick(u_a[1], u_b[1])];
     let u = [dot(u_i, n), dot(u_i, t)];
     let h_i = [pick(h_a[0], h_b[0]), pick(h_a[1], h_b[1])];
-    // The centre of a, seen from that of b.
+    // The center of a, seen from that of b.
     let a = [-dot(d, n), -dot(d, t)];
     let (r_center, i_center) = ([pick(zero, a[0]), pick(zero, a[1])], [pick(a[0], zero), pick(a[1], zero)]);
 

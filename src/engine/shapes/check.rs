@@ -1,4 +1,4 @@
-//! What numbers a shape may have.
+//! Valid ranges of the numbers of a shape.
 
 use crate::engine::error::Error;
 use glam::Vec2;

@@ -1,9 +1,9 @@
-//! Mass, centre and inertia.
+//! Mass, center and inertia.
 
 use glam::DVec2;
 use std::f64::consts::TAU;
 
-/// Mass (kg), centre of mass (m) and inertia about that centre (kg·m²).
+/// Mass (kg), center of mass (m) and inertia about that center (kg·m²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// kg
@@ -23,7 +23,7 @@ impl MassProperties {
     }
 }
 
-/// Several parts as one body. With the centre c = Σ mᵢcᵢ / Σ mᵢ, the parallel axis
+/// Several parts as one body. With the center c = Σ mᵢcᵢ / Σ mᵢ, the parallel axis
 /// theorem moves each inertia: I = Σ Iᵢ + mᵢ|cᵢ − c|². Without mass: [`MassProperties::ZERO`].
 pub fn combine(parts: &[MassProperties]) -> MassProperties {
     let mass: f64 = parts.iter().map(|p| p.mass).sum();
@@ -41,7 +41,7 @@ pub fn combine(parts: &[MassProperties]) -> MassProperties {
 /// per vertex, whose angle θ is the turn there (they sum to 2π):
 /// - triangle (0, p, q) of the fan: area ½ p×q, centroid (p + q)/3, inertia
 ///   about the apex m (p·p + p·q + q·q)/6;
-/// - rectangle: inertia about its centre m (ℓ² + r²)/12;
+/// - rectangle: inertia about its center m (ℓ² + r²)/12;
 /// - sector: mass ρ θ r²/2, inertia about the apex m r²/2, centroid at
 ///   c = (2r/3) sin(θ/2)/(θ/2) along the bisector.
 ///

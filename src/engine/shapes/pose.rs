@@ -2,10 +2,10 @@
 
 use glam::Vec2;
 
-/// Position of a body's centre of mass (m) and its rotation as (cos, sin).
+/// Position of a body's center of mass (m) and its rotation as (cos, sin).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Centre of mass in the world (m).
+    /// Center of mass in the world (m).
     pub position: Vec2,
     /// Unit complex number (cos θ, sin θ).
     pub rotation: Vec2,

@@ -125,7 +125,7 @@ impl Shape {
     /// A convex polygon of 3 to 8 vertices in either winding, grown by `radius` ≥ 0.
     ///
     /// Errors, naming the vertex by its index in `vertices`: not finite or out of
-    /// range; coincident with another vertex; collinear with its neighbours
+    /// range; coincident with another vertex; collinear with its neighbors
     /// ([`MIN_RELATIVE_TURN`]); not convex; a sliver ([`MIN_RELATIVE_AREA`]); `radius` < 0.
     pub fn polygon(place: &str, vertices: &[Vec2], radius: f32) -> Result<Shape, Error> {
         let n = vertices.len();
@@ -138,7 +138,7 @@ impl Shape {
         }
         check_rounding(place, radius)?;
 
-        // Twice the signed area; clockwise input is negative and read backwards.
+        // Twice the signed area; clockwise input is negative and read backward.
         let given: Vec<DVec2> = vertices.iter().map(|v| v.as_dvec2()).collect();
         let area2: f64 = (1..n - 1).map(|i| (given[i] - given[0]).perp_dot(given[i + 1] - given[0])).sum();
         let index = |i: usize| if area2 < 0.0 { n - 1 - i % n } else { i % n };
@@ -160,7 +160,7 @@ impl Shape {
             let (edge, next) = (at(i + 1) - at(i), at(i + 2) - at(i + 1));
             let turn = edge.perp_dot(next) / (edge.length() * next.length());
             if turn.abs() < MIN_RELATIVE_TURN {
-                return fail(i + 1, "is collinear with its neighbours");
+                return fail(i + 1, "is collinear with its neighbors");
             }
             // Left turns alone would also accept a star that winds twice, so
             // every vertex must lie to the left of every edge.
@@ -223,7 +223,7 @@ impl Shape {
         }
     }
 
-    /// Mass, centre and inertia at `density` (kg/m²), exact to `f64` rounding;
+    /// Mass, center and inertia at `density` (kg/m²), exact to `f64` rounding;
     /// zero for a segment.
     pub fn mass(&self, density: f64) -> MassProperties {
         let radius = f64::from(self.radius());
@@ -277,9 +277,8 @@ impl Shape {
         best + self.radius() * direction.normalize_or_zero()
     }
 
-    /// Half the least width of the shape (m): deeper overlap has passed its middle.
-    /// Infinite for a segment, which has no inside, so that the minimum over a
-    /// pair is that of the other shape.
+    /// Half the smallest width of the shape (m); deeper overlap is past its middle. Infinite for a segment, which has
+    /// no inside, so the minimum over a pair is that of the other shape.
     pub fn min_half_extent(&self) -> f32 {
         match self {
             Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => *radius,

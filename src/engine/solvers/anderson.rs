@@ -1,5 +1,5 @@
-//! Anderson acceleration of Gauss–Seidel: from the last few sweeps the combination is taken that
-//! would have changed least.
+//! Anderson acceleration of Gauss–Seidel: it takes the combination of the last few sweeps that would have changed
+//! least.
 //!
 //! **Source.** `walker2011`, section 2; the sweeps are those of [`super::pgs`].
 //!

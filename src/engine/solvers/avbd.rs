@@ -1,32 +1,32 @@
-//! Augmented vertex block descent: each body in turn goes where its inertia and the penalties of its
-//! contacts are in balance; multipliers and penalties grow until contacts hold.
+//! Augmented vertex block descent: each body in turn moves to the balance of its inertia and the penalties of its
+//! contacts; multipliers and penalties grow until contacts hold.
 //!
 //! **Source.** `giles2025`, algorithm 1, with the contact rows of its two-dimensional demonstration.
 //!
-//! The demonstration's defaults (10 iterations and one of post-stabilisation at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
+//! The demonstration's defaults (10 iterations and one of post-stabilization at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
 //! sticking within 10 mm) are the defaults here.
 //!
-//! **Departures.** Bodies go colour by colour; in natural order one by one, as the contacts name them. How fast a body fell
-//! is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has drifted, not its two
-//! anchors, so that along n it is where the manifold of the step has it. There is no geometric stiffness: rows are
-//! linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The cone is that of the normal
-//! force of the same iteration, not of the last one. Spins have no limit. There are rows of contacts alone: constraints of
-//! other types do nothing.
+//! **Departures.** Bodies go color by color; in natural order one by one, as the contacts name them. The acceleration
+//! of a body is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has
+//! drifted, not its two anchors, so that along n it is where the manifold of the step has it. There is no geometric
+//! stiffness: rows are linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The
+//! cone is that of the normal force of the same iteration, not of the last one. Spins have no limit. There are rows
+//! of contacts alone: constraints of other types do nothing.
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
-//! a colour (`avbd/descent.rs`). Sweeps of a step request 9477 B per contact.
+//! a color (`avbd/descent.rs`). Sweeps of a step request 9477 B per contact.
 //!
 //! **Fails when** iterations are few for the height of a stack: a penalty needs them to grow, and
 //! descent carries a change by one body per iteration. In `f32` a body is lost where penalties exceed
 //! its inertia M/h² by more than seven digits. From zero, orders hardly matter: penalties begin at 1 N/m, M/h² of a
 //! unit box is 3600 N/m at 60 Hz, and while they are that soft a body does not feel in one iteration what its
-//! neighbours do in the same. Cold curves of all orders on the frozen pyramid of five differ by 2·10⁻⁵ after 100
+//! neighbors do in the same. Cold curves of all orders on the frozen pyramid of five differ by 2·10⁻⁵ after 100
 //! iterations and by 6·10⁻⁴ at most.
 //!
 //! # The method
 //!
-//! With y = x + h v + h² a, each body minimises |x − y|²_M/(2h²) + the energy of its rows:
+//! With y = x + h v + h² a, each body minimizes |x − y|²_M/(2h²) + the energy of its rows:
 //!
 //! ```text
 //! (M/h² + Σ k JᵀJ) Δx = −M (x − y)/h² + Σ Jᵀ f,   f = λ − k C within its bounds
@@ -36,7 +36,7 @@
 //! f ≥ 0 along n, |f| ≤ µ f_n along t. Then λ ← f and, where f is within its bounds, k ← k + β |C|.
 //! From step to step k keeps the share γ.
 //!
-//! Old error comes out of positions alone, by post-stabilisation: α = 1 in all iterations, so that forces and
+//! Old error comes out of positions alone, by post-stabilization: α = 1 in all iterations, so that forces and
 //! velocities know nothing of it, and λ stays whole from step to step; then velocities are taken, and `position_iterations`
 //! with α = 0 move bodies without a trace in velocities or multipliers. With none of those α is the parameter, and λ keeps
 //! the share α γ.
@@ -57,7 +57,7 @@ use descent::{Bodies, Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
 pub static SOLVER: Variant = Variant {
     name: "avbd",
     source: "giles2025",
-    summary: "descent body by body on penalties that grow, with multipliers",
+    summary: "descent body by body on growing penalties, with multipliers",
     budget: Budget { substeps: 1, velocity_iterations: 10, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[
@@ -66,7 +66,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.99,
             range: [0.0, 1.0],
-            meaning: "share of old error that is left alone in a step, where no position iterations take it out",
+            meaning: "share of the old error that a step leaves alone, if no position iterations remove it",
             trials: &[],
         },
         Parameter {
@@ -96,7 +96,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Avbd {
     graph: Graph,
@@ -107,8 +107,8 @@ impl Solver for Avbd {
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h) = (passes.budget(), passes.h());
         let [alpha, beta, gamma] = [0, 1, 2].map(|i| passes.parameter(i));
-        let stabilises = budget.position_iterations > 0;
-        let (alpha, keep) = if stabilises { (1.0, 1.0) } else { (alpha, alpha * gamma) };
+        let stabilizes = budget.position_iterations > 0;
+        let (alpha, keep) = if stabilizes { (1.0, 1.0) } else { (alpha, alpha * gamma) };
         self.assign(passes);
         for substep in 0..budget.substeps {
             passes.integrate_velocities();

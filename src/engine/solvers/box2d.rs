@@ -1,4 +1,4 @@
-//! What Box2D 3.2 does: soft contacts in substeps, friction in the relaxing sweeps alone.
+//! The method of Box2D 3.2: soft contacts in substeps, friction in the relaxing sweeps only.
 //!
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
@@ -41,7 +41,7 @@ pub static SOLVER: Variant = Variant {
             unit: "m",
             default: 10.0 * LINEAR_SLOP,
             range: [0.0, 1.0],
-            meaning: "motion against each other within which two bodies keep their manifold; 0: none is kept",
+            meaning: "relative motion within which two bodies keep their manifold; 0: manifolds are never kept",
             trials: &[],
         },
     ],
@@ -51,7 +51,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Box2d {
     recycled: Recycled,

@@ -1,5 +1,5 @@
-//! Newton's method on the contact law itself: the impulses of a step are solved for, not approached.
-//! For scenes of some dozens of contact points.
+//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of iterated. For
+//! scenes of a few dozen contact points.
 //!
 //! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search,
 //! proximal outer loop); with `lemke` set, `cottle1992` (Lemke's method on the law as a linear complementarity
@@ -12,7 +12,7 @@
 //! finds nothing better, and in scenes with more than `largest` points, they are the answer.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then, for m points, a matrix of
-//! 4m² entries (32m² B) and up to `velocity_iterations` factorisations of 16m³/3 operations in `f64`, one lane.
+//! 4m² entries (32m² B) and up to `velocity_iterations` factorizations of 16m³/3 operations in `f64`, one lane.
 //! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 27, 85, 250 and 890 µs where
 //! eight sweeps take 4 to 9 µs. Sweeps of moderate accuracy are always cheaper; sweeps of
 //! [`super::anderson`] from a cold start to a residual of 10⁻⁴ take 60, 96 and 319 µs for 10, 20 and 40
@@ -21,7 +21,7 @@
 //! are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
 //! loses from the first point on. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** there are many points (a factorisation grows by m³), and where friction lets a point
+//! **Fails when** there are many points (a factorization grows by m³), and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
 //!
 //! # The method
@@ -34,7 +34,7 @@
 //! slip   otherwise, s = sign(λt − ρt ut)          un = 0, λt = s µ λn
 //! ```
 //!
-//! In fixed states the law is linear, u = K λ + b. A step goes towards the solution of those states as
+//! In fixed states the law is linear, u = K λ + b. A step goes toward the solution of those states as
 //! far as the residual of the natural map falls.
 
 use super::{Law, Variant};
@@ -51,7 +51,7 @@ use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 pub static SOLVER: Variant = Variant {
     name: "direct",
     source: "alart1991",
-    summary: "Newton's or Lemke's method on the contact law, for small scenes; else sweeps",
+    summary: "Newton's or Lemke's method on the contact law in small scenes; sweeps otherwise",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,
@@ -76,7 +76,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.0,
             range: [0.0, 1.0],
-            meaning: "1: Lemke's method in place of Newton's",
+            meaning: "1: Lemke's method instead of Newton's",
             trials: &[],
         },
     ],
@@ -133,7 +133,7 @@ struct Newton {
     merit: f64,
     /// Nothing better is found any more.
     done: bool,
-    /// What the records hold, and the friction of each point.
+    /// The records' values, and the friction of each point.
     written: Vec<Pair>,
     surfaces: Vec<Pair>,
     delta: Vec<Pair>,
@@ -360,7 +360,7 @@ impl Problem {
     fn by_lemke(&self) -> Option<Vec<f64>> {
         let n = self.start.len();
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();
-        // u without impulses, pulled towards λ₀ as in Newton's problem.
+        // u without impulses, pulled toward λ₀ as in Newton's problem.
         let free = |i: usize| {
             let held: f64 = self.matrix[i * n..(i + 1) * n].iter().zip(&self.start).map(|(k, l)| k * l).sum();
             self.velocity[i] - held - SHIFT * self.diagonal(i) * self.start[i]

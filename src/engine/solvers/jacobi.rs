@@ -12,10 +12,9 @@
 //! the positions, `relax_iterations` rigid ones. A sweep gathers each body twice, as it reads old
 //! velocities and adds to sums. Sweeps of a step request 1957 B per contact.
 //!
-//! **Fails when** a body has several contacts: each removes the whole approach velocity, and n of
-//! them remove it n times. The iteration x ← x − D⁻¹(A x + b) diverges where D⁻¹A has an eigenvalue
-//! above 2, which a body in a pile has from three contacts on. A `relaxation` below 2/λ_max heals
-//! that and slows everything else.
+//! **Fails when** a body has several contacts: each removes the whole approach velocity, and n of them remove it n
+//! times. The iteration x ← x − D⁻¹(A x + b) diverges where D⁻¹A has an eigenvalue above 2, which a body in a pile
+//! has from three contacts on. A `relaxation` below 2/λ_max cures that and slows everything else.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -28,7 +27,7 @@ use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTIO
 pub static SOLVER: Variant = Variant {
     name: "jacobi",
     source: "catto2024solver2d",
-    summary: "all contacts at once against the old velocities, soft contacts and relaxing sweeps",
+    summary: "all contacts at once from the old velocities, soft contacts and relaxing sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
@@ -54,7 +53,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Jacobi {
     /// Sums of velocity increments. `[rows]`

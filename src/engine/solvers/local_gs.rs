@@ -1,9 +1,8 @@
 //! Sequential impulses with several local iterations at each contact before the next one.
 //!
-//! The rows of a contact share its bodies and are coupled more strongly than contacts are. Solving
-//! them again while they are at hand makes each contact right by itself, and costs no other contact's
-//! memory. [`super::pgs_ngs_block`] solves the two normal rows exactly; local iterations bring
-//! friction along.
+//! The rows of a contact share its bodies and are coupled more strongly than contacts are. Solving them again while
+//! they are loaded solves each contact exactly and costs no memory traffic. [`super::pgs_ngs_block`] solves the two
+//! normal rows exactly; local iterations bring friction along.
 //!
 //! **Source.** `acary2018` (block Gauss–Seidel with a local solver); otherwise [`super::pgs`].
 //!

@@ -14,12 +14,11 @@
 //! soft sweeps and `relax_iterations` rigid ones, each of which gathers bodies twice as
 //! [`super::jacobi`] does. Sweeps of a step request 4389 B per contact.
 //!
-//! **Fails when** sweeps are few: it converges always and slowly, as each contact sees the n-th part
-//! of a mass.
+//! **Fails when** sweeps are few: it always converges, but slowly, since each contact sees the n-th part of a mass.
 //!
 //! # Why it converges
 //!
-//! With J split by contacts, the sweep minimises the sum of all contacts' energies over copies that
+//! With J split by contacts, the sweep minimizes the sum of all contacts' energies over copies that
 //! were equal before it; the mean is the projection on equal copies in the norm of their masses,
 //! n (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is kept: copies get Δλ/(m/n) each,
 //! a body the mean, Σ Δλ/m.
@@ -52,7 +51,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct MassSplitting {
     graph: Graph,

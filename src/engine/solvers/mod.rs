@@ -13,12 +13,14 @@
 //!     let mut world = World::new(Settings::new(solvers::find(solver)?));
 //!     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
 //!     for i in 0..5 {
-//!         world.add_body(&BodyDef::dynamic([0.0, i as f64 + 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+//!         let cube = ShapeDef::rectangle(0.5, 0.5)?;
+//!         world.add_body(&BodyDef::dynamic([0.0, f64::from(i) + 0.5]).with(cube))?;
 //!     }
 //!     for _ in 0..120 {
 //!         world.step()?;
 //!     }
-//!     Ok(world.contacts.iter().map(|c| -c.manifold.points[0].separation).fold(0.0, f32::max))
+//!     let overlaps = world.contacts.iter().map(|c| -c.manifold.points[0].separation);
+//!     Ok(overlaps.fold(0.0, f32::max))
 //! };
 //! assert!(sag("shim")? < 0.1 * sag("soft_step")?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -108,7 +110,7 @@ pub struct Uses {
     pub position: bool,
 }
 
-/// What tests hold every solver to, unless it says that it cannot promise it.
+/// A property that tests check for every solver, unless its row says that it does not have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// Lane widths give the same bits.
@@ -119,7 +121,7 @@ pub enum Law {
     Cone,
     /// A step allocates nothing.
     NoAllocation,
-    /// More iterations on one problem come to the solver's own law.
+    /// More iterations on one problem converge to the solver's own law.
     Converges,
     /// Piles of a few boxes stay where they are at the standard budget.
     Rest,
@@ -167,23 +169,23 @@ pub struct Variant {
     pub budget: Budget,
     /// The budget fields it reads, besides `substeps`.
     pub uses: Uses,
-    /// The budget of `k` of what the solver itself calls iterations, without substeps: how convergence is counted.
+    /// The budget of `k` iterations as the solver counts them, without substeps; used to measure convergence.
     pub iterations: fn(standard: Budget, k: u32) -> Budget,
     /// Its own parameters, [`MAX_PARAMETERS`] at most.
     pub parameters: &'static [Parameter],
-    /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
-    /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
-    /// such a contact gives way, and metrics tell that from error.
+    /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with others, from its parameters
+    /// and the substep (s); none if its contacts are not springs. At rest such a contact deflects, and metrics
+    /// separate that from error.
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
-    /// What it does where bodies hit each other, as its source has it.
+    /// Impact law of its source.
     pub impacts: ImpactLaw,
-    /// Whether [continuous collision](crate::engine::continuous) is on where nothing is said.
+    /// Default of [continuous collision](crate::engine::continuous).
     pub continuous: bool,
-    /// Numbers that it keeps from step to step, beside impulses.
+    /// Numbers that it keeps from step to step, in addition to impulses.
     pub kept: KeptSize,
-    /// What it cannot promise, and why.
+    /// Properties that it does not have, and why.
     pub breaks: &'static [(Law, &'static str)],
-    /// Makes one for a world: its schedule, and what it keeps.
+    /// Creates the solver of a world: its schedule and its state.
     pub make: fn() -> Box<dyn Solver>,
 }
 
@@ -195,7 +197,7 @@ pub fn find(name: &str) -> Result<&'static Variant, Error> {
 }
 
 impl Variant {
-    /// What most rows have in common: sequential impulses in one substep, counted in velocity sweeps.
+    /// Defaults of most rows: sequential impulses in one substep, counted in velocity sweeps.
     pub const BASE: Variant = Variant {
         name: "",
         source: "",
@@ -248,7 +250,7 @@ impl Variant {
         Ok(())
     }
 
-    /// Whether it promises `law`.
+    /// Whether it has the property `law`.
     pub fn promises(&self, law: Law) -> bool {
         self.breaks.iter().all(|(broken, _)| *broken != law)
     }

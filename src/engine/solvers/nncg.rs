@@ -1,11 +1,11 @@
-//! Nonsmooth nonlinear conjugate gradients: what a sweep changes is taken for a gradient, and the
-//! direction of the last step is followed further as the Fletcher–Reeves method does.
+//! Nonsmooth nonlinear conjugate gradients: the change of a sweep serves as the gradient, and the last direction is
+//! followed further, as in the Fletcher–Reeves method.
 //!
 //! **Source.** `silcowitz2010`, algorithm 1; the sweeps are those of [`super::pgs`].
 //!
 //! **Departures.** The last iteration does not go on beyond its sweep, so that impulses end within their bounds.
-//! Symmetric pairs of sweeps, as conjugate gradients want of a preconditioner, were tried: per sweep they leave 1.3 to 4.4
-//! times more residual on five of six frozen problems.
+//! Symmetric pairs of sweeps, the form of preconditioner that conjugate gradients require, were tried: per sweep they
+//! leave 1.3 to 4.4 times more residual on five of six frozen problems.
 //!
 //! **Cost.** That of [`super::pgs`]; between iterations impulses are
 //! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 4134 B per contact.

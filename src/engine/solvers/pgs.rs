@@ -42,7 +42,7 @@ use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 pub static SOLVER: Variant = Variant {
     name: "pgs",
     source: "catto2006",
-    summary: "sequential impulses with warm starting and Baumgarte stabilisation",
+    summary: "sequential impulses with warm starting and Baumgarte stabilization",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],

@@ -1,7 +1,7 @@
 //! Rigid sequential impulses in substeps: the rows of [`super::pgs`], swept once or twice in each of many short substeps.
 //!
-//! What [`super::tgs_soft`] and its like add to this are springs and relaxing sweeps. So the row tells what of their
-//! quality is due to substeps alone.
+//! [`super::tgs_soft`] and its relatives add springs and relaxing sweeps, so this solver shows how much of their
+//! quality comes from substeps alone.
 //!
 //! **Source.** `macklin2019` (small steps instead of iterations); the rows of `catto2006`.
 //!

@@ -23,7 +23,7 @@ use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION};
 pub static SOLVER: Variant = Variant {
     name: "projection",
     source: "article",
-    summary: "positions pushed apart, then approach velocities removed; no warm starting, no friction",
+    summary: "pushes positions apart, then removes approach velocities; no warm starting, no friction",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
     uses: Uses { velocity: true, relax: false, position: true },
     breaks: &[(Law::Rest, "no friction and no warm starting")],

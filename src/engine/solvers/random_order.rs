@@ -1,7 +1,7 @@
 //! Gauss–Seidel in a new random order for every sweep.
 //!
 //! A fixed order pushes the same way sweep after sweep, so that its error has a direction: a stack leans
-//! towards the side that is solved first. A random one has none.
+//! toward the side that is solved first. A random one has none.
 //!
 //! **Source.** `cottle1992` (the splitting); otherwise [`super::pgs`].
 //!
@@ -13,7 +13,7 @@
 //! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
 //! contact.
 //!
-//! **Fails when** [`super::pgs`] does: news travel no further.
+//! **Fails when** [`super::pgs`] does: changes travel no further.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
@@ -25,7 +25,7 @@ use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 pub static SOLVER: Variant = Variant {
     name: "random_order",
     source: "cottle1992",
-    summary: "sequential impulses, in another order each sweep",
+    summary: "sequential impulses, in a new random order each sweep",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,

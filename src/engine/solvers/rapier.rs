@@ -1,5 +1,5 @@
-//! What rapier does by default: soft contacts in substeps, the two normal rows of a contact solved
-//! together, and stabilising sweeps with friction.
+//! The default method of rapier: soft contacts in substeps, the two normal rows of a contact solved together, and
+//! stabilizing sweeps with friction.
 //!
 //! **Source.** `crozet2025rapier` (2D, version 0.35); the pair of rows is that of
 //! [`super::pgs_ngs_block`] with soft rows on its diagonal. Normal rows come before friction rows: with the other order
@@ -26,7 +26,7 @@ use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTIO
 pub static SOLVER: Variant = Variant {
     name: "rapier",
     source: "crozet2025rapier",
-    summary: "soft contacts in substeps, both points at once, friction while stabilising: rapier",
+    summary: "soft contacts in substeps, both points at once, friction while stabilizing: rapier",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },

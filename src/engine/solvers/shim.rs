@@ -1,27 +1,29 @@
-//! Soft contacts that do not sag: springs are shortened by what they give way under the loads that statics says they bear, so that they are
-//! stiff enough to move with and rigid to stand on.
+//! Soft contacts that do not sag. Each spring is shortened by its deflection under the load that statics assigns to
+//! it, so bodies rest where they were placed.
 //!
 //! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
 //!
-//! **Departures.** Springs are as stiff as the substep rate allows, a fixed part of it, and bear a load however deep
-//! their contact is. What goes beyond [`super::soft_step`], in `shim/`:
+//! **Departures.** Springs have a fixed share of the substep rate as frequency, and carry their load at any depth.
+//! What goes beyond [`super::soft_step`], in `shim/`:
 //!
-//! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
-//! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
-//! * `jams.rs`: two bodies that are caught in each other at several shapes begin without impulses;
-//! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
+//! * `rest/`: loads of statics, found by projected Gauss–Seidel and by a pass down from body to body, shorten the
+//!   springs;
+//! * `frames.rs`: rolling contacts use the frame of the middle of the step;
+//! * `jams.rs`: pairs of bodies that are jammed at several shapes start without impulses;
+//! * impacts are solved before the step, island by island (`constraints/impacts/spread`).
 //!
-//! The two normal rows of a contact are solved together, friction rows after them. Where contacts have come or
-//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago. Relaxing takes
-//! the angular momentum that pushing bodies apart has made from their spins
+//! The two normal rows of a contact are solved together, friction rows after them. When contacts appeared or
+//! disappeared, the first substep relaxes once more, because its impulses belong to the contacts of the previous
+//! step. Relaxing removes the angular momentum that pushing bodies apart has added to their spins
 //! ([`crate::engine::constraints::kernels::velocity::block::Parting`]).
 //!
-//! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light ones over their loads, 1 that shortens springs and, if
-//! something moves, 1 that looks for impacts; per substep 2 body passes, `velocity_iterations` soft block sweeps and
-//! `relax_iterations` rigid ones. In steps in which contacts come or go 1 rigid sweep more. Sweeps of a step request 5736 B per contact.
+//! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
+//! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes,
+//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. 1 rigid sweep more in steps in which
+//! contacts appear or disappear. Sweeps of a step request 5736 B per contact.
 //!
-//! **Fails when** an impact takes more visits than its bound (B23.heavy), a load goes or wanders within a step (B23.release, B23.rolling), or a heavy
-//! body rocks on others: it goes on for long.
+//! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
+//! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.
 
 mod frames;
 mod jams;
@@ -51,7 +53,7 @@ use std::f32::consts::TAU;
 pub static SOLVER: Variant = Variant {
     name: "shim",
     source: "shim",
-    summary: "substeps, and soft contacts whose springs are preloaded until they do not sag",
+    summary: "soft contacts in substeps, shortened by their sag under the loads of statics",
     budget: Budget { substeps: 14, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
@@ -61,7 +63,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.16,
             range: [1e-6, 0.2],
-            meaning: "frequency of contacts, as a part of the substep rate",
+            meaning: "frequency of contacts, as a share of the substep rate",
             trials: &[],
         },
         Parameter::DAMPING_RATIO,
@@ -71,18 +73,18 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 2.0,
             range: [0.0, 1000.0],
-            meaning: "sweeps per step over the loads that contacts bear in statics; 0 leaves all sag",
+            meaning: "sweeps per step over the loads of statics; 0 leaves all sag",
             trials: &[],
         },
     ],
-    breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
+    breaks: &[(Law::Converges, "the loads that shorten its springs come from earlier steps")],
     kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     make: || Box::new(Shim::default()),
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: HandDown,
@@ -91,11 +93,11 @@ struct Shim {
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
     gravity: Vec2,
-    /// Contacts have come or gone.
+    /// Contacts appeared or disappeared.
     contacts_changed: bool,
-    /// Bodies that have taken a step: the first ones.
+    /// Number of bodies that have taken a step; they come first.
     stepped: usize,
-    /// Something is round.
+    /// Some shape is round.
     rolls: bool,
 }
 
@@ -147,7 +149,7 @@ impl Solver for Shim {
                 passes.iteration_done();
             }
             passes.integrate_positions();
-            // Impulses of the step before meet contacts that came, or miss some that went: one sweep more.
+            // Impulses of the previous step do not fit contacts that appeared or disappeared: one sweep more.
             let settling = u32::from(substep == 0 && self.contacts_changed);
             for _ in 0..budget.relax_iterations + settling {
                 let left = budget.substeps - substep;
@@ -170,7 +172,7 @@ impl Solver for Shim {
 }
 
 impl Shim {
-    /// Contacts that are found in the first step of one of their bodies begin with the overlap that it was placed with.
+    /// Contacts found in the first step of one of their bodies start from the overlap that it was placed with.
     fn place(&self, scene: &mut Scene<'_>) {
         if self.stepped >= scene.bodies.len() {
             return;
@@ -185,7 +187,7 @@ impl Shim {
         }
     }
 
-    /// What comes in bounces or stops, before the step.
+    /// Solves impacts before the step.
     fn impacts(&mut self, passes: &mut Passes<'_>) {
         if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) {
             passes.spread_impacts(true, true, Some(LEAD));

@@ -1,4 +1,4 @@
-//! Sequential impulses, then shock propagation: a last sweep from the ground upwards in which whatever
+//! Sequential impulses, then shock propagation: a last sweep from the ground upward in which whatever
 //! a level stands on cannot move.
 //!
 //! The contact graph has levels: what touches the ground is on the first, what touches that on the
@@ -45,7 +45,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Shock {
     graph: Graph,

@@ -24,7 +24,7 @@ use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
 pub static SOLVER: Variant = Variant {
     name: "split_impulse",
     source: "coumans2015",
-    summary: "sequential impulses; overlap by pseudo-velocities that are forgotten",
+    summary: "sequential impulses; overlap removed by temporary pseudo-velocities",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 4 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter {
@@ -36,7 +36,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct SplitImpulse {
     /// Rows as they were before bodies are pushed apart.

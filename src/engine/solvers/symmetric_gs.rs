@@ -1,6 +1,6 @@
 //! Symmetric Gauss–Seidel: every sweep over the contacts is followed by one in reverse order.
 //!
-//! A forward sweep carries news upwards through a stack within one sweep, and downwards by one contact a
+//! A forward sweep carries news upward through a stack within one sweep, and downward by one contact a
 //! sweep; a symmetric pair carries them both ways.
 //!
 //! **Source.** `cottle1992` (splittings of a linear complementarity problem); otherwise [`super::pgs`].

@@ -27,7 +27,7 @@ use sweep::{BookDrift, LoadDrift, Sticky, StickySweep};
 pub static SOLVER: Variant = Variant {
     name: "tgs_sticky",
     source: "catto2024solver2d",
-    summary: "substeps; friction holds places instead of velocities; no warm start",
+    summary: "substeps; friction holds positions instead of velocities; no warm start",
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 2, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
@@ -53,7 +53,7 @@ pub static SOLVER: Variant = Variant {
     kept: KeptSize { per_point: 1, ..KeptSize::NONE },
     breaks: &[
         (Law::Cone, "a point may take its share of the whole manifold's load"),
-        (Law::Converges, "friction solves for places, which is another law"),
+        (Law::Converges, "friction holds positions, which is another law"),
         (Law::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::BOX2D,
@@ -64,7 +64,7 @@ pub static SOLVER: Variant = Variant {
 /// Points that are farther apart (m) do not stick.
 const REACH: f32 = 2.0 * LINEAR_SLOP;
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct TgsSticky {
     /// How far each point has drifted before the step (m), in the order of the lanes.

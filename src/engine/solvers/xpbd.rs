@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
             unit: "m/N",
             default: 0.0,
             range: [0.0, 1.0],
-            meaning: "how far a contact point gives way to a force; 0 is rigid",
+            meaning: "displacement of a contact point per force; 0 is rigid",
             trials: &[],
         },
     ],
@@ -54,12 +54,12 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// What it keeps.
+/// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Xpbd {
     /// Rows as they were before a substep displaced them.
     before: Vec<BodyRow>,
-    /// How fast points shall leave (m/s), as normal entries; empty where nothing bounces.
+    /// Rebound speeds of points (m/s), as normal entries; empty where nothing bounces.
     rebounds: PointVector,
 }
 

@@ -12,7 +12,7 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 use glam::Vec2;
 
-/// What the narrow phase keeps from step to step.
+/// State of the narrow phase between steps.
 #[derive(Clone, Default)]
 pub(super) struct Narrow {
     /// Sorted by shape pair.
@@ -22,7 +22,7 @@ pub(super) struct Narrow {
     pub of_kind: [Vec<u32>; Kind::ALL.len()],
     /// Shapes as the lane kernels read them.
     pub shapes: Shapes,
-    /// The set of contacts is not that of the lanes.
+    /// The set of contacts differs from the one that the lanes hold.
     pub is_changed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
@@ -122,7 +122,7 @@ impl World {
         self.counts.rows = if self.features.friction { 2 * points } else { points };
     }
 
-    /// Makes the solver that the settings name, if they name another.
+    /// Creates the solver that the settings name, if it is not the present one.
     fn make_solver(&mut self) {
         let solver = self.settings.solver;
         if !std::ptr::eq(self.solver_is, solver) {
@@ -130,7 +130,7 @@ impl World {
         }
     }
 
-    /// Scales the impulses of the last substep to those of a coming one of another length: the same forces.
+    /// Scales the impulses of the last substep to a new substep length: the forces stay the same.
     fn scale_impulses(&mut self) {
         let h = self.settings.h();
         let Some(old) = self.impulses_of.replace(h).filter(|old| *old != h) else { return };
@@ -195,9 +195,9 @@ impl Narrow {
         (self.is_changed, self.count) = (true, contacts.len());
     }
 
-    /// Lists the candidates that are worth a look; returns the points of manifolds that are kept.
+    /// Lists the candidates that may touch; returns the points of manifolds that are kept.
     ///
-    /// Where most candidates do not touch, those whose centres are too far apart are left out
+    /// Where most candidates do not touch, those whose centers are too far apart are left out
     /// before their shapes are read; where most do, the lists of the last step still hold.
     fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
         let cull = 4 * contacts.len() < 3 * self.candidates.len();

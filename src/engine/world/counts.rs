@@ -1,4 +1,4 @@
-//! What a step counted, and how it can end.
+//! Counts of a step, and divergence.
 
 use crate::engine::params::DIVERGED_SPEED;
 
@@ -17,9 +17,9 @@ pub struct StepCounts {
     pub sweeps: usize,
     /// Rows solved in all sweeps of the step.
     pub row_updates: usize,
-    /// Colours in use.
+    /// Colors in use.
     pub colors: usize,
-    /// Contacts solved serially because colours ran out.
+    /// Contacts solved serially because colors ran out.
     pub overflow: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,
@@ -45,19 +45,19 @@ pub enum Quantity {
     Angle,
 }
 
-/// What a simulation that failed broke.
+/// The criterion that a diverged simulation violated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Criterion {
-    /// The bounds of speeds, and that places and angles are numbers.
+    /// Speeds within bounds; finite positions and angles.
     #[default]
     Bounds,
-    /// That kinetic energy has a source.
+    /// Kinetic energy that has a source.
     Energy,
 }
 
-/// Where and when a simulation left all bounds.
+/// The body and the step at which a simulation diverged.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -77,9 +77,9 @@ pub struct Divergence {
     pub body: usize,
     /// Which quantity is out of bounds.
     pub quantity: Quantity,
-    /// How large that is (m/s or rad/s); NaN if it is not finite.
+    /// Its value (m/s or rad/s); NaN if it is not finite.
     pub speed: f32,
-    /// What was broken.
+    /// The violated criterion.
     pub criterion: Criterion,
 }
 

@@ -1,4 +1,4 @@
-//! Bodies come, go and are moved by the caller.
+//! Adding, removing and moving bodies.
 
 use super::{Surface, World};
 use crate::engine::bodies::def::{finite, finite_pair};
@@ -23,11 +23,11 @@ pub(super) struct Slots {
     pub shapes: Vec<u32>,
     /// Bodies whose places may be taken.
     pub free: Vec<u32>,
-    /// Bodies that were removed since the last step: what solvers remember of them goes in the next.
+    /// Bodies removed since the last step; solvers forget them in the next.
     pub removed: Vec<u32>,
 }
 
-/// What a body's standing forces were before some were applied for one step.
+/// Persistent forces of a body before others were applied for one step.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Standing {
@@ -125,8 +125,8 @@ impl World {
 
     /// Removes a body and its contacts. Other handles stay valid, and so do indices of other bodies.
     ///
-    /// Until another body takes its place, the index stands for a static body that nothing touches. `contacts` remain those
-    /// of the last step until the next. Errors: the body was removed before; a constraint of another type is on it.
+    /// Until its index is reused, it names a static body that nothing touches. `contacts` remain those of the last
+    /// step until the next. Errors: the body was removed before; a constraint of another type is on it.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -135,7 +135,8 @@ impl World {
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.remove_body(ball)?;
     /// assert!(!world.contains(ball));
-    /// assert_eq!(world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err().to_string(), "body 0 was removed");
+    /// let error = world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err();
+    /// assert_eq!(error.to_string(), "body 0 was removed");
     /// # Ok::<(), simpulse::engine::error::Error>(())
     /// ```
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
@@ -188,7 +189,7 @@ impl World {
         (0..self.bodies.len()).filter_map(|i| self.handle(i))
     }
 
-    /// Puts a body elsewhere: the origin of its frame to `position` (m), turned to `angle` (rad). It keeps its velocity.
+    /// Moves a body: the origin of its frame to `position` (m), its angle to `angle` (rad). The velocity stays.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -212,7 +213,7 @@ impl World {
         Ok(())
     }
 
-    /// Sets the velocity of a body's centre of mass (m/s) and its spin (rad/s).
+    /// Sets the velocity of a body's center of mass (m/s) and its spin (rad/s).
     ///
     /// Errors: the body was removed; it is static; a value that is not finite.
     pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f32; 2], spin: f32) -> Result<(), Error> {
@@ -228,9 +229,9 @@ impl World {
         Ok(())
     }
 
-    /// Applies a force (N) at the centre of mass over the next step, in addition to the standing
-    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic bodies are
-    /// moved by it.
+    /// Applies a force (N) at the center of mass during the next step only, in addition to the persistent
+    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic
+    /// bodies are moved by it.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -250,14 +251,27 @@ impl World {
         self.apply(body, force.into(), 0.0)
     }
 
-    /// Applies a torque (N·m) over the next step. Errors: as [`World::apply_force`].
+    /// Applies a torque (N·m) during the next step only. Errors: as [`World::apply_force`].
     pub fn apply_torque(&mut self, body: BodyHandle, torque: f32) -> Result<(), Error> {
         self.apply(body, Vec2::ZERO, torque)
     }
 
-    /// Changes the velocity of a dynamic body at once by an impulse (N·s) at a point of the world (m).
+    /// Changes the velocity of a dynamic body immediately, by an impulse (N·s) at a world point (m).
     ///
     /// Errors: the body was removed; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine as simpulse;
+    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let plate = ShapeDef::rectangle(1.0, 0.125)?.with_density(2.0);
+    /// let plate = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(plate))?;
+    /// // 2 N·s upward at the right end of 1 kg: it rises and turns.
+    /// world.apply_impulse(plate, [0.0, 2.0], [1.0, 2.0])?;
+    /// assert_eq!(world.bodies.velocity_y[plate.index()], 2.0);
+    /// assert!(world.bodies.angular_velocity[plate.index()] > 5.0);
+    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// ```
     pub fn apply_impulse(
         &mut self,
         body: BodyHandle,
@@ -293,7 +307,7 @@ impl World {
         Ok(())
     }
 
-    /// Scenes in which nothing turns have no rotation in their kernels.
+    /// Kernels of scenes without rotation omit it.
     fn may_spin(&mut self, spin: f32) {
         if spin != 0.0 {
             self.traits.spins();

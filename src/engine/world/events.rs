@@ -1,4 +1,4 @@
-//! What happens at contacts: which began, which ended, which were hit. And contacts as a caller reads them.
+//! Contact events (begin, end, hit), and contacts in world coordinates.
 
 use super::World;
 use crate::engine::bodies::BodyHandle;
@@ -7,7 +7,7 @@ use crate::engine::error::Error;
 use crate::engine::params::HIT_SPEED;
 use glam::{DVec2, Vec2};
 
-/// Something that happened at a contact in the last step. Bodies and shapes are in the order of the [`Contact`].
+/// An event of a contact in the last step. Bodies and shapes are in the order of the [`Contact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactEvent {
     /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::engine::params::SPECULATIVE_DISTANCE), where contacts begin.
@@ -17,7 +17,7 @@ pub enum ContactEvent {
         /// Indices of the shapes.
         shapes: [u32; 2],
     },
-    /// They parted, or one of them was removed: its handle is then no longer valid.
+    /// They separated, or one was removed; its handle is then invalid.
     End {
         /// The bodies.
         bodies: [BodyHandle; 2],
@@ -57,7 +57,7 @@ pub struct ContactPoint {
     pub tangent_impulse: f32,
 }
 
-/// Who touches whom.
+/// Touching pairs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Touching {
@@ -82,7 +82,7 @@ pub(super) struct Events {
 }
 
 impl World {
-    /// What happened at contacts in the last step: ends, begins and hits in the order of shape pairs. Empty unless
+    /// Contact events of the last step: ends, begins and hits, in the order of shape pairs. Empty unless
     /// [`Settings::contact_events`](super::Settings::contact_events) is set.
     ///
     /// ```
@@ -111,7 +111,7 @@ impl World {
         &self.events.list
     }
 
-    /// Contacts of a body in the last step. Looks through all contacts. Errors: the body was removed.
+    /// Contacts of a body in the last step, by a search through all contacts. Errors: the body was removed.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -122,7 +122,7 @@ impl World {
     /// for _ in 0..60 {
     ///     world.step()?;
     /// }
-    /// // The normal impulse of a substep, over its length, is the force: 1000 kg on the ground.
+    /// // The normal impulse of a substep ÷ its length is the force: the weight of the box.
     /// let h = world.settings.h();
     /// let points = world.contacts_of(crate_)?.flat_map(|contact| world.points_of(contact));
     /// let force: f32 = points.map(|point| point.normal_impulse / h).sum();

@@ -1,13 +1,13 @@
-//! One phase of a step, again and again on a state that is held still.
+//! Repeats one phase of a step on a frozen state.
 //!
 //! ```text
 //! hold:   a whole step without moving bodies   every phase finds what it needs
-//! repeat: one phase, nothing else              what a profiler shall see
+//! repeat: one phase, nothing else              what a profiler sees
 //! reset:  what the phase changed, copied back  cheap, and outside of the repeats
 //! drop:   bodies and contacts as they were     the next step gives the bits it would have given
 //! ```
 //!
-//! What repeats do to the state:
+//! Effect of repeats on the state:
 //!
 //! * *pairs* searches all pairs again each time and *color* for all colors, as a step does in which
 //!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
@@ -28,7 +28,7 @@ use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
 
-/// A world that is held still; dropping it lets the world go on as if nothing had happened.
+/// A frozen world; dropping it resumes the world as if nothing had happened.
 pub struct HeldWorld<'w> {
     world: &'w mut World,
     before: Saved,
@@ -39,7 +39,7 @@ pub struct HeldWorld<'w> {
     buffers: Vec<Vec<Block>>,
 }
 
-/// What a step starts from, as far as phases write to it.
+/// State that a step starts from and that phases change.
 struct Saved {
     bodies: Bodies,
     contacts: Vec<Contact>,
@@ -53,7 +53,7 @@ struct Saved {
     types: Vec<Box<dyn ConstraintType>>,
 }
 
-/// What a step does in one phase.
+/// Work of a step in one phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
     /// The phase.
@@ -74,7 +74,7 @@ pub struct Probe {
 }
 
 impl World {
-    /// Runs a whole step without moving the bodies, and holds the world there.
+    /// Runs a whole step without moving the bodies, and freezes the world there.
     pub fn hold(&mut self) -> HeldWorld<'_> {
         let before = Saved {
             bodies: self.bodies.clone(),
@@ -96,7 +96,7 @@ impl World {
         held
     }
 
-    /// Contacts as they were, linked to the present candidates.
+    /// Restores the contacts and links them to the present candidates.
     fn put_back(&mut self, Saved { contacts, kept, solver, impulses_of, is_changed, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
@@ -155,11 +155,11 @@ impl HeldWorld<'_> {
         }
     }
 
-    /// Runs every phase of a step once, from what the step itself would start with, and says what each
-    /// took, pairs searched again. The bodies are brought back.
+    /// Runs every phase of a step once, from what the step itself would start with, and returns the time of each,
+    /// pairs searched again. The bodies are restored.
     ///
-    /// With `net`, pauses in which the thread waited for a processor are taken out, which costs
-    /// some microseconds a pass beside the times.
+    /// With `net`, pauses in which the thread waited for a processor are subtracted, which costs some microseconds
+    /// per pass outside the measured times.
     pub fn step(&mut self, net: bool) -> Timings {
         self.restore_bodies();
         self.restore_types();
@@ -174,14 +174,14 @@ impl HeldWorld<'_> {
         timings
     }
 
-    /// Keeps what [`Self::reset`] brings back: rows, records and impulses of the step that is held.
+    /// Saves what [`Self::reset`] restores: rows, records and impulses of the frozen step.
     fn save(&mut self) {
         self.rows.clone_from(&self.world.work.rows);
         self.buffers = all_batches(&mut self.world.work).map(|batches| batches.records().to_vec()).collect();
         self.contacts.clone_from(&self.world.contacts);
     }
 
-    /// Brings back what repeats of `phase` have changed.
+    /// Restores what repeats of `phase` changed.
     pub fn reset(&mut self, phase: Phase) {
         match phase {
             Phase::Pairs | Phase::Collide | Phase::Color | Phase::Prepare => return,
@@ -197,8 +197,8 @@ impl HeldWorld<'_> {
         }
     }
 
-    /// What each phase does, in the order of a step; phases that the solver or the scene does not
-    /// have are not in it. Every phase is run once, at one lane that counts its operations.
+    /// The work of each phase, in the order of a step, without phases that the solver or the scene does not have.
+    /// Every phase is run once, at one lane that counts its operations.
     ///
     /// # Panics
     /// If a phase runs a pass of another, whatever the filter says.
@@ -258,20 +258,19 @@ impl HeldWorld<'_> {
         })
     }
 
-    /// What the constraints of the step need.
+    /// Features of the step's constraints.
     pub fn features(&self) -> Features {
         self.world.kernel_features()
     }
 
-    /// Brings back what constraints of other types keep.
+    /// Restores the state of constraints of other types.
     fn restore_types(&mut self) {
         for (joined, before) in self.world.work.types.iter_mut().zip(&self.before.types) {
             joined.kind = before.clone();
         }
     }
 
-    /// Brings back what a step moves, into the memory that it has: a new place would cost
-    /// the next step page faults.
+    /// Restores what a step moves, in place: new memory would cost the next step page faults.
     fn restore_bodies(&mut self) {
         let (to, from) = (&mut self.world.bodies, &self.before.bodies);
         for (to, from) in [

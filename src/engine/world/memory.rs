@@ -1,10 +1,10 @@
-//! What a world holds in memory, and what of that a step uses.
+//! Memory that a world allocates, and the part that a step uses.
 
 use super::World;
 use crate::engine::lanes::held;
 use std::mem::size_of_val;
 
-/// Arrays that serve one purpose.
+/// Arrays of one purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
     /// Name for tables.
@@ -46,7 +46,7 @@ macro_rules! arrays {
 }
 
 impl World {
-    /// What the world holds, by purpose.
+    /// Memory of the world by purpose.
     ///
     /// Where an array cannot be looked into, as in the broad phase, used is what is held.
     pub fn memory(&self) -> Memory {

@@ -1,7 +1,7 @@
 //! One time step of the whole pipeline, every phase timed.
 //!
 //! ```text
-//! bounds → pairs → manifolds → colours → records → solver stages → impulses, poses
+//! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
 //! ```
 
 use crate::engine::bodies::Bodies;
@@ -46,12 +46,12 @@ pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
-/// What is known of a shape for its contacts.
+/// Properties of a shape for its contacts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     friction: f32,
     restitution: f32,
-    /// Farthest point from the body's centre of mass (m).
+    /// Farthest point from the body's center of mass (m).
     reach: f32,
     /// What the narrow phase knows it as.
     class: Class,
@@ -61,18 +61,21 @@ struct Surface {
 
 /// Bodies, shapes, contacts and the settings that move them.
 ///
-/// A clone goes on with the same bits; a watch on iterations is not copied.
+/// A clone continues with the same bits; a watch on iterations is not copied.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
 /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
-/// // One lane and the widest: the same bits.
+/// // A stack, at one lane and at the widest: the same bits.
 /// let mut hashes = Vec::new();
 /// for width in [LaneWidth::W1, LaneWidth::W16] {
-///     let mut world = World::new(Settings::new(solvers::find("soft_step")?).exactly(width));
-///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
+///     let settings = Settings::new(solvers::find("soft_step")?).exactly(width);
+///     let mut world = World::new(settings);
+///     let (floor, cube) = (ShapeDef::rectangle(50.0, 1.0)?, ShapeDef::rectangle(0.5, 0.5)?);
+///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(floor))?;
 ///     for i in 0..8 {
-///         world.add_body(&BodyDef::dynamic([0.3 * i as f64, 1.1 * i as f64 + 0.6]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+///         let (x, y) = (0.3 * f64::from(i), 1.1 * f64::from(i) + 0.6);
+///         world.add_body(&BodyDef::dynamic([x, y]).with(cube.clone()))?;
 ///     }
 ///     for _ in 0..30 {
 ///         world.step()?;
@@ -90,13 +93,13 @@ struct Surface {
 pub struct World {
     /// Body state.
     pub bodies: Bodies,
-    /// Shapes, in the frame of their body's centre of mass.
+    /// Shapes, in the frame of their body's center of mass.
     pub shapes: Vec<Shape>,
     /// Body of each shape.
     pub shape_body: Vec<u32>,
     /// Contacts of the last step with at least one point, sorted by shape pair.
     pub contacts: Vec<Contact>,
-    /// What the run chose.
+    /// Settings of the run.
     pub settings: Settings,
     /// Times of the last step.
     pub timings: Timings,
@@ -178,7 +181,7 @@ impl World {
         }
     }
 
-    /// What the scene needs of its constraints.
+    /// Features that the scene's constraints need.
     pub fn features(&self) -> Features {
         self.features
     }
@@ -198,7 +201,7 @@ impl World {
         self.check()
     }
 
-    /// Velocities and motions of the rows to the bodies.
+    /// Writes velocities and displacements of the rows back to the bodies.
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
@@ -216,8 +219,9 @@ impl World {
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
     }
 
-    /// Runs every phase of a step, pairs included, and leaves the bodies where they are, so that
-    /// one phase can be measured again and again on the same state. Impulses are kept.
+    /// Runs every phase of a step, pairs included, without moving the bodies, so that phases can be measured
+    /// repeatedly on one state. Impulses are kept.
+    #[doc(hidden)]
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
@@ -225,8 +229,8 @@ impl World {
         self.timings = clock.stop();
     }
 
-    /// Finds the contacts of the coming step, with the impulses that it would start from, and
-    /// solves nothing. The step finds the same contacts again.
+    /// Finds the contacts of the next step, with its warm-start impulses, without solving. The step then finds the
+    /// same contacts.
     pub fn find_contacts(&mut self) {
         self.update_pairs();
         self.update_contacts();
@@ -234,16 +238,18 @@ impl World {
 
     /// The rule of the last step's last velocity sweep: none without one, or without
     /// `Settings::observe_rule`.
+    #[doc(hidden)]
     pub fn observed_rule(&self) -> Option<&ObservedRule> {
         self.work.last_rule.as_ref()
     }
 
     /// The constraint records and body rows of the last step, for benches of single kernels.
+    #[doc(hidden)]
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work
     }
 
-    /// Everything of a step up to the new velocities and motions in the rows.
+    /// A step up to the new velocities and displacements in the rows.
     fn solve(&mut self, clock: &mut Clock) {
         self.update_pairs();
         clock.lap(Phase::Pairs);
@@ -260,7 +266,7 @@ impl World {
         (self.counts.sweeps, self.counts.row_updates) = (count.sweeps, count.row_updates);
     }
 
-    /// Body rows and what moves them, from the bodies.
+    /// Fills the body rows and their forces from the bodies.
     fn load_rows(&mut self) {
         let (features, s) = (self.kernel_features(), &self.settings);
         let motion = MotionInput {
@@ -290,13 +296,13 @@ impl World {
         solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
     }
 
-    /// Lanes per instruction of the last step: as many as the settings allow and the colours fill.
+    /// Lanes per instruction of the last step: as many as the settings allow and the colors fill.
     pub fn lane_width(&self) -> LaneWidth {
         LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
     }
 
-    /// The scene's needs and the extra ones, completed to a set that has a kernel:
-    /// friction and second points act through rotation.
+    /// Features of the scene and the extra ones, completed to a set that has a kernel: friction and second points
+    /// require rotation.
     fn kernel_features(&self) -> Features {
         let mut features = self.features.union(self.settings.extra_features);
         features.rotation |= features.friction || features.two_points;
@@ -304,7 +310,7 @@ impl World {
         features
     }
 
-    /// Reports the first body that is out of all bounds.
+    /// Returns the first body that diverged.
     fn check(&self) -> Result<(), Divergence> {
         let b = &self.bodies;
         // Cut to one length and without branches, so that the compiler does it in lanes.

@@ -1,7 +1,6 @@
-//! What is where: rays, points, boxes and shapes against the bodies of a world.
+//! Queries: rays, points and boxes against the bodies of a world.
 //!
-//! The tree of the broad phase says which shapes are near, and the cores of those are measured exactly, in `f64`
-//! ([`distance`]).
+//! The tree of the broad phase finds shapes nearby; their distances are computed in `f64` ([`distance`]).
 //!
 //! **Rays.** At a point p of the ray let d be the distance of the shape and n the direction to its nearest point. All of
 //! the shape lies behind the plane at distance d with normal n. So the ray may advance to that plane, by d / (n·u) along
@@ -17,7 +16,7 @@ use crate::engine::narrowphase::gjk::distance;
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use glam::{DVec2, Vec2};
 
-/// Where a ray meets a shape first. Distances are good to 10⁻⁷ of themselves, to which places relative to a ray are rounded.
+/// The first point where a ray meets a shape. Distances have a relative accuracy of 10⁻⁷.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// The body.
@@ -41,15 +40,14 @@ const MOST_ADVANCES: u32 = 64;
 /// Bounds are read in `f32`: what lies this far outside of a query, relative to its coordinates, is still looked at.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// The bodies of a world where they are now. Made by [`World::queries`], which brings the tree up to date once for many
-/// queries.
+/// Queries on the present positions. [`World::queries`] updates the tree once for many queries.
 #[derive(Debug)]
 pub struct Queries<'w> {
     world: &'w World,
 }
 
 impl World {
-    /// Queries on the bodies where they are now. A step after it gives the same bits as without.
+    /// Queries on the present positions. They do not change the bits of later steps.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -79,7 +77,7 @@ impl World {
 }
 
 impl Queries<'_> {
-    /// The first shape along a ray without end. Errors: a value that is not finite, a direction of length zero.
+    /// The first shape along an infinite ray. Errors: a value that is not finite, a direction of length zero.
     pub fn ray_cast(&self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
         self.ray_cast_where(from, direction, f64::INFINITY, |_| true)
     }
@@ -157,7 +155,7 @@ impl Queries<'_> {
         });
     }
 
-    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector towards it; zero where
+    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector toward it; zero where
     /// cores overlap.
     fn distance(&self, i: usize, other: &Shape, center: DVec2) -> (f64, DVec2) {
         let bodies = &self.world.bodies;

@@ -1,7 +1,7 @@
-//! A world as a document: what a step starts from, without what is found again.
+//! Serialization of a world: the state that a step starts from, without what a step recomputes.
 //!
-//! Not in it: constraints of other types than contacts, which refuse to be saved, and what a solver keeps in fields of its
-//! own, beside the numbers per contact and body. So a solver without such fields goes on with the same bits.
+//! Not in it: constraints of other types than contacts (saving them is an error), and state that a solver keeps in
+//! its own fields instead of per contact and body. Solvers without such fields continue with the same bits.
 
 use super::edit::{Slots, Standing};
 use super::events::Events;
@@ -163,7 +163,7 @@ impl<'de> Deserialize<'de> for World {
 }
 
 impl SavedWorld {
-    /// Whether all arrays fit each other and all indices point into them.
+    /// Whether all arrays have matching lengths and all indices are valid.
     fn check(&self) -> Result<(), String> {
         let (n, shapes) = (self.kind.len(), self.shapes.len());
         let s = &self.slots;

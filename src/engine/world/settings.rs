@@ -1,4 +1,4 @@
-//! What a run can choose.
+//! Settings of a world.
 
 use crate::engine::broadphase::BroadPhaseKind;
 use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
@@ -14,11 +14,11 @@ use crate::engine::solvers::Variant;
 pub enum Order {
     /// One after the other, sorted by shape pair (width 1 only).
     Natural,
-    /// Colour by colour.
+    /// Color by color.
     Colored,
 }
 
-/// Everything a run can choose.
+/// Settings of a world: solver, budget, lanes, step, gravity and options.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -40,8 +40,8 @@ pub struct Settings {
     pub solver: &'static Variant,
     /// Lanes per instruction, at most.
     pub width: LaneWidth,
-    /// Fewest lanes that a step may fall back to where colours are small; see [`Self::exactly`]. Every width gives the
-    /// same bits.
+    /// Fewest lanes that the engine may fall back to when colors are small; see [`Self::exactly`]. Every width gives
+    /// the same bits.
     pub narrowest: LaneWidth,
     /// Constraint order.
     pub order: Order,
@@ -53,7 +53,7 @@ pub struct Settings {
     pub dt: f32,
     /// The solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
-    /// Where bodies hit each other.
+    /// Impact law.
     pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
@@ -69,7 +69,8 @@ pub struct Settings {
     pub integrator: Integrator,
     /// How spins turn bodies.
     pub rotation: RotationUpdate,
-    /// Whether fast bodies are stopped by what they would pass, see [`crate::engine::continuous`].
+    /// Continuous collision: whether fast bodies are stopped at surfaces that they would pass through, see
+    /// [`crate::engine::continuous`].
     pub continuous: bool,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
@@ -77,7 +78,7 @@ pub struct Settings {
 
 impl Settings {
     /// Standard settings of `solver`: its budget, the widest lanes that this build has instructions
-    /// for, coloured, gravity (0, −10), 1/60 s.
+    /// for, colored, gravity (0, −10), 1/60 s.
     pub fn new(solver: &'static Variant) -> Self {
         Settings {
             solver,
@@ -106,7 +107,7 @@ impl Settings {
         Settings { width, narrowest: width, ..self }
     }
 
-    /// What a step does where bodies hit each other.
+    /// The impact law of a step.
     pub fn impact_law(&self) -> ImpactLaw {
         self.impacts.law(self.solver.impacts)
     }

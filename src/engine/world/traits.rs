@@ -1,4 +1,4 @@
-//! What the bodies of a world have, summed up as they are added.
+//! Features of a world's bodies, collected as they are added.
 
 use crate::engine::bodies::{BodyDef, BodyKind};
 use crate::engine::constraints::Features;
@@ -24,7 +24,7 @@ impl Having {
     }
 }
 
-/// What decides the needs of a scene.
+/// Properties that decide the features of a scene.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Traits {
@@ -37,7 +37,7 @@ pub(super) struct Traits {
 }
 
 impl Traits {
-    /// Takes note of a body; `round` if it is made of discs about its centre of mass.
+    /// Takes note of a body; `round` if it is made of discs about its center of mass.
     pub fn add(&mut self, body: &BodyDef, round: bool) {
         let dynamic = body.kind == BodyKind::Dynamic;
         let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
@@ -49,12 +49,12 @@ impl Traits {
         self.damped |= body.linear_damping as f32 > 0.0 || body.angular_damping as f32 > 0.0;
     }
 
-    /// Something may spin that did not at the start.
+    /// Some body may now rotate that could not at the start.
     pub fn spins(&mut self) {
         self.spins = true;
     }
 
-    /// What constraints between such bodies need.
+    /// Features of constraints between such bodies.
     pub fn features(&self) -> Features {
         Features {
             rotation: self.friction.pair() || self.spins || self.has_other_than_discs,

@@ -1,9 +1,9 @@
-//! What is asked of a setting: limits with units, and how far a run is over them.
+//! Limits on a setting, with units, and how far a run exceeds them.
 
 use crate::lab::metrics::Errors;
 use crate::lab::study::TruthError;
 
-/// Limits that a setting has to keep; where none, anything will do.
+/// Limits that a setting has to meet; none: no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Limits {
     /// Penetration (m), see [`Errors::penetration`].
@@ -11,7 +11,7 @@ pub struct Limits {
     pub penetration: Option<f64>,
     /// Time of a step (ns).
     pub time_ns: Option<f64>,
-    /// Distance to the truth, in the truth's unit.
+    /// Distance to the reference value, in its unit.
     #[serde(rename = "reference")]
     pub truth: Option<f64>,
     /// Contact-law residual, root mean square in weights of the lighter body (1).
@@ -22,8 +22,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The largest of the errors in their limits: up to 1 is within all of them. A truth
-    /// that was not reached is infinitely far.
+    /// The largest error ÷ limit: up to 1 is within all limits. A reference value that was not reached is infinitely
+    /// far.
     pub fn of_errors(&self, errors: &Errors, truth: Option<&TruthError>) -> f64 {
         let distance = truth.and_then(|t| t.error).unwrap_or(f64::INFINITY);
         let pairs = [

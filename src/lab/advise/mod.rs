@@ -1,20 +1,19 @@
-//! Which setting is the cheapest that is good enough for a scene?
+//! Finds the cheapest setting that is good enough for a scene.
 //!
 //! A *setting* is a solver, a constraint order, a budget and, for solvers with soft contacts,
 //! their stiffness; the fastest lane width goes with it. The search
 //!
 //! 1. tries a grid in which every part of the budget is doubled, the least work first;
-//! 2. refines what is good enough: each part is lowered by bisection towards its half;
-//! 3. times the best few again, in turns and several times, and lets that decide.
+//! 2. refines what is good enough: each part is lowered by bisection toward its half;
+//! 3. times the best few again, interleaved and several times, which decides.
 //!
-//! Where a scene has to rest, what keeps the limits is [run on](crate::lab::study::horizon) for a minute before
-//! it counts as good enough.
+//! If a scene has to rest, a setting within the limits is [run for a minute](crate::lab::study::horizon) before it
+//! counts as good enough.
 //!
-//! Left out is what should only cost more than something known: a budget that contains, in
-//! every part, one of the same solver, order and stiffness that is good enough already; or one
-//! of the same solver and order that took far longer than is allowed, or than the fastest
-//! that is good enough. Errors need not fall when a budget grows, so a setting that is left
-//! out might be more exact; it should not be cheaper.
+//! Settings that cannot be cheaper than a known one are skipped: budgets that contain, in every part, a good-enough
+//! budget of the same solver, order and stiffness; or a budget of the same solver and order that took far longer than
+//! allowed, or than the fastest good-enough one. Errors need not fall when a budget grows, so a skipped setting may
+//! be more accurate, but not cheaper.
 
 pub mod limits;
 mod search;
@@ -39,23 +38,23 @@ use search::Search;
 /// What to search, and how long.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Name of the catalogue with its size, or a `.json` file.
+    /// Name of the catalog with its size, or a `.json` file.
     pub scene: String,
-    /// What is good enough.
+    /// Limits of a good-enough setting.
     pub limits: Limits,
     /// What happens where bodies hit each other.
     pub impacts: Impacts,
     /// Rows of [`crate::engine::solvers::VARIANTS`].
     pub solvers: Vec<&'static Variant>,
-    /// Lane widths of coloured settings; with one lane there is natural order too.
+    /// Lane widths of colored settings; with one lane there is natural order too.
     pub widths: Vec<LaneWidth>,
     /// Steps of the runs that measure errors; where none, the scene's own.
     pub steps: Option<u32>,
     /// Timing runs of the final timing.
     pub repeats: u32,
-    /// Lays out scenes that have chance in them, and shuffles timing runs.
+    /// Random seed of scenes that have one, and of the order of timing runs.
     pub seed: u64,
-    /// No trial begins after this long (s).
+    /// Time limit of the search (s).
     pub seconds: f64,
 }
 
@@ -140,7 +139,7 @@ pub struct Trial {
     pub failure: Option<Failure>,
     /// The first demand of the scene that was not met: no limit is kept by what fell.
     pub broken: Option<Broken>,
-    /// What happened in a minute, where the scene has to rest and the run itself kept the limits.
+    /// Result of the one-minute run, if the scene has to rest and the run itself was within the limits.
     pub later: Option<Later>,
     /// The largest of errors and time in their limits: up to 1 is good enough.
     pub excess: f64,
@@ -180,7 +179,7 @@ impl Trial {
             ),
             (
                 limits.truth.is_some() && reference.is_none_or(|e| over(e, limits.truth)),
-                reference.map_or("never comes to its reference value".into(), |e| {
+                reference.map_or("never reaches its reference value".into(), |e| {
                     format!("{} off its reference value", si(e, unit))
                 }),
             ),
@@ -207,9 +206,9 @@ pub struct Advice {
     pub finalists: Vec<Trial>,
     /// Everything that was tried, in that order, with the times of the trials.
     pub trials: Vec<Trial>,
-    /// Settings left out because they should not be cheaper.
+    /// Settings skipped because they cannot be cheaper.
     pub left_out: usize,
-    /// Whether the time was up before the grid was done.
+    /// Whether the time limit was reached before the grid was done.
     pub is_cut_short: bool,
     /// Timing runs and steps of the final timing.
     pub timing: [u32; 2],
@@ -244,7 +243,7 @@ impl Advice {
         kept
     }
 
-    /// Of what is not good enough, the nearest.
+    /// The nearest setting that is not good enough.
     pub fn nearest(&self) -> Option<&Trial> {
         self.finalists.iter().find(|t| !t.is_good())
     }
@@ -266,7 +265,7 @@ pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error>
     }
     let loaded = open_scene(&plan.scene, Some(plan.seed), plan.steps, None)?;
     if plan.limits.truth.is_some() && loaded.truth.is_none() {
-        return Err(Error::invalid("max-truth", format!("no truth is known about '{}'", plan.scene)));
+        return Err(Error::invalid("max-truth", format!("no reference value is known for '{}'", plan.scene)));
     }
     let mut search = Search::new(plan, &loaded.scene, progress);
     search.coarse()?;

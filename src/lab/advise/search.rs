@@ -32,7 +32,7 @@ pub struct Search<'a> {
     total: usize,
     /// Everything tried so far.
     pub trials: Vec<Trial>,
-    /// What was left out because it can only cost more.
+    /// Settings skipped because they can only cost more.
     pub left_out: usize,
     /// Whether the time was up before the grid was done.
     pub is_cut_short: bool,
@@ -346,7 +346,7 @@ mod tests {
         search.refine().unwrap();
         let tried: Vec<(u32, bool)> =
             search.trials[1..].iter().map(|t| (t.setting.budget.velocity_iterations, t.is_good())).collect();
-        // 48 first, then towards the boundary between the largest bad and the least good one.
+        // 48 first, then toward the boundary between the largest bad and the least good one.
         assert_eq!((tried.len(), tried[0].0), (5, 48));
         let least_good = tried.iter().filter(|t| t.1).map(|t| t.0).min().unwrap_or(64);
         let most_bad = tried.iter().filter(|t| !t.1).map(|t| t.0).max().unwrap_or(32);

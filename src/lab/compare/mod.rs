@@ -1,16 +1,14 @@
-//! Two studies side by side: what became better or worse beyond the noise.
+//! Comparison of two studies: changes beyond the noise.
 //!
-//! Settings that both have are paired: scene, solver, budget, order, lanes. **Errors** have no noise: the
-//! same program gives the same bits, so whatever changed was changed. What matters is judged by the
-//! tolerance of the scene: an error below [`NEGLIGIBLE`] of it is as good as none. **Times** have: both
-//! studies went through the same steps in the same blocks, so block k is paired with block k, and the
-//! median of the ratios has an interval ([`Ratio`]). A machine may be slower on another day, or be another
-//! machine; the median ratio over all settings is what they have in common, and can be divided out.
+//! Settings in both studies are paired by scene, solver, budget, order and lanes. **Errors** have no noise: the same
+//! program gives the same bits, so every difference is a change. They are compared with the tolerance of the scene:
+//! an error below [`NEGLIGIBLE`] of it counts as zero. **Times** have noise: both studies run the same steps in the
+//! same blocks, so block k is paired with block k, and the median of the ratios has an interval ([`Ratio`]). The
+//! machines may differ in speed; the median ratio over all settings can be divided out.
 //!
-//! One binary run twice differs, too: by where its memory lies, by the clock of the processor, by what else the
-//! machine does. What of that can be seen is measured and widens every interval ([`Noise`]): a fixed loop that
-//! each study timed between its rounds says what the machine was worth, the scatter of the settings around their
-//! common ratio what placement does, and the time in which threads waited how busy it was.
+//! Two runs of one binary differ as well: by memory placement, clock rate and load. The measurable part widens every
+//! interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the machine; the scatter of
+//! the settings around their common ratio measures placement; and the time that threads waited measures the load.
 
 pub mod text;
 
@@ -29,13 +27,13 @@ pub const NEGLIGIBLE: f64 = 0.01;
 /// How to judge.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Growth of a time or an error from which it is a regression (1): 0.1 is a tenth more.
+    /// Smallest increase of a time or an error that counts as a regression (1): 0.1 is 10 %.
     pub threshold: f64,
     /// Divide times by what all settings have in common.
     pub relative: bool,
 }
 
-/// What both studies have of a setting.
+/// A setting in both studies.
 #[derive(Clone, Debug, Serialize)]
 pub struct Pair {
     /// Name with size.
@@ -53,7 +51,7 @@ pub struct Pair {
     pub marks: [Option<Mark>; 2],
     /// Errors that both have, by axis.
     pub errors: Vec<ErrorChange>,
-    /// Time after in times that before; none if one of them has no time.
+    /// Time after ÷ time before; none if one of them has no time.
     pub time: Option<TimeChange>,
 }
 
@@ -71,7 +69,7 @@ pub struct ErrorChange {
     pub unit: &'static str,
     /// Before and after.
     pub values: [f64; 2],
-    /// What of it is negligible.
+    /// The share that is negligible.
     pub negligible: f64,
 }
 
@@ -88,7 +86,7 @@ pub struct TimeChange {
     pub interval: [f64; 2],
 }
 
-/// What two runs of one program differ by, as logarithms of ratios (1).
+/// Differences between two runs of one program, as logarithms of ratios (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Noise {
     /// Time of the fixed loop after, in that before (1); all times are divided by it.
@@ -101,7 +99,7 @@ pub struct Noise {
     pub allowed: f64,
 }
 
-/// What remains between two runs on a machine that does nothing else: code and data lie elsewhere.
+/// Difference that remains between two runs on an idle machine, because code and data lie at other addresses.
 const PLACEMENT: f64 = 0.02;
 
 /// Settings whose scatter says something.

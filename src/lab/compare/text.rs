@@ -34,7 +34,7 @@ pub fn text(found: &Comparison, all: bool) -> String {
     );
     let n = found.noise;
     text += &format!(
-        "allowed between two runs of one program: {:.1} % (settings scatter by {:.1} %, threads waited {:.1} %, a fixed loop took {:.3} times as long, which is divided out)\n",
+        "noise between two runs of one program: {:.1} % (settings scatter by {:.1} %, threads waited {:.1} %; a fixed loop took {:.3} times as long, which is divided out)\n",
         100.0 * n.allowed.exp_m1(),
         100.0 * n.scatter,
         100.0 * n.waited,
@@ -49,11 +49,11 @@ pub fn text(found: &Comparison, all: bool) -> String {
     let errors: Vec<Line> = once.iter().flat_map(|p| errors(p, found.threshold)).collect();
     let changed = once.iter().flat_map(|p| &p.errors).filter(|e| e.changed()).count();
     let count = once.iter().map(|p| p.errors.len()).sum::<usize>();
-    text += &section(&format!("Errors: {changed} of {count} differ in some bit"), errors, all);
+    text += &section(&format!("Errors: {changed} of {count} are not bit-identical"), errors, all);
     let times: Vec<Line> = found.pairs.iter().filter_map(|p| times(p, found.threshold)).collect();
     let common = match (found.common, found.relative) {
         (None, _) => String::new(),
-        (Some(common), false) => format!(": in the median {} times as long", digits(common)),
+        (Some(common), false) => format!(": median {} times as long", digits(common)),
         (Some(common), true) => format!(": relative to the median, {} times as long", digits(common)),
     };
     text += &section(&format!("Times{common}"), times, all);

@@ -6,24 +6,24 @@
 //! [`ContactProblem::impulse_unit`], against two laws that are never mixed:
 //!
 //! - the *rigid* law, the same for all;
-//! - the solver's *own* law, that of its last velocity sweep. Position feedback, softness and
-//!   missing friction are other laws; a solver may solve its own to the last bit and stay far
-//!   from the rigid one for ever.
+//! - the solver's *own* law, that of its last velocity sweep. Position feedback, softness and missing friction define
+//!   other laws; a solver may solve its own law to the last bit and never approach the rigid one.
 //!
-//! An *iteration* is what the solver's row counts as one ([`Variant::iterations`]): mostly one velocity
-//! sweep, and one relaxing sweep where the solver relaxes. *Sweeps* are what the solver itself counts. No residual
-//! gets below what `f32` can hold, some 1e-6 times the largest impulse; where a tolerance is not
-//! reached within the cap, there is no number.
+//! An *iteration* is what the solver's row counts as one ([`Variant::iterations`]): mostly one velocity sweep, and
+//! one relaxing sweep where the solver relaxes. *Sweeps* are what the solver itself counts. Residuals are limited by
+//! `f32`, at about 1e-6 times the largest impulse; a tolerance that is not reached within the cap has no number.
 //!
 //! Iterations to a tolerance are exact: k is dense up to 128 and then grows by 1/64, and between
 //! two such k the first one that reaches a tolerance is looked for.
 //!
-//! Methods in `f64` that share no code with the solvers ([`crate::lab::reference`]) stand beside them.
+//! Methods in `f64` that share no code with the solvers ([`crate::lab::reference`]) are run for comparison.
 
+#[doc(hidden)]
 pub mod plot;
 pub mod replay;
 mod scalar;
 mod setup;
+#[doc(hidden)]
 pub mod summary;
 pub mod table;
 pub mod timing;
@@ -97,7 +97,7 @@ pub struct CurvePoint {
     pub velocity_error: Option<f64>,
 }
 
-/// What a curve came to under one law.
+/// The result of a curve under one law.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reached {
     /// Index into [`Curve::points`] of the first point within each of [`TOLERANCES`].
@@ -112,11 +112,11 @@ pub struct Reached {
 /// One solver in one order from one start.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
-    /// Name of the solver, with its stage where that is not all of it.
+    /// Name of the solver, with its stage if it is only one of several.
     pub solver: String,
     /// Whether that is not its whole schedule.
     pub is_part: bool,
-    /// `f32` for the simulation's code, `f64` for methods to compare with.
+    /// `f32`: code of the simulation; `f64`: methods for comparison.
     pub arithmetic: &'static str,
     /// Order of the contacts.
     pub order: Sequence,
@@ -149,7 +149,7 @@ pub struct Report {
     pub certificate: Option<Certificate>,
     /// Where warm starts come from; without any there are no warm curves.
     pub warm_start: WarmStart,
-    /// Solvers that begin every step from zero, if there are warm starts: they have no warm curves.
+    /// Solvers without warm starting, if there are warm starts: they have no warm curves.
     pub forgetful: Vec<String>,
     /// Lanes in colored order.
     pub lanes: usize,
@@ -185,8 +185,30 @@ impl Schedule {
     }
 }
 
-/// Runs everything on `problem`. Errors: a problem that is not valid, is out of the range of
-/// `f32`, or has no contacts; a reference that does not hold.
+/// Runs every solver of `options` on `problem`.
+///
+/// Errors: a problem that is not valid, is out of the range of `f32`, or has no contacts; a reference that does not hold.
+///
+/// ```
+/// use simpulse::engine::solvers::find;
+/// use simpulse::lab::converge::{Options, converge};
+/// use simpulse::lab::reference::gallery;
+///
+/// let problem = gallery::disc_column(4);
+/// let options = Options {
+///     solvers: vec![find("pgs")?],
+///     max_iterations: 100,
+///     rounds: 0,
+///     baseline: false,
+///     ..Options::default()
+/// };
+/// let report = converge(&problem, None, &options)?;
+/// let curve = &report.curves[0];
+/// // Index of the first point with a residual below 1e-3.
+/// let reached = curve.rigid.first[2].ok_or("not within 100 sweeps")?;
+/// println!("{}: {} sweeps to 1e-3", curve.solver, curve.points[reached].sweeps);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn converge(
     problem: &ContactProblem,
     reference: Option<&Reference>,
@@ -369,7 +391,7 @@ const LAWS: [fn(&CurvePoint) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own]
 /// Fits end this many times above the rounding floor: a residual there is off by 1 %.
 const ABOVE_FLOOR: f64 = 100.0;
 
-/// What `points` came to under `law`, with residuals rounded to about `floor`.
+/// The result of `points` under `law`, with residuals rounded to about `floor`.
 fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f64) -> Reached {
     let first =
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));

@@ -98,7 +98,7 @@ fn rows(report: &Report) -> Vec<Row> {
             reached: |c| &c.rigid,
         });
         rows.push(Row {
-            title: format!("Each solver's own law, {start} start"),
+            title: format!("Solver's own law, {start} start"),
             start,
             residual: |p| p.own,
             reached: |c| &c.own,
@@ -262,7 +262,7 @@ fn decade(exponent: i32) -> String {
         n => format!("1e{n}"),
     }
 }
-/// What is said of lanes that are wider than what this build has instructions for.
+/// Note on lanes wider than the native ones of this build.
 fn emulated(lanes: usize) -> &'static str {
     if lanes > native_width().lanes() { ", emulated" } else { "" }
 }

@@ -57,7 +57,7 @@ impl Sequence {
     }
 }
 
-/// What a run begins with.
+/// Impulses at the start of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
@@ -73,7 +73,7 @@ impl fmt::Display for Start {
     }
 }
 
-/// What a step ended with.
+/// Result of a step.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// v⁺, one per body.

@@ -87,7 +87,7 @@ pub(super) fn contacts(problem: &ContactProblem, inert: u32) -> (Vec<Contact>, V
     (contacts, places)
 }
 
-/// What the problem needs of its constraints; bouncing and damping are no part of it.
+/// Features of the problem's constraints, without restitution and damping.
 pub(super) fn features(problem: &ContactProblem, contacts: &[Contact]) -> Features {
     let friction = problem.contacts.iter().any(|c| c.friction > 0.0);
     let two_points = contacts.iter().any(|c| c.manifold.count > 1);

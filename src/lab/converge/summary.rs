@@ -1,4 +1,4 @@
-//! What convergence comes to, in sentences.
+//! Convergence in sentences.
 
 use super::replay::{Sequence, Start};
 use super::{Curve, Reached, Report, TOLERANCES};
@@ -34,7 +34,7 @@ pub fn text(report: &Report) -> String {
         });
         let list: Vec<String> = each.collect();
         text += &format!(
-            "Sweeps to the law that a solver itself sets, where that is another one, cold: {}.\n",
+            "Sweeps to a solver's own law, if it differs from the rigid law, cold: {}.\n",
             list.join("; ")
         );
     }
@@ -57,7 +57,7 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
     }
     let goal = format!("{:.0e}, {start}", TOLERANCES[at]);
     let mut text = match reached.as_slice() {
-        [] => format!("To {goal}: no solver gets there"),
+        [] => format!("To {goal}: no solver reaches it"),
         [(least, _), ..] => {
             let first: Vec<&str> = reached.iter().filter(|r| r.0 == *least).map(|r| r.1).collect();
             let when = match least {
@@ -83,14 +83,14 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
 /// Measured rates beside that of Gauss–Seidel.
 fn baseline(report: &Report, curves: &[&Curve]) -> String {
     let Some(rate) = report.gauss_seidel_rate else {
-        return "Gauss-Seidel in f64 has no rate here: it comes to no solution, or at once.\n".into();
+        return "Gauss–Seidel in f64 has no rate here: it never converges, or at once.\n".into();
     };
     let sweeps = |tolerance: f64| (tolerance.ln() / rate.ln()).ceil();
     let mut text = format!(
-        "Gauss-Seidel in f64, in the problem's order and from zero, ends in a rate of {rate:.4} per sweep"
+        "Gauss–Seidel in f64, in the problem's order and from zero, has an asymptotic rate of {rate:.4} per sweep"
     );
     if rate < 1.0 {
-        text += &format!(", {:.0} sweeps for 1e-2 and {:.0} for 1e-4", sweeps(1e-2), sweeps(1e-4));
+        text += &format!(", {:.0} sweeps to 1e-2 and {:.0} to 1e-4", sweeps(1e-2), sweeps(1e-4));
     }
     let measured: Vec<String> = curves
         .iter()

@@ -57,21 +57,19 @@ pub fn text(report: &Report) -> String {
 fn starts(report: &Report) -> String {
     let mut text = match report.warm_start {
         WarmStart::Captured => {
-            "Warm starts: the impulses of the step before, which the problem has.\n".into()
+            "Warm starts: the impulses of the previous step, stored in the problem.\n".into()
         }
         WarmStart::Drawn => format!(
-            "Warm starts: the problem has no impulses of a step before; they are those of the reference, each off by \
-             up to {:.0} %.\n",
+            "Warm starts: the problem stores no impulses of a previous step; these are the impulses of the reference, each changed by up to {:.0} %.\n",
             100.0 * OFF
         ),
         WarmStart::None => {
-            "No warm starts: the problem has neither impulses of a step before nor a certified \
-                            reference to draw them around.\n"
+            "No warm starts: the problem has neither impulses of a previous step nor a certified reference.\n"
                 .into()
         }
     };
     if !report.forgetful.is_empty() {
-        text += &format!("No warm curve, as every step begins from zero: {}.\n", report.forgetful.join(", "));
+        text += &format!("No warm curve (no warm starting): {}.\n", report.forgetful.join(", "));
     }
     let mut unobserved: Vec<&str> = Vec::new();
     for curve in &report.curves {
@@ -82,7 +80,7 @@ fn starts(report: &Report) -> String {
     }
     if !unobserved.is_empty() {
         text += &format!(
-            "No curve under a law of its own, as no bias and compliance of normal rows say what is solved: {}.\n",
+            "No curve under the solver's own law (it has none in terms of bias and compliance of normal rows): {}.\n",
             unobserved.join(", ")
         );
     }
@@ -99,8 +97,8 @@ fn reference_line(report: &Report) -> String {
                 crate::lab::reference::certify::Uniqueness::Proven => "unique (no friction)",
                 crate::lab::reference::certify::Uniqueness::Agreed => "agreed on by two families",
                 crate::lab::reference::certify::Uniqueness::Multiple =>
-                    "NOT unique: their error says nothing, the residual does",
-                crate::lab::reference::certify::Uniqueness::Unknown => "of one family only",
+                    "NOT unique: use the residual instead of their error",
+                crate::lab::reference::certify::Uniqueness::Unknown => "found by one family only",
             }
         ),
         None => "Reference: none, so no velocity errors".into(),

@@ -1,4 +1,4 @@
-//! How long an iteration takes, measured apart from what it does.
+//! The time of an iteration, measured separately from its results.
 
 use super::Schedule;
 use super::replay::{Replay, Start};

@@ -1,4 +1,4 @@
-//! What warm starts begin with: the step before.
+//! Warm starts: the impulses of the previous step.
 //!
 //! A problem that was captured from a scene has the impulses of the step before. One that has none may have a
 //! certified reference λ. Then the step before is taken to be the same problem under loads that differ by up to

@@ -1,4 +1,4 @@
-//! What a step should have kept: momentum, angular momentum and energy.
+//! Balances of a step: momentum, angular momentum and energy.
 //!
 //! External to the dynamic bodies are weight, applied forces and the impulses of contacts
 //! with static and kinematic bodies, all of which are known. Damping is external too, but
@@ -14,7 +14,7 @@ use glam::DVec2;
 pub struct Balance {
     dt: f64,
     substeps: f64,
-    /// Reference point of angular momentum: the centre of mass at the start, so that
+    /// Reference point of angular momentum: the center of mass at the start, so that
     /// nothing cancels far from the origin (m).
     center: DVec2,
     mass: f64,
@@ -172,7 +172,7 @@ impl Balance {
     ///   imbalances ever was;
     /// - angular momentum: the same times the radius of gyration of the whole scene;
     /// - energy: the largest kinetic energy plus weight × the radius of gyration of the
-    ///   bodies about their own centres; the energy is the shadow energy of
+    ///   bodies about their own centers; the energy is the shadow energy of
     ///   [`shadow_energy_change`], less the work of kinematic bodies.
     ///
     /// Where a scale is zero, nothing ever moved, and the imbalance is zero.
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn weight_that_the_floor_carries_is_balanced_and_a_lost_impulse_is_not() {
-        // 2 kg × 10 m/s² × 0.1 s = 2 N·s, below the centre of mass.
+        // 2 kg × 10 m/s² × 0.1 s = 2 N·s, below the center of mass.
         let rest = BodyState { force: DVec2::new(0.0, -20.0), ..body() };
         let floor = fixed(BodyKind::Static);
         assert_eq!(run(floor, rest, rest, point([2.0, 0.0], DVec2::NEG_Y)), Imbalance::default());
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn angular_momentum_needs_the_right_arm() {
-        // 1 N·s upwards at arm +1 m: v = ½ m/s, ω = 2 rad/s.
+        // 1 N·s upward at arm +1 m: v = ½ m/s, ω = 2 rad/s.
         let rest = body();
         let after = BodyState {
             velocity: DVec2::new(0.0, 0.5),

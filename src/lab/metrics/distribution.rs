@@ -2,7 +2,7 @@
 
 /// Smallest value that has a bin of its own; smaller ones count as this.
 const FLOOR: f64 = 1e-9;
-/// Bins per factor of ten: neighbours differ by 10^(1/100), 2.3 %.
+/// Bins per factor of ten: neighbors differ by 10^(1/100), 2.3 %.
 const PER_DECADE: f64 = 100.0;
 /// Bins from [`FLOOR`] to 1000.
 const BINS: usize = 1200;

@@ -1,4 +1,4 @@
-//! How far a step's impulses are from the contact law of Signorini and Coulomb.
+//! Residual of the contact law of Signorini and Coulomb, for the impulses of a step.
 //!
 //! Over a step a contact point has the impulse (λ_n, λ_t) and ends with the velocity
 //! (u_n, u_t). The law says
@@ -33,9 +33,9 @@ use glam::DVec2;
 pub struct PointStep {
     /// Unit normal from a to b.
     pub normal: DVec2,
-    /// From the centre of mass of a to the point (m).
+    /// From the center of mass of a to the point (m).
     pub anchor_a: DVec2,
-    /// From the centre of mass of b to the point (m).
+    /// From the center of mass of b to the point (m).
     pub anchor_b: DVec2,
     /// Signed gap (m).
     pub gap: f64,
@@ -57,7 +57,7 @@ pub struct BodyStep {
 }
 
 impl BodyStep {
-    /// Motion over the step of the material point at `anchor`, linearised (m).
+    /// Motion over the step of the material point at `anchor`, linearized (m).
     fn displacement_at(&self, anchor: DVec2) -> DVec2 {
         self.after.position - self.before.position + self.after.turn_since(&self.before) * anchor.perp()
     }
@@ -137,7 +137,7 @@ pub(super) mod tests {
 
     pub const DT: f64 = 0.1;
 
-    /// A 2 kg body on a fixed floor, the contact below its centre of mass, in its centre
+    /// A 2 kg body on a fixed floor, the contact below its center of mass, in its center
     /// so that nothing turns: both effective masses are 2 kg.
     pub fn point(gap: f64, impulse: [f64; 2]) -> PointStep {
         PointStep {

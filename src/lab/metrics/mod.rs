@@ -1,24 +1,45 @@
-//! How wrong a simulation is, read from its states and impulses alone.
+//! Errors of a simulation, computed from its states and impulses only.
 //!
-//! Everything is computed in double precision from the single-precision state, and nothing
-//! here knows which solver ran. Make an [`Observation`] of the world before its first step
-//! and show it the world after every step, with `Settings::record_impulses` on.
+//! Everything is computed in double precision from the single-precision state, without knowledge of the solver.
+//! Create an [`Observation`] before the first step and call [`Observation::observe`] after every step, with
+//! `Settings::record_impulses` on.
 //!
-//! | error | says | computed in |
+//! | error | meaning | computed in |
 //! |---|---|---|
 //! | penetration | how deep bodies overlap *after* the step, pairs searched again | [`overlaps`] |
-//! | excess penetration | what of that soft contacts do not account for, at rest | [`softness`] |
+//! | excess penetration | the part that is not static deflection of soft contacts, at rest | [`softness`] |
 //! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
-//! | complementarity, cone, dissipation | which part of the law is broken | [`violation`] |
-//! | own residual | how far the solver is from what it set out to solve | [`own`] |
+//! | complementarity, cone, dissipation | which part of the law is violated | [`violation`] |
+//! | own residual | how far the solver is from its own law | [`own`] |
 //! | momentum, angular momentum | whether impulses come in pairs | [`balance`] |
-//! | energy | what was gained from nowhere, or lost, and what took it | [`balance`], [`state`] |
-//! | rest velocity, creep, settle time | whether what should rest does | [`rest`] |
+//! | energy | energy gained or lost, and where it went | [`balance`], [`state`] |
+//! | rest velocity, creep, settle time | whether bodies that should rest do | [`rest`] |
 //! | velocity error | how far velocities are from a reference | [`velocity`] |
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
 //!
-//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report.
+//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report. Outside the crate it is a
+//! function of a world:
+//!
+//! ```
+//! use simpulse::engine::world::{Settings, World};
+//! use simpulse::engine::{solvers, bodies::BodyKind};
+//! use simpulse::lab::scenes;
+//!
+//! /// Height of the highest body (m).
+//! fn height(world: &World) -> f64 {
+//!     let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Dynamic);
+//!     dynamic.map(|i| world.bodies.origin(i)[1]).fold(0.0, f64::max)
+//! }
+//!
+//! let mut world = scenes::load("stack:5")?.scene.build(Settings::new(solvers::find("shim")?))?;
+//! let before = height(&world);
+//! for _ in 0..60 {
+//!     world.step()?;
+//! }
+//! assert!((height(&world) - before).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod balance;
 pub mod distribution;
@@ -51,25 +72,24 @@ use violation::Violation;
 pub struct Errors {
     /// Steps observed.
     pub steps: u64,
-    /// Points at which shapes were as near as a contact after a step, over all steps.
+    /// Points within contact distance after a step, over all steps.
     pub points: u64,
     /// Deepest overlap (m).
     #[serde(rename = "penetration_max_m")]
     pub penetration_max: f64,
-    /// Mean overlap of such points, open ones counted as zero (m).
+    /// Mean overlap of such points; open ones count as zero (m).
     #[serde(rename = "penetration_mean_m")]
     pub penetration_mean: f64,
     /// Root mean square of the same (m).
     #[serde(rename = "penetration_rms_m")]
     pub penetration_rms: f64,
-    /// What 99 % of such points do not exceed (m).
+    /// 99th percentile over such points (m).
     #[serde(rename = "penetration_p99_m")]
     pub penetration_p99: f64,
-    /// How deep bodies that were no contact yet had flown into each other by the end of a step, at most (m): no
-    /// solver saw them.
+    /// Largest overlap at the end of a step of bodies that had no contact before (m): no solver saw them.
     #[serde(rename = "flight_depth_max_m")]
     pub flight_depth_max: f64,
-    /// What 99 % of the points of contacts do not exceed beyond the depth at which they were found (m).
+    /// 99th percentile of penetration beyond the depth at which contacts were found (m).
     #[serde(rename = "held_depth_p99_m")]
     pub held_depth_p99: f64,
     /// Deepest overlap of the last second (m).
@@ -77,8 +97,8 @@ pub struct Errors {
     pub rest_depth_max: f64,
     /// Deepest overlap, in half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
-    /// Deepest overlap of the last second beyond what soft contacts give way at rest (m); none
-    /// without soft contacts.
+    /// Deepest overlap of the last second beyond the static deflection of the soft contacts (m); none without soft
+    /// contacts.
     #[serde(rename = "penetration_excess_m")]
     pub penetration_excess: Option<f64>,
     /// The most that soft contacts give way under the last second's load (m).
@@ -141,7 +161,7 @@ pub struct Errors {
     /// Half the width of its 95 % interval (m/s).
     #[serde(rename = "creep_half_width_m_s")]
     pub creep_half_width: f64,
-    /// When the scene came to rest for good (s), if it did.
+    /// Time at which the scene came to rest (s); none if it never did.
     #[serde(rename = "settled_s")]
     pub settled: Option<f64>,
 }
@@ -154,8 +174,8 @@ impl Errors {
     }
 }
 
-/// What flew into each other counts in full after this long (s): in 30 steps a Baumgarte feedback of a fifth
-/// per step leaves a thousandth of it.
+/// Overlap from flight counts in full after this time (s): in 30 steps a Baumgarte feedback of a fifth per step
+/// leaves a thousandth of it.
 const FLIGHT: f64 = 0.5;
 
 /// Root mean square and maximum of residuals (N·s).
@@ -174,7 +194,24 @@ impl Residuals {
     }
 }
 
-/// Watches a world and sums its errors up.
+/// Observes a world step by step and accumulates its errors.
+///
+/// ```
+/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::lab::{metrics::Observation, scenes};
+///
+/// let scene = scenes::load("pyramid:4")?.scene;
+/// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("soft_step")?) };
+/// let mut world = scene.build(settings)?;
+/// let mut observation = Observation::new(&world);
+/// for _ in 0..120 {
+///     world.step()?;
+///     observation.observe(&world);
+/// }
+/// let errors = observation.errors();
+/// assert!(errors.penetration_max < 0.01 && errors.law_rms_body < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Observation {
     previous: Vec<BodyState>,
@@ -193,7 +230,7 @@ pub struct Observation {
     /// In the weight of the lighter body × step (1).
     lighter: Residuals,
     held: Distribution,
-    /// What flew into each other without having been a contact: depth (m) and step, by pair of shapes.
+    /// Overlaps from flight, without a contact before: depth (m) and step, by pair of shapes.
     flights: BTreeMap<u64, (f64, u64)>,
     flight_max: f64,
     own: [Residuals; 2],
@@ -208,7 +245,7 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Begins with the world as it stands.
+    /// Starts an observation of the world in its present state.
     pub fn new(world: &World) -> Self {
         let settings = &world.settings;
         let previous = snapshot(world);
@@ -245,8 +282,8 @@ impl Observation {
         }
     }
 
-    /// Adds the step that the world has just taken. Bodies must not have been added since
-    /// the observation began; if they were, the step is left out.
+    /// Adds the step that the world has just taken. If bodies were added since the observation started, the step is
+    /// ignored.
     pub fn observe(&mut self, world: &World) {
         let now = snapshot(world);
         if now.len() != self.previous.len() {
@@ -342,7 +379,7 @@ impl Observation {
         depth
     }
 
-    /// How far the soft contact at this feature gives way under its load of the step (m).
+    /// Static deflection of the soft contact at this feature under its load of the step (m).
     fn floor(&self, world: &World, contact: &Contact, own: &[([usize; 2], PointStep)], feature: u32) -> f64 {
         let Some(softness) = self.softness else { return 0.0 };
         let loaded = contact.manifold.points().iter().zip(own).find(|(p, _)| p.feature_id == feature);

@@ -1,20 +1,18 @@
-//! How far a solver is from what it set out to solve itself: a second residual, never mixed
-//! with that of the [rigid law](super::law).
+//! The residual of a solver's own law: a second residual, never mixed with that of the [rigid law](super::law).
 //!
-//! A solver may want something else than the rigid law on purpose: a bias velocity that
-//! recovers overlap, or a soft contact. Its last velocity sweep then solves
+//! A solver may solve another law than the rigid one on purpose: with a bias velocity that recovers overlap, or with
+//! soft contacts. Its last velocity sweep then solves
 //!
 //! ```text
 //! 0 ≤ λ_n ⊥ J v⁺ + b + c λ_n ≥ 0
 //! ```
 //!
-//! for the impulses of the last substep, with the bias b and the compliance c that its rule
-//! answers with when it is [asked](crate::engine::constraints::kernels::observe). The residual is the natural
-//! map of that, with ρ_n = 1/(J M⁻¹ Jᵀ + c). A small one beside a large rigid one says
-//! that more sweeps will not help.
+//! for the impulses of the last substep, with the bias b and the compliance c that its rule answers with when it is
+//! [asked](crate::engine::constraints::kernels::observe). The residual is the natural map of that, with ρ_n = 1/(J
+//! M⁻¹ Jᵀ + c). If it is small while the rigid residual is large, more sweeps do not help.
 //!
-//! Left out are steps in which a contact may bounce, since bounces come after the last
-//! sweep, and solvers whose last word is not a velocity sweep.
+//! Not measured: steps in which a contact may bounce, since bounces come after the last sweep, and solvers that do
+//! not end with a velocity sweep.
 
 use super::law::{BodyStep, PointStep, natural_map, tangent};
 use crate::engine::bodies::BodyKind;

@@ -1,4 +1,4 @@
-//! Whether what should rest does: speed, creep and when it settled.
+//! Rest: speed, creep and settling time.
 
 use super::law::{PointStep, tangent};
 use super::state::BodyState;
@@ -70,7 +70,7 @@ pub struct Rest {
     steps: u64,
     /// 2 E_kin/M, the last [`REST_WINDOW`] of them (m²/s²).
     speeds: VecDeque<f64>,
-    /// Centres of mass in the same window (m).
+    /// Centers of mass in the same window (m).
     positions: VecDeque<Vec<DVec2>>,
     /// Bodies that press on each other, with the tangent of their contact.
     touching: Vec<([usize; 2], DVec2)>,
@@ -129,9 +129,9 @@ impl Rest {
         self.settled
     }
 
-    /// The fastest of all slopes of a centre of mass against that of a body it presses on,
-    /// along the tangent of their contact; of those that press on each other at the end.
-    /// What rolls or slides on purpose creeps too.
+    /// The fastest of all slopes of a center of mass against that of a body it presses on, along the tangent of their
+    /// contact; of those that press on each other at the end. Bodies that roll or slide on purpose count as creeping,
+    /// too.
     pub fn creep(&self) -> Slope {
         let slopes = self.touching.iter().filter_map(|&([a, b], tangent)| {
             let along: Vec<f64> = self.positions.iter().map(|x| (x[b] - x[a]).dot(tangent)).collect();

@@ -1,4 +1,4 @@
-//! Penetration that a soft contact cannot avoid, told apart from what is too much.
+//! Separates the static deflection of soft contacts from excess penetration.
 //!
 //! A contact that is a spring of angular frequency ω rests where the spring carries the
 //! load: with the load F on the contact point and its effective mass m,
@@ -7,10 +7,10 @@
 //! F = m ω² s,   s = F/(m ω²)
 //! ```
 //!
-//! whatever the damping and the number of sweeps. A solver with such contacts says so in its
-//! [row](crate::engine::solvers::Variant::softness). The formula is for rest: in an impact the impulse of
-//! a step is no load. So floor and excess are those of the last [`REST_WINDOW`], and a run
-//! whose bodies still fall then has a floor that means nothing.
+//! whatever the damping and the number of sweeps. A solver with such contacts declares them in its
+//! [row](crate::engine::solvers::Variant::softness). The formula is for rest: in an impact the impulse of a step is
+//! no load. So floor and excess are those of the last [`REST_WINDOW`], and the floor is meaningless for a run whose
+//! bodies still fall then.
 
 use super::rest::REST_WINDOW;
 use std::collections::VecDeque;
@@ -22,7 +22,7 @@ pub fn floor(load: f64, mass: f64, omega: f64) -> f64 {
     if stiffness > 0.0 { load.max(0.0) / stiffness } else { 0.0 }
 }
 
-/// Deepest penetration at rest, and what of it is the springs'.
+/// Deepest penetration at rest, and the part of it that is static deflection of the springs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Depths {
     /// Deepest overlap (m).

@@ -14,11 +14,11 @@ pub struct BodyState {
     pub inv_mass: f64,
     /// 1/(kg·m²), zero unless dynamic.
     pub inv_inertia: f64,
-    /// Centre of mass (m).
+    /// Center of mass (m).
     pub position: DVec2,
     /// (cos θ, sin θ)
     pub rotation: DVec2,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub velocity: DVec2,
     /// rad/s
     pub angular_velocity: f64,
@@ -64,7 +64,7 @@ impl BodyState {
         0.5 * (self.mass() * self.velocity.length_squared() + self.inertia() * self.angular_velocity.powi(2))
     }
 
-    /// Velocity of the material point at `anchor` from the centre of mass (m/s).
+    /// Velocity of the material point at `anchor` from the center of mass (m/s).
     pub fn velocity_at(&self, anchor: DVec2) -> DVec2 {
         self.velocity + self.angular_velocity * anchor.perp()
     }

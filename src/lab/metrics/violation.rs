@@ -15,7 +15,7 @@
 
 use super::law::{BodyStep, PointStep};
 
-/// What a contact point breaks.
+/// Violations of the contact law at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Violation {
     /// Of complementarity (J).
@@ -38,7 +38,7 @@ impl Violation {
 }
 
 impl PointStep {
-    /// What this point breaks over a step of `dt` (s).
+    /// Violations at this point over a step of `dt` (s).
     pub fn violation(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> Violation {
         let ([un, ut], [normal, tangent]) = (self.velocities(a, b, dt), self.impulse);
         let limit = self.friction * normal.max(0.0);

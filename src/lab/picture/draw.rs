@@ -16,7 +16,7 @@ const MOVED: Color = Color::rgb(0xd9d2e9);
 /// Blue and green of Okabe and Ito: distinct with any color vision, and from the ramp.
 const IMPULSE: Color = Color::rgb(0x0072b2);
 const NORMAL: Color = Color::rgb(0x009e73);
-/// No overlap to the deepest: lightness falls steadily, so that it reads in grey, too.
+/// No overlap to the deepest: lightness falls steadily, so that it reads in gray, too.
 const RAMP: [Color; 5] = [
     Color::rgb(0xf3f5f8),
     Color::rgb(0xfde4a0),
@@ -37,7 +37,7 @@ const ASPECT: [f64; 2] = [0.3, 0.95];
 fn ramp(share: f64) -> Color {
     let place = share.clamp(0.0, 1.0) * (RAMP.len() - 1) as f64;
     let i = (place as usize).min(RAMP.len() - 2);
-    RAMP[i].towards(RAMP[i + 1], place - i as f64)
+    RAMP[i].toward(RAMP[i + 1], place - i as f64)
 }
 
 /// The least of 1, 2, 5 × 10ⁿ that is no less than `value`; 0 for 0.
@@ -61,7 +61,7 @@ fn round_down(value: f64) -> f64 {
     }
 }
 
-/// From metres on the stage to pixels.
+/// From meters on the stage to pixels.
 struct View {
     scale: f64,
     left: f64,
@@ -233,6 +233,9 @@ fn arrow(picture: &mut Picture, from: [f64; 2], to: [f64; 2], width: f64) {
     picture.items.push(Item::Polygon { points, fill: Some(IMPULSE), stroke: None, title: String::new() });
 }
 
+/// Width of a color bar with room for a label in the middle (pixels).
+const THREE_LABELS: f64 = 140.0;
+
 /// `darkest`: the penetration of the darkest color, and the deepest there is (m).
 fn legend(
     picture: &mut Picture,
@@ -249,13 +252,13 @@ fn legend(
         picture.text([x, y], 13.0, anchor, INK, text);
     };
     // A length.
-    let metres = round_down(0.6 * quarter / view.scale);
-    let (x, bar) = (column(0), metres * view.scale);
+    let meters = round_down(0.6 * quarter / view.scale);
+    let (x, bar) = (column(0), meters * view.scale);
     picture.line([x, bar_y], [x + bar, bar_y], INK, 2.0);
     for end in [x, x + bar] {
         picture.line([end, bar_y - 5.0], [end, bar_y + 5.0], INK, 1.4);
     }
-    text(picture, x, text_y, Anchor::Start, si_short(metres, "m"));
+    text(picture, x, text_y, Anchor::Start, si_short(meters, "m"));
     // Penetration.
     let (x, wide) = (column(1), 0.62 * quarter);
     if deepest > 0.0 {
@@ -266,7 +269,9 @@ fn legend(
             picture.rectangle([left, bar_y - 7.0], [step + 0.3, 14.0], ramp(share));
         }
         text(picture, x, text_y, Anchor::Start, "0".into());
-        text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * darkest, "m"));
+        if wide > THREE_LABELS {
+            text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * darkest, "m"));
+        }
         let more = if deepest > darkest { "≥ " } else { "" };
         text(picture, x + wide, text_y, Anchor::End, format!("{more}{}", si_short(darkest, "m")));
         text(picture, x, bar_y - 14.0, Anchor::Start, "penetration".into());

@@ -15,7 +15,7 @@ pub struct Stage {
     pub origin: [f64; 2],
     /// How each body moves.
     pub kinds: Vec<BodyKind>,
-    /// Body of each shape, and the shape in the frame of that body's centre of mass.
+    /// Body of each shape, and the shape in the frame of that body's center of mass.
     pub shapes: Vec<(u32, Shape)>,
     /// Step (s).
     pub dt: f64,
@@ -58,7 +58,7 @@ impl TouchPoint {
 /// Where everything is after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// Centre of mass from the stage's origin (m), and angle in (−π, π] (rad), by body.
+    /// Center of mass from the stage's origin (m), and angle in (−π, π] (rad), by body.
     pub poses: Vec<[f64; 3]>,
     /// Points of contact where the bodies are now; those with an impulse of the last step that
     /// have parted since, too.
@@ -158,7 +158,7 @@ mod tests {
     fn a_stack_at_rest_carries_itself() {
         let (stage, frame) = frame("stack:3", 240);
         assert_eq!((stage.kinds.len(), frame.poses.len(), frame.points.len()), (4, 4, 6));
-        // 1 kg each under 10 m/s²: 30, 20 and 10 N, for 1/60 s, upwards.
+        // 1 kg each under 10 m/s²: 30, 20 and 10 N, for 1/60 s, upward.
         for (below, load) in [(0, 30.0), (1, 20.0), (2, 10.0)] {
             let on = frame.points.iter().filter(|p| p.bodies[0] == below);
             let sum = on.map(|p| p.impulse_vector()).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);

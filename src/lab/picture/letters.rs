@@ -116,7 +116,7 @@ const LETTERS: &[(char, &str)] = &[
 /// What stands for a letter that there is not.
 const MISSING: &str = "0006464000";
 
-/// The strokes of a letter, in units: y upwards from the baseline.
+/// The strokes of a letter, in units: y upward from the baseline.
 pub fn strokes(letter: char) -> Vec<Vec<[f64; 2]>> {
     let code = LETTERS.iter().find(|(known, _)| *known == letter).map_or(MISSING, |(_, code)| code);
     let unit = |c: u8| match c {

@@ -1,4 +1,4 @@
-//! Frames of a simulation as pictures: what was drawn where, then SVG or PNG.
+//! Frames of a simulation as pictures: a list of drawn items, then SVG or PNG.
 //!
 //! ```text
 //! World ──► Stage, Frame ──► Picture ──┬─► svg
@@ -7,9 +7,12 @@
 
 pub mod draw;
 pub mod frame;
+#[doc(hidden)]
 pub mod letters;
+#[doc(hidden)]
 pub mod outline;
 pub mod png;
+#[doc(hidden)]
 pub mod raster;
 pub mod svg;
 
@@ -24,7 +27,7 @@ impl Color {
     }
 
     /// The color at `share` of the way to another, in [0, 1].
-    pub fn towards(self, other: Color, share: f64) -> Self {
+    pub fn toward(self, other: Color, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
         let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
         Color(mix(self.0, other.0), mix(self.1, other.1), mix(self.2, other.2), mix(self.3, other.3))
@@ -42,7 +45,7 @@ pub enum Anchor {
     End,
 }
 
-/// Something drawn; lengths in pixels, y downwards.
+/// Something drawn; lengths in pixels, y downward.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// A closed outline.
@@ -69,7 +72,7 @@ pub enum Item {
     },
     /// A filled disc.
     Disc {
-        /// Its centre.
+        /// Its center.
         at: [f64; 2],
         /// Its radius.
         radius: f64,

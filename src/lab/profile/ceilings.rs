@@ -1,4 +1,4 @@
-//! What this machine can do: bytes per second from each level of cache, operations per second.
+//! Limits of the machine: bytes per second from each level of cache, operations per second.
 //!
 //! Three loops that do nothing else, on one thread: *read* adds up a buffer, *update* reads it and
 //! writes it back, *multiply-add* keeps twelve independent chains in registers. The first two use the
@@ -115,7 +115,7 @@ impl Buffer {
     }
 }
 
-/// How fast working sets are read, by their size.
+/// Read bandwidth by size of the working set.
 pub struct ReadCurve {
     buffer: Buffer,
     /// Sizes (bytes), each twice the last, and what was measured (GB/s).

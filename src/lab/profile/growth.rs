@@ -1,9 +1,9 @@
 //! The cost of a contact as scenes grow: what stays flat, what steps where a cache ends, and what
 //! grows.
 //!
-//! Scenes of all sizes are held still and take turns, so that whatever the machine does, it does to
-//! all of them. A turn is a few whole steps on the same state, pairs searched again in each; the
-//! first finds cold caches and is not timed.
+//! Scenes of all sizes are frozen and timed interleaved, so a slow spell of the machine affects all of them alike. A
+//! turn is a few whole steps on the same state, pairs searched again in each; the first finds cold caches and is not
+//! timed.
 
 use super::ceilings::ReadCurve;
 use super::waiting::{self, waited};
@@ -190,16 +190,15 @@ pub struct Growth {
     pub change: Change,
 }
 
-/// What a ratio may be off for other reasons than growth: measured, ratios of equal worlds differ by
-/// a tenth on a machine with other guests.
+/// Tolerance of a ratio for reasons other than growth: measured ratios of equal worlds differ by a tenth on a machine
+/// with other guests.
 const TOLERANCE: f64 = 1.15;
 
 /// Judges a ratio of costs per contact by the contacts on both sides, the spread of the times
 /// (relative) and how much slower memory has become.
 ///
-/// Of an n log n method the cost per contact grows by ln n₂/ln n₁; streams cost what their bytes
-/// cost. Faster growth is what the product of both, with the tolerance and twice the spread, does
-/// not reach.
+/// For an n log n method the cost per contact grows by ln n₂/ln n₁; streams cost what their bytes cost. Faster growth
+/// is what the product of both, with the tolerance and twice the spread, does not reach.
 pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Growth {
     let [before, after] = contacts.map(|n| (n.max(2) as f64).ln());
     let room = TOLERANCE + 2.0 * spread;

@@ -56,7 +56,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
         memory.add_row(cells);
     }
     text += &format!(
-        "Memory per contact (bytes, as allocated), what of all that is in use, and all per body\n{}\n",
+        "Memory per contact (bytes allocated), the part in use, and memory per body\n{}\n",
         finish(memory, 1)
     );
     text += &verdicts.iter().map(sentence).collect::<String>();
@@ -71,13 +71,13 @@ pub(super) fn sentence(verdict: &Verdict) -> String {
     let meaning = match whole.change {
         Change::Flat => "latency- or compute-bound at every size: its cost is flat".to_string(),
         Change::Cache => format!(
-            "bandwidth-bound at the large sizes: it grows no more than memory, which streams {} times slower",
+            "bandwidth-bound at large sizes: it grows no more than the cost of memory, which streams {} times slower",
             digits(whole.memory)
         ),
         Change::Logarithm => "latency- or compute-bound, within n log n".to_string(),
         Change::Faster => {
             format!(
-                "grows faster than n log n and bandwidth explain, which account for {}",
+                "grows faster than n log n and bandwidth explain: they account for {}",
                 digits(whole.memory)
             )
         }
@@ -101,7 +101,7 @@ pub(super) fn sentence(verdict: &Verdict) -> String {
         .map(|s| format!("{} (its working set streams {} times slower)", place(s), digits(s.memory)))
         .collect();
     if !caches.is_empty() {
-        parts.push(format!("steps where a cache ends: {}", caches.join(", ")));
+        parts.push(format!("jumps where a cache ends: {}", caches.join(", ")));
     }
     let logarithms: Vec<String> = of(Change::Logarithm).map(place).collect();
     if !logarithms.is_empty() {

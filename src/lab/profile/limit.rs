@@ -1,4 +1,4 @@
-//! What limits a phase, in the terms of the roofline.
+//! The limit of a phase, in terms of the roofline.
 
 use super::PhaseReport;
 

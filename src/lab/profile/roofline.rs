@@ -31,7 +31,7 @@ struct RooflinePoint<'a> {
 }
 
 fn draw(report: &Report, text: &mut String) -> Drawn {
-    let peak = report.multiply_adds.ok_or("without ceilings there is no roofline")?;
+    let peak = report.multiply_adds.ok_or("a roofline needs ceilings")?;
     let point = |phase: &'_ PhaseReport| Some((phase.intensity()?, phase.flops_rate()?));
     let points: Vec<RooflinePoint> = report
         .phases
@@ -41,8 +41,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
         .collect();
     let root = SVGBackend::with_string(text, (SIZE.0 as u32, SIZE.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
-    let title =
-        format!("{}, {}, {} lanes: phases under their roofs", report.scene, report.solver, report.lanes);
+    let title = format!("{}, {}, {} lanes: roofline", report.scene, report.solver, report.lanes);
     write(&root, &title, (12, 20), 18, HPos::Left)?;
     let note = "thin: reading from each level of memory; thick: multiply-adds; short bars: the roof of a phase's own working set";
     write(&root, note, (12, 44), 13, HPos::Left)?;

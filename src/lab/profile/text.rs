@@ -98,7 +98,7 @@ fn single(report: &Report, phase: &PhaseReport) -> String {
         };
         text += &format!(
             "  per contact on lanes: {} additions, {} multiplications, {} multiply-adds, {} divisions or roots; \
-             {} minima, maxima and selections, which are no flop\n",
+             {} minima, maxima and selections, which do not count as flop\n",
             each(o.adds),
             each(o.multiplies),
             each(o.multiply_adds),

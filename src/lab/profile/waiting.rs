@@ -14,7 +14,7 @@ pub fn share(before: Option<Duration>, elapsed: Duration) -> Option<f64> {
 pub fn note(share: Option<f64>) -> String {
     match share {
         Some(share) if share >= 0.01 => format!(
-            "this thread waited for a processor {:.0} % of the time; others use this machine too\n",
+            "this thread waited for a processor {:.0} % of the time: the machine is busy\n",
             100.0 * share
         ),
         _ => String::new(),

@@ -1,4 +1,4 @@
-//! Whole runs in a compact file, and the page that plays them.
+//! Recordings: whole runs in a compact file, and the page that plays them.
 //!
 //! # The file, version 1
 //!
@@ -60,7 +60,7 @@ pub struct Header {
     pub solver: String,
     /// Its budget, order and lanes in words.
     pub setting: String,
-    /// How the run ended: `holds`, or the word for what broke.
+    /// Outcome of the run: `holds`, or the word for its failure.
     pub outcome: String,
     /// Step (s).
     pub dt: f64,
@@ -85,7 +85,7 @@ pub struct Header {
 pub struct ShapeRecord {
     /// Its body.
     pub body: u32,
-    /// Vertices in the frame of the body's centre of mass (m).
+    /// Vertices in the frame of the body's center of mass (m).
     pub points: Vec<[f32; 2]>,
     /// m
     pub radius: f32,

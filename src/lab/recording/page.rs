@@ -43,7 +43,7 @@ pub fn fragment(panels: &[Panel], share: f64) -> String {
             STANDARD.encode(bytes)
         );
     }
-    text + "</div>\n<noscript><p>Playing needs JavaScript.</p></noscript>\n</div>\n"
+    text + "</div>\n<noscript><p>The replay needs JavaScript.</p></noscript>\n</div>\n"
 }
 
 /// A page of its own.

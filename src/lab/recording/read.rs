@@ -115,9 +115,9 @@ fn frame(reader: &mut Reader, header: &Header, last: &mut [[i64; 3]]) -> Option<
             }
         }
     }
-    let metres = |n: i64| n as f64 * header.quantum;
+    let meters = |n: i64| n as f64 * header.quantum;
     let angle = |n: i64| (n as f64 / TURN as f64 * TAU + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-    let poses = last.iter().map(|&[x, y, a]| [metres(x), metres(y), angle(a)]).collect();
+    let poses = last.iter().map(|&[x, y, a]| [meters(x), meters(y), angle(a)]).collect();
     let mut points = Vec::new();
     let count = if header.contacts { reader.unsigned()? } else { 0 };
     let mut at = [0_i64; 2];
@@ -130,11 +130,11 @@ fn frame(reader: &mut Reader, header: &Header, last: &mut [[i64; 3]]) -> Option<
         for x in &mut at {
             *x = x.checked_add(reader.signed()?).filter(|x| x.abs() <= FARTHEST)?;
         }
-        point.at = at.map(metres);
+        point.at = at.map(meters);
         let turn = reader.unsigned()?;
         let normal = (turn < NORMAL_TURN).then(|| turn as f64 / NORMAL_TURN as f64 * TAU)?;
         point.normal = [normal.cos() as f32, normal.sin() as f32];
-        point.separation = metres(reader.signed()?) as f32;
+        point.separation = meters(reader.signed()?) as f32;
         point.impulse = [whole(reader.u16()?), whole(reader.u16()?)];
         points.push(point);
     }

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 /// Quanta in half the width of the thinnest shape that moves, at least.
 const FINENESS: f64 = 8192.0;
 
-/// What a recording says about its run.
+/// Description of the run of a recording.
 #[derive(Clone, Debug)]
 pub struct Caption {
     /// Name of the scene.

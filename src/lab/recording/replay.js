@@ -234,7 +234,7 @@
       }
       // A bar of a round length.
       const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
-      const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
+      const meters = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
       c.fillStyle = "#fff";
       c.fillRect(0, h - strip, w, strip);
       c.strokeStyle = c.fillStyle = "#1f2933";
@@ -242,11 +242,11 @@
       c.beginPath();
       c.moveTo(12, h - 14);
       c.lineTo(12, h - 10);
-      c.lineTo(12 + metres * scale, h - 10);
-      c.lineTo(12 + metres * scale, h - 14);
+      c.lineTo(12 + meters * scale, h - 10);
+      c.lineTo(12 + meters * scale, h - 14);
       c.stroke();
       c.font = "11px system-ui, sans-serif";
-      c.fillText(si(metres, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
+      c.fillText(si(meters, "m").replace(/(\.\d*?)0+ /, "$1 ").replace(". ", " "), 14, h - 16);
     }
 
     // Limits of each curve over all recordings, so that panels compare.

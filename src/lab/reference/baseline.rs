@@ -1,4 +1,4 @@
-//! What solvers are compared with on a problem: projected Gauss–Seidel in `f64`.
+//! The baseline of comparisons: projected Gauss–Seidel in `f64`.
 //!
 //! Near its solution the sweeps are linear while no contact changes between sticking, sliding and
 //! separation, and the error falls by the spectral radius of that map. A power iteration on the map

@@ -1,14 +1,13 @@
 //! References: solutions that are accepted only with evidence.
 //!
-//! An answer becomes a reference if its certificate holds, a natural-map residual of at most
-//! [`CERTIFIED`] measured by [`super::residual`], which shares nothing with the methods; or if two
-//! methods of different families agree on velocities to [`AGREED`] in the mass norm. What was found
-//! is stored with it.
+//! A solution becomes a reference if its certificate holds, a natural-map residual of at most [`CERTIFIED`] measured
+//! by [`super::residual`], which shares nothing with the methods; or if two methods of different families agree on
+//! velocities to [`AGREED`] in the mass norm. What was found is stored with it.
 //!
-//! Impulses of a hyperstatic pile are an affine family; velocities v⁺ and net body impulses Jᵀλ
-//! are unique without friction (a strictly convex problem in v). With friction even velocities may
-//! not be: the residual alone then says whether an answer is right. So [`Reference::compare`] never
-//! looks at single impulses, and [`Uniqueness`] says whether a distance means anything.
+//! Impulses of a hyperstatic pile are an affine family; velocities v⁺ and net body impulses Jᵀλ are unique without
+//! friction (a strictly convex problem in v). With friction even velocities may not be: then only the residual
+//! decides whether a solution is right. So [`Reference::compare`] never compares single impulses, and [`Uniqueness`]
+//! tells whether a distance is meaningful.
 
 use super::newton::newton;
 use super::nncg::nncg;
@@ -114,7 +113,7 @@ pub struct NoReference {
     pub why: String,
 }
 
-/// How far an answer is from a reference, in what the problem determines.
+/// Distance of a solution from a reference, in the quantities that the problem determines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// [`ContactProblem::velocity_error`] (1).

@@ -1,6 +1,6 @@
 //! Contact problems whose solution can be derived by hand.
 //!
-//! All start from rest unless stated, with gravity 10 m/s² downwards; each function derives its
+//! All start from rest unless stated, with gravity 10 m/s² downward; each function derives its
 //! solution in its docs. They are the material for tests of references and for exact
 //! convergence rates.
 
@@ -94,7 +94,7 @@ pub fn light_on_heavy(ratio: f64) -> ContactProblem {
 }
 
 /// A box of 2 kg, 1 m × 1 m, sliding to the right at 1 m/s on the flat with µ = 0.3; contacts rear,
-/// front. Friction µ m g at half a height below the centre turns the box forwards:
+/// front. Friction µ m g at half a height below the center turns the box forward:
 /// N_front,rear = m g/2 (1 ± µ) = 13 N, 7 N, and the box slows by µ g h.
 pub fn sliding_box() -> ContactProblem {
     let mut p = Builder::new("sliding box".into(), H);
@@ -135,7 +135,7 @@ pub fn plank(supports: &[f64], friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// A pyramid of unit boxes of 1 kg with `base` boxes at the bottom, neighbours in a row touching.
+/// A pyramid of unit boxes of 1 kg with `base` boxes at the bottom, neighbors in a row touching.
 /// It rests; impulses are highly hyperstatic.
 pub fn box_pyramid(base: usize, friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("pyramid of boxes, base {base}"), H);

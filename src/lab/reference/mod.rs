@@ -1,16 +1,14 @@
-//! What the answer should have been: exact and certified solutions of one contact problem.
+//! Exact and certified solutions of a contact problem.
 //!
-//! Reading order: [`problem`] states the problem, [`residual`] the law and how far from it an
-//! answer is. [`stewart_trinkle`] solves small problems exactly by Lemke's method
-//! ([`crate::engine::constraints::numerics::lemke`]);
-//! [`sweeps`], [`nncg`] and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts
-//! an answer only with a certificate. [`statics`] asks without any time step whether rest is possible
-//! at all, through [`nnls`]. [`frozen`] keeps problems in files, [`gallery`] holds problems solved by
-//! hand, [`rates`] measures convergence in iterations and in the step size, [`baseline`] that of
-//! Gauss–Seidel.
+//! Reading order: [`problem`] states the problem, [`residual`] the law and its residual. [`stewart_trinkle`] solves
+//! small problems exactly by Lemke's method ([`crate::engine::constraints::numerics::lemke`]); [`sweeps`], [`nncg`]
+//! and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts a solution only with a certificate.
+//! [`statics`] decides without a time step whether rest is possible, through [`nnls`]. [`frozen`] stores problems in
+//! files, [`gallery`] has problems solved by hand, [`rates`] measures convergence in iterations and in the step size,
+//! [`baseline`] that of Gauss–Seidel.
 //!
-//! Nothing here knows the simulation's own solvers, so that it can judge them; it shares Lemke's method with
-//! `direct`, and certifies what that finds.
+//! Nothing here depends on the simulation's solvers, so that it can judge them, except that it shares Lemke's method
+//! with `direct` and certifies the result.
 
 pub mod baseline;
 pub mod certify;

@@ -1,4 +1,4 @@
-//! Semi-smooth Newton on the Alart–Curnier function, with a sparse factorisation.
+//! Semi-smooth Newton on the Alart–Curnier function, with a sparse factorization.
 //!
 //! Each contact is open, sticking or slipping by the sign of what its natural map clips:
 //!
@@ -167,7 +167,7 @@ impl<'a> Proximal<'a> {
         arguments.iter().zip(&self.problem.contacts).map(one).collect()
     }
 
-    /// Solves the linear problem of fixed states; none if it cannot be factorised.
+    /// Solves the linear problem of fixed states; none if it cannot be factorized.
     fn solve_states(&self, states: &[State]) -> Option<Vec<Pair>> {
         // Unknowns (contact, direction); `index` finds them again.
         let mut unknowns: Vec<(usize, usize)> = Vec::new();

@@ -1,10 +1,10 @@
 //! Non-negative least squares: the point of a cone that is nearest to a given one.
 //!
-//! Minimise |p − A z| over z ≥ 0, the columns of A being the edges of the cone. z is optimal exactly if
+//! Minimize |p − A z| over z ≥ 0, the columns of A being the edges of the cone. z is optimal exactly if
 //! the remainder r = p − A z makes no acute angle with any edge, Aᵀ r ≤ 0, and a right one with those
 //! in use. So, beginning with none, the edge that makes the most acute angle with r joins those in use;
 //! least squares over them are solved without a sign; and where that would make weights negative, z
-//! goes towards it only until the first of them vanishes, and that edge is dropped.
+//! goes toward it only until the first of them vanishes, and that edge is dropped.
 //!
 //! **Source**: Lawson and Hanson 1974 (`lawson1974`), chapter 23. Every round shortens
 //! r, so none can come back, however many ways there are to write p: degenerate cones, on which the
@@ -84,7 +84,7 @@ fn least_squares(columns: &[Vec<f64>], used: &[usize], p: &[f64]) -> Option<(Vec
     Some((s, rest))
 }
 
-/// What of `x` is orthogonal to the basis, and its components along it.
+/// The part of `x` that is orthogonal to the basis, and its components along the basis.
 fn project(mut x: Vec<f64>, basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let mut weights = vec![0.0; basis.len()];
     for _ in 0..2 {

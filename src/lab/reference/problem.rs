@@ -2,7 +2,7 @@
 //!
 //! Bodies have velocities v = (vx, vy, w) and the mass matrix M = diag(m, m, I). Contact `i`
 //! has a unit normal n from a to b, the tangent t = (n_y, −n_x), and arms r × n and r × t from
-//! each centre of mass to the contact point. The velocity of b relative to a at the point,
+//! each center of mass to the contact point. The velocity of b relative to a at the point,
 //!
 //! ```text
 //! un = n·(v_b + w_b ẑ × r_b) − n·(v_a + w_a ẑ × r_a) = n·v_b + (r_b × n) w_b − n·v_a − (r_a × n) w_a,
@@ -33,7 +33,7 @@ pub type Block = [Velocity; 2];
 pub struct ProblemBody {
     /// 1/kg; zero for a body that moves as it likes.
     pub inv_mass: f64,
-    /// 1/(kg·m²), about the centre of mass; zero if it does not turn.
+    /// 1/(kg·m²), about the center of mass; zero if it does not turn.
     pub inv_inertia: f64,
     /// Velocity at the start of the step.
     pub velocity: Velocity,
@@ -49,14 +49,14 @@ pub struct ProblemContact {
     pub body_a: Option<u32>,
     /// Body b; none if that side is static.
     pub body_b: Option<u32>,
-    /// Points with the same number belong to one manifold: they are neighbours in the list and
+    /// Points with the same number belong to one manifold: they are neighbors in the list and
     /// share bodies and normal.
     pub manifold: u32,
     /// Unit normal from a to b.
     pub normal: [f64; 2],
-    /// (r × n, r × t) from the centre of mass of a to the point (m).
+    /// (r × n, r × t) from the center of mass of a to the point (m).
     pub arm_a: Pair,
-    /// (r × n, r × t) from the centre of mass of b to the point (m).
+    /// (r × n, r × t) from the center of mass of b to the point (m).
     pub arm_b: Pair,
     /// Signed distance at the start of the step (m); negative is overlap.
     pub gap: f64,
@@ -70,7 +70,7 @@ pub struct ProblemContact {
 
 impl ProblemContact {
     /// A point without gap or rebound between two bodies, of which none is static: `r` from their
-    /// centres of mass to the point (m).
+    /// centers of mass to the point (m).
     pub fn touching(
         bodies: [Option<u32>; 2],
         manifold: u32,
@@ -116,7 +116,7 @@ impl ProblemContact {
         [side(self.body_a, self.arm_a, -1.0), side(self.body_b, self.arm_b, 1.0)].into_iter().flatten()
     }
 
-    /// The vectors r from both centres of mass to the point (m), recovered from the arms.
+    /// The vectors r from both centers of mass to the point (m), recovered from the arms.
     ///
     /// Write r = α n + β t. Since t × n = 1, r × n = β and r × t = −α.
     pub fn anchors(&self) -> [[f64; 2]; 2] {
@@ -144,7 +144,7 @@ fn dot(a: &Velocity, b: &Velocity) -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactProblem {
-    /// What it is, and where it comes from.
+    /// Its name, with its origin.
     pub name: String,
     /// Step (s), > 0.
     pub h: f64,

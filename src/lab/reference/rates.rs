@@ -1,4 +1,4 @@
-//! How fast something converges: in iterations, and in the step size.
+//! Rates of convergence: per iteration, and in the step size.
 
 /// Fewest points that a fitted rate may rest on.
 const FEWEST_POINTS: usize = 4;

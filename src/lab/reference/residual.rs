@@ -1,4 +1,4 @@
-//! How far velocities and impulses are from the contact law.
+//! Residuals of the contact law for velocities and impulses.
 //!
 //! The law at a contact with relative velocity (un, ut), un including the right-hand side b of
 //! the chosen [`Target`], and impulse (λn, λt):

@@ -1,4 +1,4 @@
-//! Sparse systems of equations, by LU factorisation.
+//! Sparse systems of equations, by LU factorization.
 //!
 //! Columns are eliminated in an order of approximate minimum degree of A + Aᵀ, which suits matrices
 //! whose pattern is nearly symmetric, and a diagonal entry stays the pivot of its column while it is

@@ -1,4 +1,4 @@
-//! Statics: is rest possible at all, and how much may be added before it is not?
+//! Statics: whether rest is possible, and how much load may be added before it is not.
 //!
 //! Rest under loads f (N·s over a step, or N) is possible exactly if impulses within their friction
 //! cones balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. So the answer needs no time step and no
@@ -31,7 +31,7 @@ const ROUNDS_PER_EDGE: usize = 20;
 /// Mechanisms allowed on the way to a collapse load; typical runs meet two to ten.
 const MECHANISMS: usize = 1000;
 
-/// How far a disturbance may grow.
+/// Largest growth of a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Collapse {
     /// Even without it there is no rest.
@@ -76,7 +76,7 @@ pub fn collapse(
     Err(Error::invalid(problem.name.clone(), format!("no collapse load in {MECHANISMS} mechanisms")))
 }
 
-/// What contacts can give the bodies.
+/// Forces that contacts can exert on the bodies.
 struct Cone<'a> {
     problem: &'a ContactProblem,
     /// Components that must balance, (body, 0..3): those of infinite mass are held by themselves.
@@ -145,7 +145,7 @@ impl<'a> Cone<'a> {
         match remainder(&self.edges, &wanted, limit) {
             Some(rest) => Ok((norm(&rest) > BALANCED).then_some(rest)),
             None => {
-                let message = format!("statics found no balance in {limit} rounds");
+                let message = format!("the static solve found no equilibrium in {limit} rounds");
                 Err(Error::invalid(self.problem.name.clone(), message))
             }
         }
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_topples_where_its_centre_leaves_the_base() {
+    fn a_box_topples_where_its_center_leaves_the_base() {
         // A unit box on a rough slope: 45°.
         for (slope, truth) in [(0.785, true), (0.786, false)] {
             assert_eq!(rests(&block_on_incline(slope, 10.0)), truth, "{slope}");
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn collapse_loads_by_hand() {
-        // A box pushed sideways at its centre slides at µ m g (µ < 1) and topples at m g beyond.
+        // A box pushed sideways at its center slides at µ m g (µ < 1) and topples at m g beyond.
         let p = block_on_incline(0.0, 0.3);
         let weight = GRAVITY * p.h;
         let push = |x: f64, y: f64| vec![[x * weight, y * weight, 0.0]];
@@ -228,7 +228,7 @@ mod tests {
         let contact = |a, b, normal, ra, rb, friction, manifold| {
             ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
         };
-        // Centres at ∓sin/2; feet outwards below, tops meeting at x = 0.
+        // Centers at ∓sin/2; feet outwards below, tops meeting at x = 0.
         let (left_foot, left_top) = ([-0.5 * sin, -0.5 * cos], [0.5 * sin, 0.5 * cos]);
         let (right_foot, right_top) = ([0.5 * sin, -0.5 * cos], [-0.5 * sin, 0.5 * cos]);
         let contacts = vec![

@@ -9,7 +9,7 @@
 //! so its fixed points are the zeros of the natural map. Gauss–Seidel (Catto 2005; NSGS of
 //! Jean & Moreau 1992) applies each change at once. Jacobi applies all changes of a sweep together
 //! and diverges where λ_max(D⁻¹G) > 2. Mass splitting (Tonge et al. 2012) gives each of the k rows
-//! of a body a copy of 1/k of its mass and averages the copies afterwards; a row then sees k times
+//! of a body a copy of 1/k of its mass and averages the copies afterward; a row then sees k times
 //! the inverse mass, and averaging divides the effect of its impulse by k again. So it is Jacobi
 //! with D_i = ∑_sides k J_i M⁻¹ J_iᵀ, and since (∑ᵢ xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G: it
 //! converges.

@@ -1,4 +1,4 @@
-//! What a contact problem must be before anything is computed with it.
+//! Validation of a contact problem.
 
 use super::problem::ContactProblem;
 use crate::lab::error::Error;

@@ -24,10 +24,11 @@ const BUSY: f64 = 0.02;
 
 /// What the columns of the answer are.
 const LEGEND: &str = "\
-A plausible run holds, stands for a minute where it has to rest, and keeps penetration (1 cm at bodies of a metre), residual (a tenth
-of what carries the lighter body), reference value and rest speed (`simpulse scene NAME`); a tight one keeps a tenth, an exact one a
-hundredth of each.  µs/step: mean over the run, its median, its longest step.  Errors in % of the plausible tolerance.
-next: the cheapest setting of another solver, and how much slower; tie: no difference can be told.
+Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the tolerances of the
+scene (`simpulse scene NAME`): penetration (1 cm for bodies of 1 m), contact-law residual (10 % of the lighter body's weight), distance
+to the reference value, rest speed. tight: within 10 % of them; exact: within 1 %. Errors in % of the plausible tolerance.
+µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another solver, and how much slower it is;
+tie: too close to call.
 ";
 
 /// The answer of a study, from its records alone; `steps` if runs were cut to so many.
@@ -50,14 +51,14 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
     let standings = &ranking.standings;
     let mut text = String::new();
     if let Some(steps) = steps {
-        text += &format!("A look, no recommendation: runs end after {steps} steps. ");
+        text += &format!("Not a recommendation: runs end after {steps} steps.  ");
     }
     let all: Vec<&Standing> = standings.iter().filter(|s| s.good[0] == scenes).collect();
     let speed = |s: &Standing| format!("{:.0} % of the speed of each scene's fastest", 100.0 * s.score);
     match (ranking.leader(), &all[..]) {
         (Some(first), _) => {
             text += &format!(
-                "{} {}: good enough on {} of {scenes} scenes, at {}; so with any scene left out and with half or twice the tolerances.",
+                "{} {}: good enough on {} of {scenes} scenes, at {}. This also holds with any one scene left out, and with half or twice the tolerances.",
                 if steps.is_some() { "First is" } else { "Use" },
                 first.solver,
                 first.good[0],
@@ -71,18 +72,24 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
         }
         (None, [only]) => {
             text += &format!(
-                "{} {} if one solver has to do for all {scenes} scenes: no other is good enough on every one; it has {}.",
+                "{} {} if you need one solver for all {scenes} scenes: no other is good enough on every one. It runs at {}.",
                 if steps.is_some() { "First is" } else { "Use" },
                 only.solver,
                 speed(only)
             );
         }
-        (None, _) if ranking.first.is_empty() => text += "Nothing that ran is good enough anywhere.",
-        (None, _) => text += "No one solver will do: choose by scene.",
+        (None, _) if ranking.first.is_empty() => text += "No setting is good enough on any scene.",
+        (None, []) => text += "No solver is good enough on all scenes: choose by scene.",
+        (None, several) => {
+            text += &format!(
+                "{} solvers are good enough on all scenes; which is fastest depends on the scene.",
+                several.len()
+            );
+        }
     }
     if ranking.leader().is_none() && ranking.first.len() > 1 {
         text += &format!(
-            " By speed nobody leads: first is one of {}, depending on the scene that is left out and on the tolerances.",
+            "  By speed there is no clear leader: with a scene left out or other tolerances, first is one of {}.",
             ranking.first.join(", ")
         );
     }
@@ -131,7 +138,7 @@ fn short_list(names: &[String], most: usize) -> String {
     if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
 }
 
-/// What makes the figures worth less. Also for the page.
+/// Warnings about the quality of the figures. Also for the page.
 pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let mut text = String::new();
     let samples = || records.iter().filter_map(|r| r.sample.as_ref());
@@ -147,12 +154,12 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let rounds = samples().map(|s| s.rounds).min().unwrap_or(0);
     if rounds < 3 && count > 1.0 {
         text += &format!(
-            "WARNING  {rounds} round{}: nobody can tell spikes of a solver from those of the machine; costs are medians.\n",
+            "WARNING  {rounds} round{}: spikes of a solver cannot be told from those of the machine, so costs are medians.\n",
             if rounds == 1 { "" } else { "s" }
         );
     }
     if steps.is_some() && records.iter().all(|r| r.later.is_none()) {
-        text += "WARNING  what fails after the run was not looked for.\n";
+        text += "WARNING  runs were not extended to a minute, so later failures were not looked for.\n";
     }
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         for what in &scene[0].unchecked {
@@ -176,7 +183,7 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
         let list: Vec<String> = lanes.iter().map(usize::to_string).collect();
         let emulated = if is_emulated(*widest) { " (emulated above the native width)" } else { "" };
         let plural = if lanes == [1] { "" } else { "s" };
-        ways.push(format!("coloured order at {} lane{plural}{emulated}", list.join(", ")));
+        ways.push(format!("colored order at {} lane{plural}{emulated}", list.join(", ")));
     }
     let holding = records.iter().filter(|r| r.holds()).count();
     let good = Accuracy::ALL.map(|a| records.iter().filter(|r| r.is_good(a)).count());
@@ -290,8 +297,8 @@ fn worst(record: &Record) -> String {
     let axis = ErrorAxis::JUDGED.into_iter().max_by(|a, b| over(a).total_cmp(&over(b)));
     let axis = axis.unwrap_or(ErrorAxis::Penetration);
     match record.excess() {
-        excess if excess.is_finite() => format!("{} times its tolerance of {}", digits(excess), axis.name()),
-        _ => format!("it never came to its {}", ErrorAxis::Truth.name()),
+        excess if excess.is_finite() => format!("{} times its tolerance for {}", digits(excess), axis.name()),
+        _ => format!("it never reached its {}", ErrorAxis::Truth.name()),
     }
 }
 
@@ -330,15 +337,12 @@ pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
     found
 }
 
-/// Who looks good and is not.
+/// Settings that look good and fail later.
 fn fallen(records: &[Record]) -> String {
     let found = fails_later(records);
     let lines = found.iter().take(MOST_NOTES).map(|(r, why)| {
         let time = digits(r.cost_ns() / 1e3);
-        format!(
-            "  ! {}: {}, {} ({time} µs) passes its run, and then {why}\n",
-            r.scene, r.solver, r.budget_text
-        )
+        format!("  ! {}: {}, {} ({time} µs) passes its run, then {why}\n", r.scene, r.solver, r.budget_text)
     });
     let mut text: String = lines.collect();
     if found.len() > MOST_NOTES {
@@ -384,8 +388,8 @@ fn standings(ranking: &Ranking, scenes: usize) -> String {
         more => format!("and {more} more in report.html\n"),
     };
     format!(
-        "Ranking over all scenes.  score: a solver has, in the mean over scenes, this share of the speed of the fastest solver for the\n\
-         scene (0 where it is not good enough); range: with any scene left out, and with half and twice the tolerances\n{}{more}",
+        "Ranking over all scenes.  score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, averaged\n\
+         over scenes (0 where it is not good enough); range: with any scene left out, and with half or twice the tolerances\n{}{more}",
         finish(rows, 1)
     )
 }
@@ -401,7 +405,7 @@ fn waves(records: &[Record]) -> String {
     costs.sort_by(f64::total_cmp);
     let cost = costs.get(costs.len() / 2).map_or("–".to_string(), |c| digits(*c));
     let text = format!(
-        "--impacts waves: of {} solver and scene pairs where something bounces, {better} become better by a tenth or more; in the median {cost} times the time (tables.txt)\n",
+        "--impacts waves: of {} solver and scene pairs where something bounces, {better} improve by 10 % or more; the median time is {cost} times as long (tables.txt)\n",
         found.len()
     );
     wrapped(&text)
@@ -412,7 +416,7 @@ fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
         others => {
-            let mut text = format!("left out, {} solvers (--solvers all runs every solver):", others.len());
+            let mut text = format!("not run, {} solvers (--solvers all runs every solver):", others.len());
             let lines: Vec<String> = others.chunks(PER_LINE).map(|line| line.join(", ")).collect();
             text += &format!("\n  {}\n", lines.join(",\n  "));
             text
@@ -420,11 +424,13 @@ fn left_out(records: &[Record]) -> String {
     }
 }
 
-/// What would make the times worthless: widths that did something else.
+/// Settings whose times are invalid: their timed runs gave other results.
 fn differing(records: &[Record]) -> String {
     match records.iter().filter(|r| r.bits_equal == Some(false)).count() {
         0 => String::new(),
-        count => format!("\n{count} settings did NOT end in the bits of their error run: see tables.txt\n"),
+        count => {
+            format!("\n{count} settings did NOT reproduce the state of their error run: see tables.txt\n")
+        }
     }
 }
 
@@ -447,7 +453,7 @@ pub fn later_table(records: &[Record]) -> String {
     if !any {
         return String::new();
     }
-    format!("Run on for {HORIZON} s, untimed\n{}\n", finish(rows, 3))
+    format!("Extended to {HORIZON} s, untimed\n{}\n", finish(rows, 3))
 }
 
 #[cfg(test)]
@@ -510,7 +516,8 @@ mod tests {
         torn[3] = on("y", "soft_step", 1.0);
         let text = page(&torn);
         assert!(
-            text.starts_with("No one solver will do") && text.contains("first is one of soft_step, shim"),
+            text.starts_with("2 solvers are good enough on all scenes")
+                && text.replace('\n', " ").contains("first is one of soft_step, shim"),
             "{text}"
         );
     }
@@ -527,7 +534,7 @@ mod tests {
         ];
         let text = page(&records);
         assert!(
-            text.contains("! stack:2: pgs, 1 sub (5.00 µs) passes its run, and then fell at step 800"),
+            text.contains("! stack:2: pgs, 1 sub (5.00 µs) passes its run, then fell at step 800"),
             "{text}"
         );
         assert!(text.lines().any(|l| l.starts_with("stack:2") && l.contains("2 sub @8")), "{text}");

@@ -126,7 +126,7 @@ pub fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -
     Ok(())
 }
 
-/// Text that runs upwards, its middle at `at`.
+/// Text that runs upward, its middle at `at`.
 pub fn write_upwards(area: &Area, text: &str, at: (i32, i32), size: i32) -> Drawn {
     let font = ("sans-serif", size).into_font().transform(FontTransform::Rotate270);
     let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));

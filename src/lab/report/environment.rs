@@ -20,7 +20,7 @@ pub struct Environment {
     pub target_features: Vec<String>,
     /// Widest lanes that one instruction of these sets processes.
     pub native_lanes: usize,
-    /// Whether the program was built with optimisation checks on.
+    /// Whether the program was built with optimization checks on.
     pub debug_assertions: bool,
     /// Version of this crate.
     pub version: String,
@@ -29,7 +29,7 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Of this program on this machine.
+    /// The environment of this program on this machine.
     pub fn current() -> Self {
         Environment {
             cpu: cpu_model(),

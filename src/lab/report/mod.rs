@@ -1,17 +1,26 @@
-//! From [`Record`]s to tables, files and a picture. Nothing here runs a simulation.
+//! Reports: from [`Record`]s to tables, files and pages. Nothing here runs a simulation.
 
+#[doc(hidden)]
 pub mod answer;
+#[doc(hidden)]
 pub mod axes;
 pub mod columns;
 pub mod environment;
 pub mod export;
+#[doc(hidden)]
 pub mod html;
+#[doc(hidden)]
 pub mod plot;
+#[doc(hidden)]
 pub mod profiles;
+#[doc(hidden)]
 pub mod savings;
 pub mod study_file;
+#[doc(hidden)]
 pub mod style;
+#[doc(hidden)]
 pub mod sweep;
+#[doc(hidden)]
 pub mod table;
 pub use crate::lab::units;
 

@@ -111,7 +111,7 @@ pub fn profile_table(records: &[Record]) -> String {
         return String::new();
     }
     "Performance profiles: share of scenes that each solver solves within a factor of the fastest;\n\
-     scenes: how many some solver solves, of how many there are\n"
+     scenes: how many of them at least one solver solves\n"
         .to_string()
         + &finish(rows, 3)
 }
@@ -144,13 +144,12 @@ pub fn slice_tables(records: &[Record]) -> String {
         }
     };
     add(
-        "Equal time: the least error of a setting that takes at most that long (— none does; * the least)\n",
+        "Equal time: the smallest error of any setting that takes at most this long (— none; * the smallest)\n",
         equal_time,
         true,
     );
     add(
-        "\nEqual error: µs per step of the fastest setting whose error is at most that (— none; * the fastest \
-         and what ties with it)\n",
+        "\nEqual error: µs per step of the fastest setting with at most this error (— none; * the fastest and its ties)\n",
         equal_error,
         false,
     );

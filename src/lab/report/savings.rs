@@ -1,14 +1,14 @@
-//! Savings from specialisation as a table.
+//! Savings from specialization as a table.
 
 use super::table::{finish, table};
 use super::units::{digits, lanes};
 use crate::lab::study::savings::Saving;
 
 const LEGEND: &str = "\
-Savings from specialisation: what a kernel gains by leaving out a feature that its scene does not have.
-bytes, ns: of a prepared contact, and per contact and sweep, with the features of the scene alone; saved:
-what they would be more with this feature. frictionless: the scene with every friction coefficient zero.
-same bits: whether both kernels came to the same state.
+Savings from specialization: what a kernel gains by dropping a feature that its scene does not use.
+bytes, ns: per prepared contact, and per contact and sweep, with only the features of the scene; saved: how much
+larger they are with this feature. frictionless: the scene with every friction coefficient zero.
+same bits: whether both kernels give the same state.
 ";
 
 /// The savings, a line each.
@@ -19,7 +19,7 @@ pub fn savings_table(savings: &[Saving]) -> String {
     }
     for own in savings.chunk_by(|a, b| (a.solver, a.lanes) == (b.solver, b.lanes)) {
         text += &format!("\n{}, {}\n", own[0].solver, lanes(own[0].lanes));
-        let mut rows = table(&["scene", "left out", "bytes", "saved", "ns", "saved", "same bits"]);
+        let mut rows = table(&["scene", "feature", "bytes", "saved", "ns", "saved", "same bits"]);
         for saving in own {
             rows.add_row([
                 saving.scene.clone(),

@@ -17,14 +17,14 @@ pub const NAME: &str = "study.json";
 pub struct StudyFile {
     /// [`SCHEMA`]
     pub schema_version: u32,
-    /// Where it ran; of a study that was put together, where its first part did.
+    /// Where it ran; for a merged study, where its first part ran.
     pub environment: Environment,
     /// Everything that was chosen.
     pub settings: Value,
     /// Scenes of the plan that have no records, because the study was interrupted or is a part of one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_scenes: Vec<String>,
-    /// What it was put together from. Times are comparable within a part only.
+    /// Its parts, if it was merged. Times are comparable only within a part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
     /// A record per setting, scene by scene.
@@ -77,7 +77,7 @@ impl StudyFile {
         let mut found: Vec<(String, &String)> = Vec::new();
         for (part, name) in parts.iter().zip(names) {
             if chosen(part) != chosen(first) {
-                let message = format!("{name} was run with other settings than {}", names[0]);
+                let message = format!("{name} was run with different settings than {}", names[0]);
                 return Err(Error::invalid("merge", message));
             }
             for scene in part.scenes() {
@@ -248,7 +248,7 @@ mod tests {
         let mut other = of(&["b"], &[]);
         other.settings["seed"] = 9.into();
         let message = StudyFile::merged(vec![of(&["a"], &[]), other], &names).unwrap_err().to_string();
-        assert_eq!(message, "merge: two was run with other settings than one");
+        assert_eq!(message, "merge: two was run with different settings than one");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Eight colors that differ with any color vision (Okabe and Ito, yellow darkened for lines on
 //! white) times eight markers. A solver's place decides: first those of [`DEFAULT_SOLVERS`], which
-//! therefore differ in color, then the others of [`VARIANTS`]. Neighbours differ in both, and
+//! therefore differ in color, then the others of [`VARIANTS`]. Neighbors differ in both, and
 //! sixty-four solvers differ in one of them.
 
 use crate::engine::solvers::VARIANTS;
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sixty_four_solvers_look_different_and_neighbours_in_both() {
+    fn sixty_four_solvers_look_different_and_neighbors_in_both() {
         for i in 0..64 {
             assert!((0..i).all(|j| Style::at(i) != Style::at(j)), "{i}");
             let (a, b) = (Style::at(i), Style::at(i + 1));

@@ -93,7 +93,7 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
     text + &finish(rows, 1)
 }
 
-/// The values at which a solver is good enough, and at which it holds at all.
+/// The values at which a solver is good enough, and those at which it holds.
 fn reach(scene: &[Record], solver: &str, swept: Swept) -> String {
     let values = |keep: &dyn Fn(&Record) -> bool| -> Vec<f64> {
         let mut values: Vec<f64> =

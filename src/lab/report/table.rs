@@ -8,16 +8,16 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 /// What the columns of [`scene_table`] are, once for the whole study.
 pub const LEGEND: &str = "\
-budget: substeps, and in each so many velocity (vel), relaxation (rel) and position (pos) sweeps.
-lanes: natural is one contact after the other in natural order, numbers are lanes in coloured order; the
-errors are the same for all lane widths of a budget.
-µs/step: mean over the run, its median and its longest step, ± median deviation of a repeat.  ns/row: a sweep, per constraint row that it solves.
+budget: substeps; then velocity (vel), relaxation (rel) and position (pos) sweeps per substep.
+lanes: natural means one contact after the other in natural order; a number means colored order in so many lanes.
+The errors are the same for all lane widths of a budget.
+µs/step: mean over the run, its median and its longest step, ± median deviation of a repeat.  ns/row: time of a sweep per constraint row.
 speed-up: over 1 lane.  holds: yes, or what happened (fell, slid, tunnelled, blew up).
-penetration: as judged (99 % of contact points, and the deepest at rest), and greatest.  residual: rms of the
+penetration: as judged (99 % of contact points, and the maximum at rest), and maximum.  residual: rms of the
 contact law, in the weight of the lighter body × step, and in the mean weight of a body × step.
-energy, momentum: gained or lost, relative.  rest speed: rms over the last second.
-reference: distance to the scene's reference value; missed if the run never came to it, – if none is known.
-sweeps: per step.  colours: of contacts.  occupancy: lanes that hold a contact.
+energy, momentum: relative change.  rest speed: rms over the last second.
+reference: distance to the scene's reference value; missed if the run never reached it, – if none is known.
+sweeps: per step.  colors: of contacts.  occupancy: share of lanes that hold a contact.
 Pareto: on the Pareto front of time against p penetration, l contact-law residual, t reference value.
 ";
 
@@ -72,7 +72,7 @@ pub fn scene_table(records: &[Record]) -> String {
         "rest speed",
         "reference",
         "sweeps",
-        "colours",
+        "colors",
         "occupancy",
         "Pareto",
     ]);
@@ -92,7 +92,7 @@ pub fn scene_table(records: &[Record]) -> String {
         }
         if record.bits_equal == Some(false) {
             notes += &format!(
-                "  NOT the same bits as the error run: {}, {}, {}\n",
+                "  state differs from the error run: {}, {}, {}\n",
                 record.solver,
                 record.budget_text,
                 lanes(record)
@@ -172,7 +172,7 @@ pub fn impacts_table(records: &[Record]) -> String {
         rows.add_row([g.scene, g.solver.into()].into_iter().chain(counts).chain(ratios));
     }
     format!(
-        "--impacts waves, in times the solver's own treatment (median over settings)\n{}\n",
+        "--impacts waves, relative to the solver's own impact law (median over settings)\n{}\n",
         finish(rows, 2)
     )
 }
@@ -181,8 +181,7 @@ pub fn impacts_table(records: &[Record]) -> String {
 pub fn error_line(errors: Option<&Errors>) -> String {
     match errors {
         Some(e) => format!(
-            "errors of the last {} steps: penetration {} at most, {} in the mean; law residual {} of the \
-             scene's weight, {} of a body's\n",
+            "errors of the last {} steps: penetration {} maximum, {} mean; law residual {} of the scene's weight, {} of a body's\n",
             e.steps,
             si(e.penetration_max, "m"),
             si(e.penetration_mean, "m"),
@@ -204,10 +203,10 @@ pub fn error_list(errors: &Errors) -> String {
         ("penetration 99 %", Some(length(e.penetration_p99))),
         ("penetration held, 99 %", Some(length(e.held_depth_p99))),
         ("penetration at rest, max", Some(length(e.rest_depth_max))),
-        ("flown into before a contact, max", Some(length(e.flight_depth_max))),
+        ("overlap before a contact was found, max", Some(length(e.flight_depth_max))),
         ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
-        ("soft contacts give way, last second", e.soft_floor.map(length)),
-        ("penetration beyond that", e.penetration_excess.map(length)),
+        ("static deflection of soft contacts, last second", e.soft_floor.map(length)),
+        ("penetration beyond the deflection", e.penetration_excess.map(length)),
         ("law residual, rms, lighter weights", Some(ratio(e.law_rms_lighter))),
         ("law residual, rms, body weights", Some(ratio(e.law_rms_body))),
         ("law residual, rms, scene weights", Some(ratio(e.law_rms))),
@@ -251,7 +250,7 @@ mod tests {
         assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
-        assert!(text.contains("NOT the same bits as the error run: pgs, 1 sub, 8"));
+        assert!(text.contains("state differs from the error run: pgs, 1 sub, 8"));
         // No cell is blank.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();

@@ -23,7 +23,7 @@ const G: f64 = -DEFAULT_GRAVITY[1];
 const RADIUS: f64 = 0.5;
 
 pub(super) const BOUNCE: Entry =
-    Entry::new("bounce", "a disc dropped from 10 m that bounces with e = 0.5 until too slow", |_| {
+    Entry::new("bounce", "a disc dropped from 10 m that bounces with e = 0.5 until it rests", |_| {
         scene("bounce", 10.0, 0.5).steps(300)
     })
     .known(|scene, _| truth("apexes of all bounces", scene, 10.0, 0.5, counted(10.0, 0.5)))
@@ -31,7 +31,7 @@ pub(super) const BOUNCE: Entry =
     .within(tolerances);
 
 pub(super) const ELASTIC: Entry =
-    Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces for ever", |_| {
+    Entry::new("bounce_elastic", "a disc dropped from 1 m that bounces forever", |_| {
         // Twenty bounces take 18.3 s, or 20 s if each adds h times its speed to the apex.
         scene("bounce_elastic", 1.0, 1.0).steps(1320)
     })
@@ -43,7 +43,7 @@ pub(super) const ELASTIC: Entry =
 fn tolerances(scene: &Scene, apex: f64) -> Tolerances {
     Tolerances::impacts(scene).fixed(
         (2.0, "a rebound is compared with the approach at the step's start: up to 1 + e weights"),
-        ((2.0 * G * apex).sqrt() * scene.dt, "a rebound that is a step early or late"),
+        ((2.0 * G * apex).sqrt() * scene.dt, "a rebound one step early or late"),
     )
 }
 
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn four_impacts_from_ten_metres_are_fast_enough() {
+    fn four_impacts_from_ten_meters_are_fast_enough() {
         assert_eq!(counted(10.0, 0.5), 4);
     }
 

@@ -39,6 +39,6 @@ pub(super) const HOUSE: Entry = Entry::new("card_house", "a house of 40 cards, f
 .holds(&[Demand::Stands, Demand::Rests])
 .within(|scene, _| {
     Tolerances::standard(scene)
-        .penetration(0.004, "a hundredth of a card's length")
-        .truth(0.042, "2 mm in each of ten joints, and the 22 mm of air that the house is built with")
+        .penetration(0.004, "1 % of a card's length")
+        .truth(0.042, "2 mm in each of ten joints, plus the 22 mm of gaps that the house is built with")
 });

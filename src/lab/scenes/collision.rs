@@ -1,6 +1,6 @@
-//! A7: one smooth elastic disc hits another, off centre.
+//! A7: one smooth elastic disc hits another, off center.
 //!
-//! The line of centres makes the angle φ with the path, sin φ = b/(2r) = 0.6.
+//! The line of centers makes the angle φ with the path, sin φ = b/(2r) = 0.6.
 //! Equal masses swap their velocities along it and keep those across: the target
 //! leaves with v cos φ = 0.8 v along the line, the other with v sin φ = 0.6 v
 //! across it.
@@ -14,8 +14,10 @@ use super::{Entry, Scene, SceneBody, SceneShape};
 /// the restitution threshold of 1 m/s would make the collision plastic (m/s).
 const SPEED: f64 = 2.0;
 
-pub(super) const OBLIQUE: Entry =
-    Entry::new("oblique_collision", "two smooth elastic discs, one at rest, hit off centre", |_| {
+pub(super) const OBLIQUE: Entry = Entry::new(
+    "oblique_collision",
+    "two frictionless elastic discs, one at rest, collide off center",
+    |_| {
         // They touch after half a second, at the end of a step, so that the normal of
         // the step that sees the collision is exact and the error is the law's alone.
         let disc = || SceneShape::disc(0.5).friction(0.0).restitution(1.0);
@@ -24,13 +26,14 @@ pub(super) const OBLIQUE: Entry =
             SceneBody::dynamic([0.0, 0.0], disc()),
         ];
         Scene::new("oblique_collision", bodies).weightless().steps(60)
-    })
-    .known(|scene, _| {
-        let truth = Worst::from_time(scene, 0.75, |view| Some(error(view)));
-        Truth::new("outgoing speeds, from 0.75 s on", "m/s", 0.8 * SPEED, truth)
-    })
-    .holds(&[Demand::GainsNoEnergy])
-    .within(|scene, speed| Tolerances::impacts(scene).percent(speed));
+    },
+)
+.known(|scene, _| {
+    let truth = Worst::from_time(scene, 0.75, |view| Some(error(view)));
+    Truth::new("outgoing speeds, from 0.75 s on", "m/s", 0.8 * SPEED, truth)
+})
+.holds(&[Demand::GainsNoEnergy])
+.within(|scene, speed| Tolerances::impacts(scene).percent(speed));
 
 /// The worse of the two speeds.
 fn error(view: &View) -> f64 {

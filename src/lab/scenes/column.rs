@@ -8,7 +8,7 @@ use super::{Entry, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
 
 /// One contact per pair, so every impulse is known: contact i (0 is the ground)
-/// carries (N − i) m g. Exactly centred, the discs have no reason to roll off.
+/// carries (N − i) m g. Exactly centered, the discs have no reason to roll off.
 pub(super) const DISCS: Entry = Entry::new("disc_column", "discs of 1 kg on top of each other", |count| {
     let disc = SceneShape::disc(0.5).density(4.0 / PI);
     column("disc_column", count, ground_line(20.0), &disc)
@@ -18,7 +18,7 @@ pub(super) const DISCS: Entry = Entry::new("disc_column", "discs of 1 kg on top 
 .holds(&[Demand::Stands, Demand::Rests])
 .within(|scene, load| Tolerances::standard(scene).percent(load));
 
-/// Unit boxes, centres at i + ½. The error is how far the topmost has sunk.
+/// Unit boxes, centers at i + ½. The error is how far the topmost has sunk.
 pub(super) const BOXES: Entry = Entry::new("stack", "boxes on top of each other", |count| {
     column("stack", count, ground_box(20.0), &SceneShape::rectangle(0.5, 0.5))
 })
@@ -32,7 +32,7 @@ pub(super) fn column(name: &str, count: u32, ground: SceneBody, shape: &SceneSha
     Scene::new(name, std::iter::once(ground).chain(bodies).collect())
 }
 
-/// Dropped in a zigzag of a centimetre, the boxes come to rest on each other:
+/// Dropped in a zigzag of a centimeter, the boxes come to rest on each other:
 /// the topmost of 15 at 14.5 m.
 pub(super) const ZIGZAG: Entry = Entry::new("vertical_stack", "15 boxes dropped in a slight zigzag", |_| {
     let shape = || SceneShape::rectangle(0.5, 0.5).friction(0.3);
@@ -44,7 +44,7 @@ pub(super) const ZIGZAG: Entry = Entry::new("vertical_stack", "15 boxes dropped 
 .holds(&[Demand::StaysStacked, Demand::Rests])
 .within(|scene, _| Tolerances::impacts(scene).joints(15.0));
 
-/// An unstable equilibrium, but exactly centred: rounding that treats left and
+/// An unstable equilibrium, but exactly centered: rounding that treats left and
 /// right alike keeps it, so the topmost of 10 discs of radius 1 rests at 19 m.
 pub(super) const CIRCLES: Entry = Entry::new("circle_stack", "10 discs dropped on top of each other", |_| {
     let discs = (0..10).map(|i| SceneBody::dynamic([0.0, 4.0 + 3.0 * f64::from(i)], SceneShape::disc(1.0)));

@@ -7,7 +7,7 @@ use super::truth::{Truth, Worst};
 use super::{Entry, Geometry, Scene, SceneBody, SceneShape, Segment};
 
 pub(super) const COMPOUNDS: Entry =
-    Entry::new("compounds", "3000 bodies of two triangles each, in a yard", |_| {
+    Entry::new("compounds", "3000 bodies of two triangles each, in a box", |_| {
         let mut ground = yard(40, 100);
         // Catches what jumps over the walls.
         ground

@@ -7,7 +7,7 @@ use super::{Entry, Scene, SceneBody, SceneShape};
 /// Half width and half height (m).
 const HALF: [f64; 2] = [0.125, 0.5];
 
-/// The first is struck at its top, r = (0, ½) m from its centre, by the impulse
+/// The first is struck at its top, r = (0, ½) m from its center, by the impulse
 /// J = (0.2, 0) N·s. With m = 4 ρ hx hy = 0.25 kg and I = m (hx² + hy²)/3:
 /// v = J/m = 0.8 m/s and ω = r × J/I = −½ · 0.2/I = −4.52 rad/s.
 pub(super) const DOMINOES: Entry =
@@ -25,5 +25,5 @@ pub(super) const DOMINOES: Entry =
         bodies[1] = bodies[1].clone().moving([impulse / mass, 0.0], -HALF[1] * impulse / inertia);
         Scene::new("double_domino", bodies)
     })
-    // A domino's top falls from its height of a metre.
+    // A domino's top falls from its height of a meter.
     .within(|scene, _| Tolerances::impacts(scene));

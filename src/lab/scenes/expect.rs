@@ -1,7 +1,7 @@
-//! What a scene file says of a run: what must hold, and what is known.
+//! Expectations in a scene file: conditions that must hold, and known values.
 //!
-//! Scenes of the catalogue write it with [`Scene::to_json`], so that a file that was printed is checked as the
-//! scene that it came from. Observers of the catalogue that no number describes (the twin of a far stack, the
+//! Scenes of the catalog write it with [`Scene::to_json`], so that a file that was printed is checked as the
+//! scene that it came from. Observers of the catalog that no number describes (the twin of a far stack, the
 //! apexes of a bounce) go by its name, and only as long as the bodies are its own.
 
 use super::Scene;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {
-    /// Scene of the catalogue whose tolerances, and whose observers that nothing else here describes, hold for
+    /// Scene of the catalog whose tolerances, and whose observers that nothing else here describes, hold for
     /// this one as long as its bodies are the same.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub catalogue: Option<String>,
@@ -35,7 +35,7 @@ pub struct Expect {
     /// [`Demand::Inside`](super::holds::Demand::Inside) (m)
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub stays_inside: Option<[[f64; 2]; 2]>,
-    /// What is known.
+    /// The known value.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub reference: Option<Reference>,
 }
@@ -55,15 +55,15 @@ pub struct Reference {
     pub tolerance: f64,
 }
 
-/// What a file can know.
+/// Quantities whose value a file can give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
-    /// Height of a body's centre over the last second (m).
+    /// Height of a body's center over the last second (m).
     RestingHeight,
     /// Load of all static bodies over the last second (N).
     GroundLoad,
-    /// Greatest drop of a body's centre over the run (m).
+    /// Greatest drop of a body's center over the run (m).
     GreatestDrop,
 }
 
@@ -102,13 +102,13 @@ impl Expect {
         match (measure, body) {
             (Measure::RestingHeight, Some(i)) if is_dynamic(i) => Ok(()),
             (Measure::RestingHeight, Some(i)) => {
-                Err(Error::invalid("reference.body", format!("{i} is no dynamic body of the scene")))
+                Err(Error::invalid("reference.body", format!("{i} is not a dynamic body of the scene")))
             }
             (Measure::RestingHeight, None) => {
-                Err(Error::invalid("reference.body", "missing: whose height is known"))
+                Err(Error::invalid("reference.body", "missing: the bodies whose height is known"))
             }
             (_, Some(i)) => {
-                Err(Error::invalid("reference.body", format!("{i}, where the measure is of no body")))
+                Err(Error::invalid("reference.body", format!("{i}, but the measure concerns no body")))
             }
             (_, None) => Ok(()),
         }

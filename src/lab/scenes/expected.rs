@@ -8,7 +8,7 @@ use super::{Entry, Loaded, Scene, entry_of, load};
 use crate::lab::error::Error;
 
 impl Expect {
-    /// What a scene of the catalogue expects.
+    /// Expectations of a scene of the catalog.
     pub(super) fn of(name: &str, demands: &[Demand], truth: Option<&Truth>, tolerances: &Tolerances) -> Self {
         let mut expect = Expect { catalogue: Some(name.to_string()), ..Expect::default() };
         for demand in demands {
@@ -33,7 +33,7 @@ impl Expect {
         expect
     }
 
-    /// What it demands, without what goes by the name of the scene.
+    /// Its conditions, without those that depend on the name of the scene.
     fn demands(&self) -> Vec<Demand> {
         [
             self.stands.then_some(Demand::Stands),
@@ -61,11 +61,11 @@ impl Reference {
 
 /// A scene of a file with what it says of a run.
 ///
-/// Errors: an unknown scene of the catalogue.
+/// Errors: an unknown scene of the catalog.
 pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     let Some(expect) = scene.expect.clone() else {
         let tolerances = Tolerances::standard(&scene);
-        let nothing = "what must hold and what is known: the file says neither (expect)".to_string();
+        let nothing = "conditions and reference values: the file has none (expect)".to_string();
         return Ok(Loaded { scene, truth: None, demands: Vec::new(), tolerances, unchecked: vec![nothing] });
     };
     let mut unchecked = Vec::new();
@@ -90,13 +90,14 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
         unchecked.push("a reference value: the file has none".to_string());
     }
     if demands.is_empty() && expect.catalogue.is_none() {
-        unchecked.push("whether it stands, rests or stays inside: the file demands nothing".to_string());
+        unchecked
+            .push("whether it stands, rests or stays inside: the file has no such condition".to_string());
     }
     tolerances.rest = expect.rests.then(|| Tolerances::resting(&scene));
     Ok(Loaded { scene, truth, demands, tolerances, unchecked })
 }
 
-/// What goes by the name of a scene whose bodies are others.
+/// Expectations that are lost because the bodies differ from the catalog's.
 fn lost(entry: &Entry, expect: &Expect, name: &str) -> Option<String> {
     let by_name = entry.demands.iter().any(|d| matches!(d, Demand::Contains(_)));
     let value = entry.truth.is_some() && expect.reference.is_none();
@@ -106,7 +107,7 @@ fn lost(entry: &Entry, expect: &Expect, name: &str) -> Option<String> {
         (false, true) => "the reference value",
         (true, true) => "whether bodies get out, and the reference value",
     };
-    Some(format!("{what} of the catalogue's {name}: the bodies are others"))
+    Some(format!("{what} of the catalog's {name}: the bodies are others"))
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(super) const STACK: Entry =
         let near = column("far_stack", 10, ground_box(20.0), &SceneShape::rectangle(0.5, 0.5));
         moved(near, shift(exponent))
     })
-    .sized(4, 0, 6, "decimal digits of the distance in metres")
+    .sized(4, 0, 6, "decimal digits of the distance in meters")
     .known(|scene, exponent| {
         let [x, y] = shift(exponent);
         let twin = Twin { scene: moved(scene.clone(), [-x, -y]), shift: [x, y], world: None, worst: None };

@@ -17,7 +17,24 @@ use std::path::Path;
 /// Steps of a scene that gives none: five seconds at the default step.
 pub const DEFAULT_STEPS: u32 = 300;
 
-/// Bodies, the field they move in, and for how long.
+/// A scene: bodies, gravity, step and number of steps, and what is known about them.
+///
+/// Scenes are written in code or read from JSON (`simpulse scene NAME --json` prints one):
+///
+/// ```
+/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+///
+/// let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(20.0, 1.0));
+/// let ball = SceneBody::dynamic([0.0, 2.0], SceneShape::disc(0.5).restitution(0.8)).moving([1.0, 0.0], 0.0);
+/// let scene = Scene::new("ball", vec![ground, ball]).steps(120);
+/// scene.validate()?;
+///
+/// assert_eq!(Scene::from_json(&scene.to_json(), "ball.json".as_ref())?, scene);
+/// let mut world = scene.build(Settings::new(solvers::find("shim")?))?;
+/// world.step()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -32,10 +49,10 @@ pub struct Scene {
     /// Number of steps of a run, ≥ 1.
     #[serde(default = "default_steps")]
     pub steps: u32,
-    /// What a run is held to; none: it is not checked.
+    /// Conditions on a run; none: it is not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
-    /// In the order in which a world numbers them.
+    /// Bodies, in the order of their indices in a world.
     pub bodies: Vec<SceneBody>,
 }
 
@@ -51,7 +68,7 @@ pub struct SceneBody {
     /// rad
     #[serde(default, skip_serializing_if = "is_zero")]
     pub angle: f64,
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     #[serde(default, skip_serializing_if = "is_origin")]
     pub velocity: [f64; 2],
     /// rad/s
@@ -116,7 +133,7 @@ pub struct Circle {
     pub radius: f64,
 }
 
-/// A rectangle turned about its centre, grown by `radius`.
+/// A rectangle turned about its center, grown by `radius`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
@@ -282,7 +299,7 @@ impl Scene {
     /// The scene as JSON, one body per line; defaults of bodies and shapes are left out.
     /// JSON has no NaN, so one becomes `null`, which reading refuses.
     pub fn to_json(&self) -> String {
-        // Infallible: every map key is a string and nothing here can fail to serialise.
+        // Infallible: every map key is a string and nothing here can fail to serialize.
         let line = |value: serde_json::Result<String>| value.unwrap_or_default();
         let bodies: Vec<String> = self.bodies.iter().map(|b| line(serde_json::to_string(b))).collect();
         let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));

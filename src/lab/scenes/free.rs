@@ -22,7 +22,7 @@ pub(super) const FALL: Entry = Entry::new("free_fall", "a disc thrown up, for tw
     )
 })
 .holds(&[Demand::GainsNoEnergy])
-.within(|scene, _| Tolerances::standard(scene).truth(1e-3, "a millimetre: nothing but rounding is left"));
+.within(|scene, _| Tolerances::standard(scene).truth(1e-3, "1 mm: only rounding remains"));
 
 /// m/s, along both axes
 const START_SPEED: f64 = 5.0;
@@ -48,7 +48,7 @@ pub(super) const SPIN: Entry = Entry::new("free_spin", "a box that spins freely 
     Truth::new("angle turned, all steps", "rad", end, Worst::from_step(1, off))
 })
 .holds(&[Demand::GainsNoEnergy])
-.within(|scene, _| Tolerances::standard(scene).truth(1e-2, "half a degree begins to be seen"));
+.within(|scene, _| Tolerances::standard(scene).truth(1e-2, "half a degree starts to be visible"));
 
 /// θ = ω t, but a rotation only tells θ mod 2π. The error of each single step is
 /// below half a turn (at 180 rad/s and 1/60 s a step turns 3 rad, and a body that

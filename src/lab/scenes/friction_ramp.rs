@@ -48,7 +48,7 @@ pub(super) const RAMP: Entry =
     .within(|scene, _| {
         // The box at x = 1 m starts at 28 m, over a ramp that is 21 m high there.
         let downhill = 0.01 * -DEFAULT_GRAVITY[1] * SLOPE.sin();
-        Tolerances::impacts(scene).truth(downhill, "a hundredth of gravity along the ramp")
+        Tolerances::impacts(scene).truth(downhill, "1 % of gravity along the ramp")
     });
 
 /// rad

@@ -1,9 +1,8 @@
-//! What a scene demands of a run, and the word for one that does not meet it.
+//! Conditions on a run, and the words for their violation.
 //!
-//! A run that fell has fallen, however fast it was and however small its errors are: nobody wants
-//! it. Every scene demands that its kinetic energy has a source (see
-//! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes
-//! through a static or kinematic one; what else it demands stands in its row of the catalogue.
+//! A run that fails a condition is useless, however fast it is and however small its errors are. Every scene requires
+//! that its kinetic energy has a source (see [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up))
+//! and that no body passes through a static or kinematic one; further conditions are in its row of the catalog.
 
 use super::truth::View;
 use crate::engine::bodies::BodyKind;
@@ -55,7 +54,7 @@ impl std::fmt::Display for Broken {
     }
 }
 
-/// What a scene demands of every step.
+/// A condition that every step has to meet.
 #[derive(Clone, Copy, Debug)]
 pub enum Demand {
     /// Every two bodies that touch at the start stay together: neither moves against the other by
@@ -69,7 +68,7 @@ pub enum Demand {
     StaysWithin(f64),
     /// No body is outside.
     Contains(Outside),
-    /// No dynamic body's centre is outside of this box, given by its lowest and highest corner (m).
+    /// No dynamic body's center is outside of this box, given by its lowest and highest corner (m).
     Inside([[f64; 2]; 2]),
     /// What moves comes to rest. How much may move in the end is a tolerance
     /// ([`Tolerances::rest`](super::tolerance::Tolerances::rest)); here it says that the scene has to stand for a
@@ -84,22 +83,22 @@ pub enum Demand {
 #[derive(Clone, Copy, Debug)]
 pub struct Outside(pub(super) fn(&View) -> usize);
 
-/// Share of a body's reach, from its centre to its farthest corner, by which it may move against one
-/// that it touched: a unit box then is 0.35 m off, and its centre still above the one below.
+/// Share of a body's reach, from its center to its farthest corner, by which it may move against one
+/// that it touched: a unit box then is 0.35 m off, and its center still above the one below.
 pub const LEFT: f64 = 0.5;
 
 /// Share of the largest kinetic energy that may come from nowhere. Semi-implicit Euler itself is off
 /// by up to m g h v/2, that is g h/v of it: 4 % at 4.5 m/s in steps of 1/60 s.
 pub const GAIN: f64 = 0.1;
 
-/// What comes to rest has to stand for so long (s).
+/// Time for which a scene at rest has to stand (s).
 pub const HORIZON: f64 = 60.0;
 
 impl Demand {
     /// In words.
     pub fn meaning(&self) -> String {
         match self {
-            Demand::Stands => "no body leaves those it stood on (fell)".to_string(),
+            Demand::Stands => "no body leaves the bodies that it stood on (fell)".to_string(),
             Demand::StaysStacked => "the bodies end up one above the other (fell)".to_string(),
             Demand::StaysWithin(limit) => format!("no body leaves its place by more than {limit} m (slid)"),
             Demand::Contains(_) => "no body gets out (tunnelled)".to_string(),
@@ -128,7 +127,7 @@ pub struct Watch {
     demands: Vec<Demand>,
     start: Vec<DVec2>,
     previous: Vec<DVec2>,
-    /// From the centre of mass to the farthest point; infinite unless dynamic (m).
+    /// From the center of mass to the farthest point; infinite unless dynamic (m).
     reach: Vec<f64>,
     /// Bodies that touched at the start.
     touching: Vec<[usize; 2]>,
@@ -241,7 +240,7 @@ impl Watch {
     }
 }
 
-/// Centres of mass (m), by body.
+/// Centers of mass (m), by body.
 fn centers(world: &World) -> Vec<DVec2> {
     (0..world.bodies.len()).map(|i| DVec2::from(world.bodies.center(i))).collect()
 }
@@ -313,7 +312,7 @@ impl Walls {
     }
 }
 
-/// Centre of mass (m) and (cos θ, sin θ) of a body.
+/// Center of mass (m) and (cos θ, sin θ) of a body.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     center: DVec2,
@@ -398,7 +397,7 @@ mod tests {
         let stays = &[Demand::StaysWithin(0.05)];
         assert_eq!(moved("stack:1", stays, 1, [0.06, 0.5]), Some(Mark::Slid));
         assert_eq!(moved("stack:1", stays, 1, [0.04, 0.5]), None);
-        // Half of it below the ground is not through it, its centre is.
+        // Half of it below the ground is not through it, its center is.
         assert_eq!(moved("stack:1", &[], 1, [0.0, 0.01]), None);
         assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunnelled));
         assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunnelled));

@@ -25,7 +25,7 @@ pub(super) const STICK: Entry =
     .within(|scene, _| Tolerances::standard(scene).joints(1.0));
 
 pub(super) const SLIP: Entry =
-    Entry::new("incline_slip", "a box on an incline, just too steep for it", |_| {
+    Entry::new("incline_slip", "a box on an incline that is just too steep", |_| {
         scene("incline_slip", SceneShape::rectangle(0.5, 0.5), 0.24).steps(120)
     })
     .known(|scene, _| truth("distance slid, all steps", slipping(0.24), end_time(scene)))
@@ -55,7 +55,7 @@ fn end_time(scene: &Scene) -> f64 {
     f64::from(scene.steps) * scene.dt
 }
 
-/// The plank's top passes through the origin; the body, half a metre high, starts flush above it.
+/// The plank's top passes through the origin; the body, half a meter high, starts flush above it.
 fn scene(name: &str, shape: SceneShape, friction: f64) -> Scene {
     let (sin, cos) = SLOPE.sin_cos();
     let plank = SceneShape::rectangle(40.0, 0.5).friction(friction);
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_start_is_zero_and_a_metre_is_a_metre() {
+    fn the_start_is_zero_and_a_meter_is_a_meter() {
         let (sin, cos) = (SLOPE.sin(), SLOPE.cos());
         let at = |d: f64| {
             let body = [(0.5 * sin + d * cos) as f32, (0.5 * cos - d * sin) as f32];

@@ -1,4 +1,4 @@
-//! D: a yard full of pentagons, and a pusher that ploughs through them.
+//! D: a yard full of pentagons, and a pusher that plows through them.
 
 use super::holds::{Demand, Outside};
 use super::parts::{below_floor, yard};
@@ -8,7 +8,7 @@ use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 use std::f64::consts::{PI, TAU};
 
-pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a pusher in a yard", |_| {
+pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a pusher in a box", |_| {
     // A scene has no script, so the pusher does not swing as x = 60 sin(0.2 t) but goes
     // the same way, 93 m in 800 steps, at constant speed.
     let blade = SceneShape::rectangle_at([2.0, 4.0], [0.0, 4.0]);

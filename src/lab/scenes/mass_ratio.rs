@@ -64,9 +64,9 @@ pub(super) const TOPS: Entry =
     .within(|scene, load| Tolerances::impacts(scene).percent(load));
 
 /// A box of 400 kg dropped on two of 1 kg, which stay 1 m high under it: its
-/// centre comes to rest at 1 + 10 m.
+/// center comes to rest at 1 + 10 m.
 pub(super) const LARGE_ON_SMALL: Entry =
-    Entry::new("high_mass_ratio_2", "a large box dropped on two small ones, 400 times as heavy", |_| {
+    Entry::new("high_mass_ratio_2", "a large box of 400 times the mass dropped on two small ones", |_| {
         let small = |x: f64| SceneBody::dynamic([x, 0.5], SceneShape::rectangle(0.5, 0.5));
         let large = SceneBody::dynamic([0.0, 26.0], SceneShape::rectangle(10.0, 10.0));
         Scene::new("high_mass_ratio_2", vec![ground_line(20.0), small(-9.0), small(9.0), large])

@@ -1,8 +1,7 @@
-//! Scenes: their file format, a catalogue of them, what is known about each, what it demands of a
-//! run and how wrong that may be.
+//! Scenes: file format, catalog, known values, conditions on a run, and tolerances.
 //!
-//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 or C11
-//! in the scene files are those of the list of hard cases.
+//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 in the scene files are those of `simpulse
+//! verify`.
 
 mod arch;
 mod bounce;
@@ -102,13 +101,13 @@ pub struct Entry {
     pub build: fn(u32) -> Scene,
     /// Makes it from a size and a seed, for scenes with chance in them.
     pub seeded: Option<fn(u32, u64) -> Scene>,
-    /// What is known about the scene of that size, for a run of its `steps` at its `dt`.
+    /// The known value of the scene of that size, for a run of its `steps` at its `dt`.
     pub truth: Option<fn(&Scene, u32) -> Truth>,
-    /// What of a scene that may be very large is known without making it.
+    /// Properties of a scene that are known without building it, if it may be very large.
     pub outline: Option<fn(u32) -> Outline>,
-    /// What a run has to meet, besides that nothing blows up or passes through what is static.
+    /// Conditions on a run, besides that nothing blows up or passes through static bodies.
     pub demands: &'static [Demand],
-    /// How wrong a run may be, for the scene and the value that its truth has (0 where none is known).
+    /// Tolerances, for the scene and its reference value (0 if none is known).
     pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
 
@@ -128,7 +127,7 @@ pub struct Size {
     pub meaning: &'static str,
 }
 
-/// What a scene's size alone says about it.
+/// Properties that follow from the size of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
     /// Bodies in it.
@@ -194,7 +193,7 @@ impl Entry {
     }
 }
 
-/// A scene of the catalogue, and what is known about it.
+/// A scene of the catalog, and what is known about it.
 pub struct Loaded {
     /// Ready to build.
     pub scene: Scene,
@@ -204,7 +203,7 @@ pub struct Loaded {
     pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,
-    /// What nobody checks, in words: a file need not say what must hold.
+    /// Conditions that are not checked, in words: a file need not give any.
     pub unchecked: Vec<String>,
 }
 
@@ -252,7 +251,7 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
     Ok(entry.loaded(scene, size))
 }
 
-/// What there is to say about a scene besides its bodies.
+/// Description of a scene without its bodies.
 #[derive(Clone, Debug)]
 pub struct Description {
     /// With its size.
@@ -271,7 +270,7 @@ pub struct Description {
     pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,
-    /// What nobody checks, in words.
+    /// Conditions that are not checked, in words.
     pub unchecked: Vec<String>,
 }
 
@@ -293,7 +292,7 @@ impl Description {
     }
 }
 
-/// Describes a scene of the catalogue. One that may be very large is not made for it: its smallest
+/// Describes a scene of the catalog. One that may be very large is not made for it: its smallest
 /// sibling says what all sizes have in common, and its [`Outline`] the rest.
 ///
 /// Errors: as [`load`].

@@ -125,7 +125,7 @@ pub(super) fn ground_box(half: f64) -> SceneBody {
     SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(half, 1.0))
 }
 
-/// A yard with its floor's middle at height 0: metre blocks from −`half` to `half`, and walls
+/// A yard with its floor's middle at height 0: meter blocks from −`half` to `half`, and walls
 /// `height` of them high at both ends. Blocks overlap by 0.1 m, so that nothing slips through.
 pub(super) fn yard(half: i32, height: i32) -> SceneBody {
     let (half_width, mut shapes) = (f64::from(half), Vec::new());
@@ -140,7 +140,7 @@ pub(super) fn yard(half: i32, height: i32) -> SceneBody {
     SceneBody { shapes, ..SceneBody::fixed([0.0, 0.0], SceneShape::line(1.0)) }
 }
 
-/// Bodies whose centre is below the middle of a floor at height 0; NaN counts.
+/// Bodies whose center is below the middle of a floor at height 0; NaN counts.
 pub(super) fn below_floor(view: &View) -> usize {
     let above = |&i: &usize| !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0;
     view.bodies.len() - (0..view.bodies.len()).filter(above).count()

@@ -1,4 +1,4 @@
-//! Where in a scene a JSON error stands, in the words of the scene: `bodies[3].shapes[0].density`.
+//! The place of a JSON error in a scene: `bodies[3].shapes[0].density`.
 
 use crate::lab::error::LONGEST_MISSPELT;
 

@@ -25,10 +25,12 @@ pub(super) const LARGE: Entry =
         .holds(&[Demand::Stands, Demand::Rests])
         .within(|scene, load| Tolerances::standard(scene).percent(load));
 
-pub(super) const MANY: Entry =
-    Entry::new("many_pyramids", "floors with pyramids of 55 boxes, as many as there are floors", |floors| {
+pub(super) const MANY: Entry = Entry::new(
+    "many_pyramids",
+    "floors, each with as many pyramids of 55 boxes as there are floors",
+    |floors| {
         const BASE: u32 = 10;
-        // A pyramid and a metre of air, in both directions.
+        // A pyramid and a meter of air, in both directions.
         const SPACING: f64 = BASE as f64 + 1.0;
         let half_width = 0.5 * SPACING * f64::from(floors);
         let height = |floor: u32| SPACING * f64::from(floor);
@@ -42,15 +44,16 @@ pub(super) const MANY: Entry =
             }
         }
         Scene::new("many_pyramids", bodies).steps(200)
-    })
-    .sized(20, 1, 100, "floors")
-    .outlined(|floors| {
-        let (floors, boxes) = (floors as usize, 55 * (floors * floors) as usize);
-        Outline { bodies: floors + boxes, reference: boxes as f64 * BOX_WEIGHT }
-    })
-    .known(|scene, _| rests_on_ground(scene))
-    .holds(&[Demand::Stands, Demand::Rests])
-    .within(|scene, load| Tolerances::standard(scene).percent(load));
+    },
+)
+.sized(20, 1, 100, "floors")
+.outlined(|floors| {
+    let (floors, boxes) = (floors as usize, 55 * (floors * floors) as usize);
+    Outline { bodies: floors + boxes, reference: boxes as f64 * BOX_WEIGHT }
+})
+.known(|scene, _| rests_on_ground(scene))
+.holds(&[Demand::Stands, Demand::Rests])
+.within(|scene, load| Tolerances::standard(scene).percent(load));
 
 fn scene(name: &str, base: u32) -> Scene {
     let corner = [-0.5 * f64::from(base), 0.0];

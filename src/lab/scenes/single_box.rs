@@ -5,7 +5,7 @@ use super::tolerance::Tolerances;
 use super::truth::rests_at;
 use super::{Entry, Scene, SceneBody, SceneShape};
 
-pub(super) const DROP: Entry = Entry::new("single_box", "a box dropped from three metres", |_| {
+pub(super) const DROP: Entry = Entry::new("single_box", "a box dropped from three meters", |_| {
     let mut ground = ground_line(66.0);
     ground.shapes[0].friction = 0.5;
     let shape = SceneShape::rectangle(1.0, 1.0).friction(0.5);

@@ -1,7 +1,7 @@
-//! How wrong a run of a scene may be: limits with their reasons, written down with the scene.
+//! Tolerances of a scene: limits on errors, with their reasons.
 //!
-//! They say what would be noticed, or what no solver can avoid, and not what some solver reaches: it
-//! is an answer, too, that none of those tried does.
+//! They follow from what is visible or what no solver can avoid, not from what some solver reaches. It is a valid
+//! result that no solver is within them.
 
 use super::format::Scene;
 use crate::engine::bodies::{BodyDef, BodyKind};
@@ -33,15 +33,15 @@ impl Tolerance {
     }
 }
 
-/// How right a run has to be. Each is ten times as strict as the one before it, in every error.
+/// Accuracy of a run. Each level is ten times as strict as the one before, in every error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accuracy {
-    /// Nothing wrong is seen: a centimetre at bodies of a metre.
+    /// Nothing wrong is seen: a centimeter at bodies of a meter.
     Plausible,
-    /// A millimetre.
+    /// A millimeter.
     Tight,
-    /// A tenth of a millimetre.
+    /// A tenth of a millimeter.
     Exact,
 }
 
@@ -98,11 +98,11 @@ pub struct GivenTolerances {
     pub rest: Option<f64>,
 }
 
-/// What is seen of a body, in its size (1): a centimetre at a metre.
+/// Visible overlap, relative to the size of a body (1): 1 cm at 1 m.
 const SEEN: f64 = 0.01;
 
-/// What is seen to move at rest, in sizes of a body per second: half a centimetre at a metre, a twelfth of a
-/// millimetre in each of sixty pictures.
+/// What is seen to move at rest, in sizes of a body per second: half a centimeter at a meter, a twelfth of a
+/// millimeter in each of sixty pictures.
 const SEEN_MOVING: f64 = 0.005;
 
 /// Size of the bodies that move: the median of their mean extents (m), 1 where nothing moves.
@@ -131,11 +131,8 @@ impl Tolerances {
     /// Those of bodies that rest or slide; nothing is known.
     pub fn standard(scene: &Scene) -> Self {
         Tolerances {
-            penetration: Tolerance::new(SEEN * size(scene), "a hundredth of a body begins to be seen"),
-            residual: Tolerance::new(
-                0.1,
-                "a tenth of what carries the lighter body: loads are good to a digit",
-            ),
+            penetration: Tolerance::new(SEEN * size(scene), "1 % of a body starts to be visible"),
+            residual: Tolerance::new(0.1, "10 % of the lighter body's weight: loads correct to one digit"),
             truth: None,
             rest: None,
         }
@@ -147,13 +144,14 @@ impl Tolerances {
     /// of 1 is some hundredths of it. How deep bodies fly into each other before they are a contact is no
     /// solver's error, and not in the penetration.
     pub fn impacts(scene: &Scene) -> Self {
-        let reason = "the weight of a body: impacts take dozens of it, so some hundredths of an impact";
+        let reason =
+            "one body weight: impacts reach dozens of weights, so this is a few percent of an impact";
         Tolerances { residual: Tolerance::new(1.0, reason), ..Self::standard(scene) }
     }
 
-    /// What may be left of the motion of what comes to rest.
+    /// Residual speed allowed at rest.
     pub fn resting(scene: &Scene) -> Tolerance {
-        Tolerance::new(SEEN_MOVING * size(scene), "half a hundredth of a body per second begins to be seen")
+        Tolerance::new(SEEN_MOVING * size(scene), "0.5 % of a body per second starts to be visible")
     }
 
     /// The same, with this for the deepest penetration (m).
@@ -174,15 +172,15 @@ impl Tolerances {
 
     /// A hundredth of a truth of this size.
     pub fn percent(self, size: f64) -> Self {
-        self.truth(0.01 * size.abs(), "a hundredth of what it should be")
+        self.truth(0.01 * size.abs(), "1 % of the expected value")
     }
 
     /// A slop in each of so many joints on top of each other.
     pub fn joints(self, count: f64) -> Self {
-        self.truth(f64::from(LINEAR_SLOP) * count, "a slop in every joint up to the top")
+        self.truth(f64::from(LINEAR_SLOP) * count, "one slop per joint up to the top")
     }
 
-    /// With those that are given in the place of the scene's own.
+    /// With the given tolerances instead of the scene's own.
     pub fn with(self, given: &GivenTolerances) -> Self {
         let or =
             |own: Tolerance, given: Option<f64>| given.map_or(own, |value| Tolerance::new(value, "given"));

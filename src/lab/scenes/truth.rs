@@ -1,10 +1,8 @@
-//! Known truths, and observers that measure how far a world is from them.
+//! Known values, and observers that measure the distance of a world from them.
 //!
-//! An observer sees a world after each step and nothing else: not which solver
-//! ran, nor how long it took. It reads the `f32` state and computes in `f64`.
-//! Where the truth of a semi-implicit Euler scheme with n substeps is known
-//! exactly, the observer compares with that, so that a correct solver's error is
-//! rounding, not discretisation.
+//! An observer sees only the world after each step, not the solver or its time. It reads the `f32` state and computes
+//! in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is known, the observer compares with
+//! that, so that a correct solver's error is rounding, not discretization.
 
 use super::expect::Measure;
 use super::format::Scene;
@@ -24,13 +22,13 @@ pub trait Observer {
 
 /// Something known about a scene, and who measures it.
 pub struct Truth {
-    /// What is measured.
+    /// The measured quantity.
     pub quantity: &'static str,
-    /// Of `expected` and of the error.
+    /// Unit of `expected` and of the error.
     pub unit: &'static str,
     /// The value that the exact rigid bodies have (in the limit of small steps).
     pub expected: f64,
-    /// What a scene file calls it, with the body that it is about; none where only the catalogue knows it.
+    /// Its name in scene files, with its body; none if only the catalog has it.
     pub measure: Option<(Measure, Option<usize>)>,
     /// Its error is the distance to the truth, in `unit`.
     pub observer: Box<dyn Observer>,
@@ -47,7 +45,7 @@ impl Truth {
     }
 }
 
-/// What observers may see of a world: plain state, so that tests make it by hand.
+/// The part of a world that observers see: plain state, so that tests can construct it.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
     pub bodies: &'a Bodies,
@@ -98,7 +96,7 @@ impl<'a> View<'a> {
         if n == 0.0 { 0.0 } else { 0.5 * a * t * t * (1.0 + 1.0 / n) }
     }
 
-    /// Centre of mass of body `i` (m).
+    /// Center of mass of body `i` (m).
     pub fn center(&self, i: usize) -> [f64; 2] {
         self.bodies.center(i)
     }
@@ -188,7 +186,7 @@ pub(super) fn weight(scene: &Scene) -> f64 {
     -scene.gravity[1] * masses.sum::<f64>()
 }
 
-/// Centres of mass at the start (m), by body.
+/// Centers of mass at the start (m), by body.
 pub(super) fn start_centers(scene: &Scene) -> Vec<[f64; 2]> {
     let center = |b: &crate::engine::bodies::BodyDef| {
         let [x, y] = b.mass().center;
@@ -211,7 +209,7 @@ pub(super) fn load_on_ground(scene: &Scene, load: f64) -> Truth {
     Truth { measure: Some((Measure::GroundLoad, None)), ..truth }
 }
 
-/// A body that ends at rest with its centre at `height` (m).
+/// A body that ends at rest with its center at `height` (m).
 pub(super) fn rests_at(scene: &Scene, body: usize, height: f64) -> Truth {
     let off = move |view: &View| Some(view.center(body)[1] - height);
     let truth = Truth::new("resting height, last second", "m", height, Worst::last_second(scene, off));
@@ -219,7 +217,7 @@ pub(super) fn rests_at(scene: &Scene, body: usize, height: f64) -> Truth {
 }
 
 /// A structure that stands: nothing falls. The error is the greatest drop of any
-/// dynamic body's centre below its start, over the whole run.
+/// dynamic body's center below its start, over the whole run.
 pub(super) fn stands(scene: &Scene) -> Truth {
     greatest_drop(scene, 0.0)
 }
@@ -243,7 +241,7 @@ pub(super) mod by_hand {
 
     use super::*;
 
-    /// Dynamic bodies at centres (m), at rest.
+    /// Dynamic bodies at centers (m), at rest.
     pub fn bodies(centers: &[[f32; 2]]) -> Bodies {
         let mut bodies = Bodies::default();
         for &[x, y] in centers {

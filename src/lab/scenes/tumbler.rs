@@ -6,7 +6,7 @@ use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 
-/// From the drum's centre to the middle of its walls (m); they are 1 m thick.
+/// From the drum's center to the middle of its walls (m); they are 1 m thick.
 const REACH: f64 = 10.0;
 
 pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning square drum", |_| {
@@ -34,7 +34,7 @@ pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning
 // Across the drum.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// Bodies whose centre is beyond the middle of a wall of the drum, which is body 0; NaN counts.
+/// Bodies whose center is beyond the middle of a wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {
     let [x, y] = view.center(0);
     let (cos, sin) = (f64::from(view.bodies.rotation_cos[0]), f64::from(view.bodies.rotation_sin[0]));

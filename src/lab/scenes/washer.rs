@@ -48,7 +48,7 @@ fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {
     SceneShape::polygon(vec![at(inner, from), at(outer, from), at(outer, to), at(inner, to)])
 }
 
-/// Bodies whose centre is in or beyond the wall of the drum, which is body 0; NaN counts.
+/// Bodies whose center is in or beyond the wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {
     let [x, y] = view.center(0);
     let inside = |i: &usize| {

@@ -1,11 +1,10 @@
-//! Which of two settings is faster, if that can be told.
+//! Decides which of two settings is faster, or that they tie.
 //!
-//! Each block of one setting is paired with the other's block of the same round. The median of the
-//! ratios has an interval whatever their distribution (Thompson 1936, Savur 1937): of n pairs, the
-//! k-th smallest and the k-th largest ratio have the true median between them unless fewer than k
-//! of n fair coins fall on one side. An interruption is one ratio among many, and a clock that
-//! drifts is in both halves of a pair. A ratio of 1 within the interval is a tie, and so is a
-//! difference that nobody would act on.
+//! Each block of one setting is paired with the other's block of the same round. The median of the ratios has an
+//! interval whatever their distribution (Thompson 1936, Savur 1937): of n pairs, the k-th smallest and the k-th
+//! largest ratio have the true median between them unless fewer than k of n fair coins fall on one side. An
+//! interruption is one ratio among many, and a clock that drifts is in both halves of a pair. A ratio of 1 within the
+//! interval is a tie, and so is a negligible difference.
 
 use super::interleave::{Sample, median};
 use std::cmp::Ordering;
@@ -23,7 +22,7 @@ const MISS: f64 = 1e-3;
 /// The quantile of the normal distribution that leaves out half of [`MISS`].
 const Z: f64 = 3.291;
 
-/// The time of one setting in times that of another.
+/// The time of one setting ÷ that of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
     /// Median over the pairs of blocks, or of the means where spikes differ.

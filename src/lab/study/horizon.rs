@@ -1,8 +1,7 @@
-//! Runs to the horizon of a scene: whether what would be named stands for a minute.
+//! Extended runs: checks that recommended settings stand for a minute.
 //!
-//! A stack that stands for the five seconds of a run may fall in the thirteenth. Nobody wants it, however cheap
-//! it is, and nobody would find out from a run that ends before. So the settings that an [`Answer`] would name
-//! are run on, untimed and on all cores, and those that fail make place for the next.
+//! A stack that stands for the five seconds of a run may fall after thirteen. So the settings that an [`Answer`]
+//! would name are extended, untimed and on all cores, and those that fail are replaced by the next.
 
 use super::answer::{Answer, same};
 use super::record::Later;
@@ -106,7 +105,7 @@ pub fn run_on(
         if untried.is_empty() {
             return Ok(());
         }
-        tell(format!("a minute of {name}: {} settings", untried.len()));
+        tell(format!("extending {name} to a minute: {} settings", untried.len()));
         let jobs: Vec<(Record, Settings)> =
             untried.into_iter().map(|r| Ok((r.clone(), settings(plan, r)?))).collect::<Result<_, Error>>()?;
         let found = in_parallel(&jobs, |(_, settings)| later(&plan.open(name)?, settings.clone()))?;

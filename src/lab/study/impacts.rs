@@ -5,7 +5,7 @@ use super::compare::Ratio;
 use super::curve::ErrorAxis;
 use crate::engine::constraints::Impacts;
 
-/// One solver on one scene, over its settings: with waves in times that with its own treatment.
+/// One solver on one scene, over its settings: results with waves ÷ results with its own impact law.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Gain {
     /// Name with size.

@@ -1,10 +1,9 @@
-//! Timing: all settings of a scene take turns, in blocks of some steps.
+//! Interleaved timing: all settings of a scene take turns, in blocks of steps.
 //!
-//! A machine's clock rate and its other guests change from second to second, so settings that are
-//! timed one after another are compared with the weather. Here every setting of a scene has a world
-//! of its own, and in every round each world goes the same block of steps, in an order that rotates
-//! from round to round. Settings are compared by the blocks of the same round ([`super::compare`]),
-//! so what changes slowly changes both.
+//! Clock rate and load of a machine change from second to second, so times measured one setting after another are not
+//! comparable. Here every setting of a scene has its own world, and in every round each world runs the same block of
+//! steps, in an order that rotates from round to round. Settings are compared by blocks of the same round
+//! ([`super::compare`]), so slow changes affect both.
 //!
 //! ```text
 //! block:  ○ ● ● ● ● ● ● ● ● ◐     ○ meets cold caches, not timed
@@ -152,9 +151,9 @@ pub struct Load {
     pub rows: f64,
     /// Sweeps over the constraints.
     pub sweeps: f64,
-    /// Most colours of any step.
+    /// Most colors of any step.
     pub colors: usize,
-    /// Contacts solved serially because colours ran out.
+    /// Contacts solved serially because colors ran out.
     pub overflow: f64,
     /// Share of lanes that hold a contact, in [0, 1].
     pub occupancy: f64,
@@ -201,7 +200,7 @@ impl LoadSum {
 /// Lets `count` settings take turns in so many rounds: `turn(setting, round)` for each of them.
 ///
 /// The order of a round is the last one's, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
-/// and every second round is read backwards (Williams 1949), so that who comes after whom changes,
+/// and every second round is read backward (Williams 1949), so that who comes after whom changes,
 /// too: a setting that leaves the caches full of its own does not always leave them to the same one.
 /// It rotates by the golden section of the count, so that after any number of rounds everybody has
 /// been early and late about as often.

@@ -1,27 +1,37 @@
-//! The main job: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
+//! Studies: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
-//! Every setting runs twice over. *Errors* come from one run with impulses recorded, on
-//! all cores at once, because no clock is read. *Times* come from [interleaved timing](interleave) of all
-//! settings of a scene in common rounds, alone on the machine. All
-//! coloured widths and the error run must agree to the last bit; [`Record::bits_equal`] says so.
-//! Settings that would be named are then [run on](horizon), untimed and on all cores, for as long as the scene
-//! deserves.
+//! Every setting runs twice. *Errors* come from one run with impulses recorded, on all cores in parallel, because no
+//! clock is read. *Times* come from [interleaved timing](interleave) of all settings of a scene in common rounds, on
+//! one core. All colored widths and the error run must agree to the last bit ([`Record::bits_equal`]). Settings that
+//! would be recommended are then [extended](horizon) to a minute, untimed and on all cores.
 
+#[doc(hidden)]
 pub mod answer;
 pub mod budget;
 pub mod compare;
+#[doc(hidden)]
 pub mod cost;
+#[doc(hidden)]
 pub mod curve;
+#[doc(hidden)]
 pub mod horizon;
+#[doc(hidden)]
 pub mod impacts;
+#[doc(hidden)]
 pub mod interleave;
+#[doc(hidden)]
 pub mod pareto;
+#[doc(hidden)]
 pub mod profile;
+#[doc(hidden)]
 pub mod ranking;
 pub mod record;
+#[doc(hidden)]
 pub mod savings;
+#[doc(hidden)]
 pub mod slices;
 pub mod sweep;
+#[doc(hidden)]
 pub mod telling;
 
 use crate::engine::constraints::Impacts;
@@ -82,31 +92,31 @@ pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
 /// What a study tries.
 #[derive(Clone, Debug)]
 pub struct StudyPlan {
-    /// Names of the catalogue, with sizes, or `.json` files.
+    /// Names of the catalog, with sizes, or `.json` files.
     pub scenes: Vec<String>,
     /// Rows of [`VARIANTS`].
     pub solvers: Vec<&'static Variant>,
-    /// Lane widths of coloured runs.
+    /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,
     /// Constraint orders; natural order has one lane.
     pub orders: Vec<Order>,
-    /// Treatments of impacts; on scenes where nothing bounces only the first of them.
+    /// Impact laws; scenes where nothing bounces run only the first.
     pub impacts: Vec<Impacts>,
     /// Work per step.
     pub budgets: BudgetGrid,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
-    /// What takes several values; none in a study of budgets.
+    /// The swept quantity; none in a study of budgets.
     pub sweep: Option<Sweep>,
-    /// Tolerances that take the place of the scenes' own.
+    /// Tolerances that override the scenes' own.
     pub tolerances: GivenTolerances,
     /// Steps of an error run; where none, the scene's own.
     pub steps: Option<u32>,
     /// Most steps of a timing run.
     pub timing_steps: u32,
-    /// Timing runs of each setting.
+    /// Timing runs per setting.
     pub repeats: u32,
-    /// Shuffles the timing runs, and lays out scenes that have chance in them.
+    /// Random seed of the order of timing runs, and of scenes that have one.
     pub seed: u64,
 }
 
@@ -136,12 +146,12 @@ fn widths(native: LaneWidth) -> Vec<LaneWidth> {
 }
 
 impl StudyPlan {
-    /// A look at everything, in seconds: short runs, nothing repeated.
+    /// An overview in seconds: short runs without repeats.
     pub fn quick() -> Self {
         StudyPlan { steps: Some(60), timing_steps: 36, repeats: 1, ..StudyPlan::default() }
     }
 
-    /// Refuses what cannot be run, before anything is.
+    /// Errors: a plan that cannot be run.
     pub fn check(&self) -> Result<(), Error> {
         let empty = [
             ("scenes", self.scenes.is_empty()),
@@ -223,7 +233,7 @@ pub fn is_path(name: &str) -> bool {
     name.ends_with(".json") || name.contains(['/', '\\'])
 }
 
-/// A scene of the catalogue or of a file (a name with a separator, or that ends in `.json`), for
+/// A scene of the catalog or of a file (a name with a separator, or that ends in `.json`), for
 /// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
 pub fn open_scene(
     name: &str,

@@ -1,4 +1,4 @@
-//! Performance profiles: on how many scenes is a solver how close to the fastest?
+//! Performance profiles: the share of scenes that a solver solves within a factor of the fastest.
 //!
 //! **Source.** Dolan and Moré, "Benchmarking optimization software with performance profiles"
 //! (2002). Let t(p, s) be the least time in which any setting of the solver p holds and keeps an
@@ -8,17 +8,17 @@
 //! r(p, s) = t(p, s)/min over p of t(p, s),   ρ(p, τ) = share of scenes with r(p, s) ≤ τ
 //! ```
 //!
-//! ρ(p, 1) says how often p is fastest, ρ(p, ∞) how often it gets there at all. Scenes that
-//! nobody solves count too. A time that ties with the least counts as the least, so that
-//! noise does not decide who is fastest.
+//! ρ(p, 1) is the share of scenes on which p is fastest, ρ(p, ∞) the share that it solves at all. Scenes that no
+//! solver solves count as well. A time that ties with the smallest counts as the smallest, so that noise does not
+//! decide.
 
 use super::Record;
 use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
 use super::interleave::Sample;
 
-/// For each solver the least time of its `allowed` records of one scene, in times that of the fastest
-/// solver; a time that ties with the least is 1. None where no record is allowed.
+/// For each solver the least time of its `allowed` records of one scene, relative to that of the fastest solver; a
+/// time that ties with the least is 1. None where no record is allowed.
 pub fn times_of_fastest(
     scene: &[Record],
     solvers: &[&str],

@@ -1,14 +1,12 @@
-//! The solvers over all scenes, and how much of it survives.
+//! Ranking of the solvers over all scenes, and its robustness.
 //!
-//! On a scene, t(p) is the least time in which any setting of the solver p holds and keeps every
-//! tolerance of the scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest and for
-//! those that [tie](super::compare) with it, ½ for one that takes twice as long, 0 for one that is
-//! never good enough. The score of a solver is its mean speed over all scenes, and a scene that nobody
-//! solves lowers every score alike.
+//! On a scene, t(p) is the least time in which any setting of the solver p holds and keeps every tolerance of the
+//! scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest and for those that [tie](super::compare) with
+//! it, ½ for one that takes twice as long, 0 for one that is never good enough. The score of a solver is its mean
+//! speed over all scenes, and a scene that no solver solves lowers every score alike.
 //!
-//! Which scenes there are, and how strict they are, is somebody's choice. So every score has a range: over the
-//! studies that leave one scene out, and those with half and twice the tolerances. Who is not first in all of
-//! them does not [lead](Ranking::leader).
+//! The choice of scenes and tolerances is arbitrary. So every score has a range: over all studies without one scene,
+//! and with half or twice the tolerances. Only a solver that is first in all of them [leads](Ranking::leader).
 
 use super::Record;
 use super::curve::solvers_of;

@@ -1,4 +1,4 @@
-//! What a study finds: a record per setting, and which records are on a front.
+//! Results of a study: one record per setting, and which records are on a Pareto front.
 
 use super::curve::ErrorAxis;
 use super::interleave::Sample;
@@ -46,7 +46,7 @@ pub struct Record {
     /// Times and counts; none if the run failed.
     #[serde(alias = "lap")]
     pub sample: Option<Sample>,
-    /// Times faster than one coloured lane; none without that run.
+    /// Times faster than one colored lane; none without that run.
     pub speed_up: Option<f64>,
     /// Errors, the same for all widths; none if the run failed.
     pub errors: Option<Errors>,
@@ -58,10 +58,10 @@ pub struct Record {
     /// The first demand of the scene that was not met.
     #[serde(rename = "holds", with = "holding")]
     pub broken: Option<Broken>,
-    /// What nobody checked, in words.
+    /// Conditions that were not checked, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
-    /// What happened when it was run on, for as long as the scene deserves; none if it was not.
+    /// Result of the extended run; none without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub later: Option<Later>,
     /// Whether this width ended in the same bits as the error run.
@@ -72,7 +72,7 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
-/// What holds is `"yes"` in files; what does not has its word and its step.
+/// In files `"yes"` if the run holds, otherwise the failure and its step.
 mod holding {
     use super::Broken;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -121,7 +121,7 @@ impl Record {
         self.sample.as_ref().map_or(f64::INFINITY, Sample::cost_ns)
     }
 
-    /// What went wrong after the end of the run, in words; none if nothing did, or nobody looked.
+    /// Failure after the end of the run, in words; none if there was none, or without an extended run.
     pub fn fails_later(&self) -> Option<String> {
         let later = self.later?;
         if let Some(broken) = later.broken {
@@ -178,7 +178,7 @@ impl Record {
     }
 }
 
-/// How far a run was from a known truth.
+/// Distance of a run from a reference value.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TruthError {
     /// What is known.
@@ -214,17 +214,17 @@ pub struct Fronts {
     pub truth: bool,
 }
 
-/// Where and when a run left all bounds.
+/// Body and step at which a run diverged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Failure {
     /// Step, from 1.
     pub step: u64,
     /// Body index.
     pub body: usize,
-    /// What of it is out of bounds.
+    /// Which quantity is out of bounds.
     #[serde(default)]
     pub quantity: Quantity,
-    /// What was broken.
+    /// The violated criterion.
     #[serde(default)]
     pub criterion: Criterion,
     /// m/s or rad/s; none where it is not a finite number.
@@ -285,7 +285,7 @@ pub(crate) mod tests {
     use crate::lab::scenes::{Scene, SceneBody, SceneShape};
     use crate::lab::study::interleave::Load;
 
-    /// A record of `stack:2` by `pgs` in colours, with a time (µs) and a penetration (m).
+    /// A record of `stack:2` by `pgs` in colors, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
         let sample = Sample {
             mean_ns: 1e3 * time,
@@ -333,7 +333,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Those of a box of a metre that nobody said has to rest.
+    /// Those of a box of a meter that nobody said has to rest.
     pub fn tolerances() -> Tolerances {
         let body = SceneBody::dynamic([0.0, 0.0], SceneShape::rectangle(0.5, 0.5));
         Tolerances::standard(&Scene::new("x", vec![body]))

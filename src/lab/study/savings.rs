@@ -1,4 +1,4 @@
-//! Savings from specialisation: what the kernels of a scene gain by leaving out features that the
+//! Savings from specialization: what the kernels of a scene gain by leaving out features that the
 //! scene does not have.
 //!
 //! A scene's features choose the kernel. Here each feature that a scene is without is forced on,

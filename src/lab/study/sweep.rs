@@ -2,7 +2,7 @@
 //!
 //! The quantity belongs to solvers (a parameter), to the budget, or to the scene. Solvers that do not have
 //! it take no part. Where the step changes, runs keep their duration; where friction changes, the scene has
-//! no reference value, because those of the catalogue hold for a scene's own friction.
+//! no reference value, because those of the catalog hold for a scene's own friction.
 
 use super::budget::{self, BudgetGrid};
 use crate::engine::params::{Budget, Parameters};
@@ -19,7 +19,7 @@ use std::str::FromStr;
 /// Most values of a sweep.
 const MOST: usize = 100;
 
-/// What can vary besides the parameters of solvers: name, unit, whose it is.
+/// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
 const QUANTITIES: [(&str, &str, Kind); 8] = [
     ("substeps", "", Kind::Substeps),
     ("iterations", "", Kind::Iterations),
@@ -159,7 +159,7 @@ impl Sweep {
         ];
         for (option, list, kinds) in lists {
             if list.len() > 1 {
-                let message = format!("{} values, where a sweep takes one", list.len());
+                let message = format!("{} values, but a sweep needs one", list.len());
                 return Err(Error::invalid(format!("--{option}"), message));
             }
             if !list.is_empty() && kinds.contains(&self.kind) {

@@ -20,7 +20,7 @@ const FRAMES: u32 = 300;
 
 /// The runs to play (none of a sweep, whose scenes differ): of the scene on which as many solvers hold as fail, the cheapest setting within
 /// tolerance or nearest to it, then those that broke, then others that hold; each of another solver.
-/// Empty where nothing was run in colours on a small scene.
+/// Empty where nothing was run in colors on a small scene.
 pub fn telling(records: &[Record]) -> Vec<&Record> {
     if records.iter().any(|r| r.swept.is_some()) {
         return Vec::new();

@@ -12,12 +12,12 @@ use std::f64::consts::TAU;
 pub struct Family {
     /// On the command line and in tables.
     pub name: &'static str,
-    /// What is hard about it.
+    /// The difficulty, in words.
     pub summary: &'static str,
     draw: fn(&mut Pcg64Mcg) -> Draft,
 }
 
-/// What a family draws.
+/// Draws a scene of the family.
 struct Draft {
     room: Room,
     /// Besides the walls.
@@ -32,7 +32,7 @@ struct Draft {
 
 /// Every family.
 pub const FAMILIES: &[Family] = &[
-    Family { name: "drops", summary: "mixed shapes that fall on each other", draw: drops },
+    Family { name: "drops", summary: "mixed shapes dropped on each other", draw: drops },
     Family { name: "ratios", summary: "stacks of boxes with masses from 1 to 10 000", draw: ratios },
     Family {
         name: "fast",
@@ -46,8 +46,8 @@ pub const FAMILIES: &[Family] = &[
     },
     Family { name: "driven", summary: "kinematic pistons, doors and stirrers", draw: driven_bodies },
     Family { name: "overlaps", summary: "bodies that start inside each other", draw: overlaps },
-    Family { name: "extremes", summary: "steps, substeps and gravity far from usual", draw: extremes },
-    Family { name: "scales", summary: "centimetres beside a hundred metres", draw: scales },
+    Family { name: "extremes", summary: "unusual steps, substeps and gravity", draw: extremes },
+    Family { name: "scales", summary: "centimeters beside a hundred meters", draw: scales },
     Family { name: "slender", summary: "plates and needles in layers", draw: slender },
     Family { name: "far", summary: "mixed shapes 10 km from the origin", draw: far },
 ];
@@ -56,7 +56,7 @@ impl Family {
     /// Scene `number` of a campaign with this seed. The same for ever: what was drawn before does not matter.
     pub fn case(&self, seed: u64, number: u32) -> Case {
         let place = FAMILIES.iter().position(|f| f.name == self.name).unwrap_or(0) as u64;
-        // Neighbours in any of the three begin far apart: odd factors of a Weyl sequence.
+        // Neighbors in any of the three begin far apart: odd factors of a Weyl sequence.
         let mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (place << 32 | u64::from(number)).wrapping_mul(0xd1b5_4a32_d192_ed03);
         let Draft { room, bodies, gravity, dt, seconds, rests, substeps } =

@@ -10,7 +10,7 @@ use crate::lab::metrics::state::BodyState;
 use glam::DVec2;
 
 /// Energy, in what was lent, from which on some came from nowhere. The bound is generous where nothing is driven, see
-/// [`Ledger`], and what discretisation adds to a fall in long steps is less than a third.
+/// [`Ledger`], and what discretization adds to a fall in long steps is less than a third.
 pub const ENERGY: f64 = 1.5;
 
 /// Speed, in the fastest that free fall, start and kinematic bodies give, from which on a body was flung. A lever or a
@@ -191,7 +191,7 @@ fn height_energy(room: &Room, body: &BodyState, position: DVec2) -> f64 {
     -body.force.dot(position - DVec2::new(corner(0), corner(1)))
 }
 
-/// Farthest point of each body from its centre of mass (m).
+/// Farthest point of each body from its center of mass (m).
 fn reaches(world: &World) -> Vec<f64> {
     let mut reaches = vec![0.0_f64; world.bodies.len()];
     for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {

@@ -4,7 +4,7 @@ use super::{Case, Outcome, Verdict};
 use crate::engine::bodies::BodyKind;
 use crate::lab::error::Error;
 
-/// Runs that a minimisation may take.
+/// Runs that a minimization may take.
 const MOST_RUNS: u32 = 150;
 
 /// Steps that stay after the one at which a fault was seen.

@@ -1,26 +1,28 @@
-//! A campaign: scenes drawn at random from families, and what no solver may do in any of them.
+//! Random scenes, drawn from families, and checks that every solver has to pass.
 //!
-//! A solver is tuned on scenes that somebody thought of. Here [`families`] draw others, by seed; each runs
-//! under every solver, and a [`judge`] looks on from outside, in double precision, at poses alone: whatever
-//! moves the bodies, this crate's solvers or another engine, is an [`Engine`] to it. What fails is
-//! [minimised](minimise) into a scene file.
+//! Solvers are tuned on known scenes. Here [`families`] draw others, by seed. Each runs under every solver, and a
+//! [`judge`] checks poses only, in double precision: it works for any [`Engine`], this crate's solvers or others.
+//! Failing scenes are [minimized](minimise) into scene files.
 //!
-//! | verdict | what is forbidden |
+//! | verdict | failure |
 //! |---|---|
-//! | diverged | a speed or a place out of all bounds |
-//! | energy | more energy than gravity, kinematic bodies and the start lend, see [`judge::Ledger`] |
-//! | flung | one body much faster than anything in the scene could make it |
+//! | diverged | a speed or a position out of bounds |
+//! | energy | more energy than gravity, kinematic bodies and the initial state provide, see [`judge::Ledger`] |
+//! | flung | a body much faster than anything in the scene can explain |
 //! | escaped | a body beyond the middle of the walls that close the scene |
 //! | sunk | at the end, two bodies past the middle of the thinner one |
-//! | restless | still in motion when nothing has driven it for seconds |
+//! | restless | still in motion after seconds without a drive |
 //!
-//! A step that takes longer than the time that it simulates is counted as late: it depends on the machine,
-//! so it is told and fails nothing.
+//! A step that takes longer than the time that it simulates counts as late. That depends on the machine, so it is
+//! reported but is not a failure.
 
 pub mod families;
+#[doc(hidden)]
 pub mod judge;
 pub mod minimise;
+#[doc(hidden)]
 pub mod shapes;
+#[doc(hidden)]
 pub mod table;
 
 use crate::engine::solvers::Variant;
@@ -31,20 +33,20 @@ use families::{FAMILIES, Family};
 use judge::Judge;
 use std::time::Instant;
 
-/// A scene with what is demanded of it.
+/// A scene with its conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// [`Family::name`].
     pub family: &'static str,
-    /// Which of its scenes, from 0.
+    /// Number of the scene in its family, from 0.
     pub number: u32,
-    /// What is simulated.
+    /// The scene.
     pub scene: Scene,
-    /// What closes it.
+    /// The walls around it.
     pub room: Room,
     /// Whether it should be at rest in its last second.
     pub rests: bool,
-    /// Substeps in the place of the solver's own, for solvers that take several.
+    /// Substeps instead of the solver's own, for solvers that take several.
     pub substeps: Option<u32>,
 }
 
@@ -59,15 +61,15 @@ pub struct Room {
     pub wall: f64,
 }
 
-/// What moves the bodies of a scene.
+/// An engine that moves the bodies of a scene.
 pub trait Engine {
     /// Advances by the scene's step. Errors: what is wrong, where the engine itself says that it diverged.
     fn step(&mut self) -> Result<(), String>;
-    /// Centre of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
+    /// Center of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
     fn pose(&self, body: usize) -> [[f64; 2]; 2];
 }
 
-/// What no solver may do, in the order in which a run is named after it.
+/// Failures, in order of precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -120,7 +122,7 @@ pub struct Fault {
     pub body: Option<usize>,
 }
 
-/// What became of a scene under a solver.
+/// Result of a scene under a solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outcome {
     /// The first of each verdict, in their order.
@@ -158,9 +160,9 @@ pub struct Row {
     pub family: String,
     /// Which of its scenes.
     pub number: u32,
-    /// Who ran it, with what was chosen beside its defaults.
+    /// The solver, with options that differ from its defaults.
     pub solver: String,
-    /// What became of it.
+    /// Its result.
     pub outcome: Outcome,
 }
 

@@ -12,7 +12,7 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "0.1 %, as for A1",
         tip,
-        Yes("springs are stiff against the weight of one body"),
+        Yes("the springs are stiff compared with the weight of one body"),
     ),
     Case::new(
         "A25.overhang",
@@ -20,11 +20,11 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "1e-3 of its length",
         overhang,
-        Yes("springs are stiff against the weight of one body"),
+        Yes("the springs are stiff compared with the weight of one body"),
     ),
     Case::new(
         "A25.ladder",
-        "least friction of the ground under a ladder at a smooth wall, tan φ/2",
+        "smallest ground friction that holds a ladder against a frictionless wall, tan φ/2",
         "1",
         "1 %, as for B10",
         ladder,
@@ -32,19 +32,19 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A25.groove",
-        "loads of a frictionless disc in a groove of 30° and 50°, worse of two",
+        "loads of a frictionless disc in a groove of 30° and 50°, larger error",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         groove,
         Yes("two rows of one body converge in a few warm-started steps"),
     ),
     Case::new(
         "A25.scale",
-        "worlds of boxes of 1 mm to 100 m whose stack of five rests after five times √(H/g)",
+        "sizes, 1 mm to 100 m, at which a stack of five boxes rests after 5 √(H/g)",
         "m",
-        "all are to hold",
+        "all have to hold",
         scale,
-        Yes("springs are as stiff as the substep rate, not as a length, allows"),
+        Yes("stiffness follows from the substep rate, not from a length"),
     ),
 ];
 
@@ -103,7 +103,7 @@ fn groove(lab: &Lab) -> Result<Finding, Failure> {
         SceneBody::fixed([0.5 * sin, -0.5 * cos], SceneShape::rectangle(10.0, 0.5).friction(0.0))
             .turned(angle)
     };
-    // Its centre is half a metre from both faces.
+    // Its center is half a meter from both faces.
     let (na, nb) = ([alpha.sin(), alpha.cos()], [-beta.sin(), beta.cos()]);
     let determinant = na[0] * nb[1] - na[1] * nb[0];
     let at = [0.5 * (nb[1] - na[1]) / determinant, 0.5 * (na[0] - nb[0]) / determinant];

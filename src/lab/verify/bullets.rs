@@ -8,23 +8,23 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A28.wall",
-        "how far bodies of 5 cm at 300 m/s get into a wall of 1 cm, worst of shapes and of times within a step",
+        "penetration of 5 cm bodies at 300 m/s into a 1 cm wall, worst of shapes and of impact times within a step",
         "m",
-        "slop: a contact, and not the other side",
+        "the slop: a contact, not a passage",
         wall,
-        Yes("with continuous collision a step ends where a body would pass a surface"),
+        Yes("with continuous collision a body stops where it would pass through a surface"),
     ),
     Case::new(
         "A28.plate",
-        "how far a bullet of 5 cm at 300 m/s gets into a dynamic plate of 1 cm that is a thousand times as heavy",
+        "penetration of a 5 cm bullet at 300 m/s into a dynamic 1 cm plate of 1000 times its mass",
         "m",
         "slop, as above",
         plate,
-        Yes("bullets end their step at dynamic bodies, too"),
+        Yes("bullets stop at dynamic bodies as well"),
     ),
 ];
 
-/// Metres per step: 300 m/s at 60 Hz.
+/// Meters per step: 300 m/s at 60 Hz.
 const WAY: f64 = 5.0;
 
 /// Deepest that the far side of what is thrown from the left gets beyond x = 0, where the target's near side is.

@@ -31,15 +31,13 @@ pub(super) static CASES: &[Case] = &[
         "N",
         "1 %",
         train,
-        Yes(
-            "a wall that is faster in every step is an impact in every step, and spreads along the row before it",
-        ),
+        Yes("an accelerating wall is an impact in every step, which spreads along the row before the step"),
     ),
     Case::new(
         "A23.shake",
         "gap or overlap under a box on a platform that shakes at g/2, all steps",
         "m",
-        "what the platform moves beside its parabola in a step, a dt²/2",
+        "how far the platform leaves its parabola in a step, a dt²/2",
         shake,
         Yes("one body: its rows converge within a step"),
     ),
@@ -53,15 +51,15 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A23.paddle",
-        "speed of an elastic disc off a paddle that comes towards it",
+        "rebound speed of an elastic disc from an approaching paddle",
         "m/s",
         "1e-5 of 8 m/s: exact in f32",
         paddle,
-        Yes("rebounds are of the velocity between both surfaces"),
+        Yes("rebounds use the relative velocity of the surfaces"),
     ),
     Case::new(
         "A24.belt",
-        "speed of a disc that comes to roll on a belt",
+        "speed of a disc once it rolls on a belt",
         "m/s",
         "0.5 %, as for A3",
         belt,
@@ -73,7 +71,7 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "1 %, as for A2",
         tiles,
-        Yes("faces that would only graze each other are no contact"),
+        Yes("faces that only graze each other make no contact"),
     ),
     Case::new(
         "A24.seams",
@@ -81,7 +79,7 @@ pub(super) static CASES: &[Case] = &[
         "m/s, m",
         "1e-3",
         seams,
-        Yes("gaps of circles are those at the end of their way"),
+        Yes("gaps of circles are taken at their closest approach"),
     ),
 ];
 

@@ -11,11 +11,11 @@ use rand::seq::SliceRandom;
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "B1.loads",
-        "loads in a column of ten discs, worst of all contacts",
+        "loads in a column of ten discs, worst contact",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         disc_loads,
-        Yes("cos²(π/20) per sweep leaves nothing after 20 s"),
+        Yes("cos²(π/20) per sweep leaves no error after 20 s"),
     ),
     Case::new(
         "B2.depths",
@@ -39,49 +39,51 @@ pub(super) static CASES: &[Case] = &[
         "B2.bound",
         "worst overlap in a column of 15 discs, over the slop or F/(m ω²)",
         "1",
-        "the bound and 1 % for what is left of the approach",
+        "the bound, and 1 % for what remains of the transient",
         depth_bound,
         Yes("the spring's fixed point"),
     ),
     Case::new(
         "B5.loads",
-        "loads in a stack of ten boxes, worst of all contacts",
+        "loads in a stack of ten boxes, worst contact",
         "N",
-        "what the jitter limit does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         box_loads,
-        Yes("stands below 14 boxes (Greenhill), and cos²(π/20) per sweep leaves nothing after 20 s"),
+        Yes(
+            "below the buckling height of 14 boxes (Greenhill); cos²(π/20) per sweep leaves no error after 20 s",
+        ),
     ),
     Case::new(
         "B5.drift",
-        "greatest movement in a stack of twenty boxes, 15 s to 20 s",
+        "largest displacement in a stack of twenty boxes, 15 s to 20 s",
         "m",
-        "list: 1e-3 m",
+        "1e-3 m",
         drift,
-        Yes("required by the list of cases; it exceeds what 30 Hz contacts hold: see the promises"),
+        Yes("required although contacts of 30 Hz cannot hold it: see the promises"),
     ),
     Case::new(
         "B5.jitter",
-        "its greatest rms speed",
+        "its largest rms speed",
         "m/s",
-        "list: 1e-4 m/s",
+        "1e-4 m/s",
         jitter,
-        Yes("required by the list of cases; it exceeds what 30 Hz contacts hold: see the promises"),
+        Yes("required although contacts of 30 Hz cannot hold it: see the promises"),
     ),
     Case::new(
         "B5.height",
-        "highest stack that rests after 20 s (below: m off its axis)",
+        "tallest stack that rests after 20 s (table below: distance from the axis, m)",
         "boxes",
-        "the list's 60 are to stand",
+        "60 boxes have to stand",
         height,
-        Yes("springs are stiffer than those on which the column would buckle"),
+        Yes("loads are fed forward, so a lean decays"),
     ),
     Case::new(
         "B22.order",
-        "spread of first velocities in a column over 32 orders, at 500 times the sweeps",
+        "spread of the velocities of a column's first step over 32 constraint orders, at 500 times the sweeps",
         "m/s",
-        "1e-5 of g dt: none, in f32",
+        "1e-5 of g dt: zero in f32",
         order_converged,
-        Yes("the velocities are unique and 0.9045 per sweep converges"),
+        Yes("the velocities are unique, and a rate of 0.9045 per sweep converges"),
     ),
 ];
 
@@ -115,7 +117,7 @@ fn load_error(world: &World, count: usize) -> f64 {
     let dt = f64::from(world.settings.dt);
     let mut found = vec![0.0; count];
     for c in &world.contacts {
-        // Body 0 is the ground; a contact of neighbours is named by the lower one.
+        // Body 0 is the ground; a contact of neighbors is named by the lower one.
         if let Some(load) = found.get_mut(c.body_a.min(c.body_b) as usize) {
             *load += normal_impulse(c) / dt;
         }
@@ -175,7 +177,7 @@ impl Stack {
     fn finding(&self, value: f64, tolerance: f64) -> Finding {
         let measured = if self.stands { value } else { f64::INFINITY };
         Finding::new(measured, 0.0, tolerance)
-            .note(format!("{:.1e} m off the axis at most, {:.1e} m/s", self.sideways, self.speed))
+            .note(format!("at most {:.1e} m from the axis, {:.1e} m/s", self.sideways, self.speed))
     }
 }
 

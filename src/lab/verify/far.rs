@@ -10,16 +10,16 @@ pub(super) static CASES: &[Case] = &[
         "distance of ten boxes at 1 km to their twins at the origin, all steps",
         "m",
         "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
-        kilometre,
-        Yes("contacts see differences of positions, taken before they are rounded"),
+        kilometer,
+        Yes("contacts use differences of positions, taken before rounding"),
     ),
     Case::new(
         "B15.far",
-        "greatest distance from the origin with the same trajectory",
+        "largest distance from the origin with the same trajectory",
         "m",
-        "1e5 m is to hold, with the tolerance of B15.kilometre",
+        "1e5 m has to hold, with the tolerance of B15.kilometre",
         distance,
-        Yes("contacts see differences of positions, taken before they are rounded"),
+        Yes("contacts use differences of positions, taken before rounding"),
     ),
 ];
 
@@ -33,8 +33,8 @@ fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
     lab.catalog(&format!("far_stack:{exponent}"), 10.0 * ROUNDING)
 }
 
-/// B15. At a kilometre, where the spacing of `f32`s is 6.1e-5 m.
-fn kilometre(lab: &Lab) -> Result<Finding, Failure> {
+/// B15. At a kilometer, where the spacing of `f32`s is 6.1e-5 m.
+fn kilometer(lab: &Lab) -> Result<Finding, Failure> {
     twins(lab, 3)
 }
 

@@ -10,11 +10,11 @@ use std::f64::consts::FRAC_PI_3;
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A27.oblique",
-        "velocities after an oblique collision of discs at 10 m/s with e = 1, 1/2 and 0, worst of ten times within a step, over the first",
+        "velocities after an oblique collision of discs at 10 m/s with e = 1, 1/2 and 0, worst of ten impact times within a step, over the first",
         "1",
-        "1 %: one law or the other",
+        "1 %: far less than the difference between the laws",
         oblique,
-        Yes("round shapes have the frame of the moment of touch"),
+        Yes("round shapes use the contact frame at the moment of touch"),
     ),
     Case::new(
         "A27.rest",
@@ -22,27 +22,27 @@ pub(super) static CASES: &[Case] = &[
         "s",
         "flights shorter than two steps: 2 dt/(1 - e)",
         rest,
-        Yes("bodies fly on to where they are hit, and from there"),
+        Yes("flight before and after the impact is split at its time"),
     ),
     Case::new(
         "A27.edges",
-        "spin of a hexagon and of boxes that come down on their next edge, over the law, worst",
+        "spin of a hexagon and of boxes after they land on their next edge, over the exact value, worst",
         "1",
         "1e-3, as for A19.flat",
         edges,
-        Yes("both edges are looked at together, and the old one is free to leave"),
+        Yes("both edges are solved together, and the old one may separate"),
     ),
     Case::new(
         "A27.energy",
-        "energy that a rough plastic impact through three bodies makes, over what there was",
+        "energy gained by a plastic impact with friction through three bodies, relative",
         "1",
-        "1e-3: none, as for A19.flat",
+        "1e-3, as for A19.flat: none",
         energy,
-        Yes("each row knows all that its impulses do"),
+        Yes("each row accounts for all effects of its impulses"),
     ),
     Case::new(
         "A27.rod",
-        "velocity and spin of a rod at 45° after a rough bounce, where Newton and Coulomb make energy, worst",
+        "velocity and spin of a rod at 45° after a bounce with friction, where Newton's and Coulomb's laws together gain energy, worst",
         "m/s",
         "1e-4, as for A20.corner",
         rod,
@@ -88,7 +88,7 @@ fn rest(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// A27. A body turns about a corner A with ω until its next corner B meets the ground, which is rough: about B its angular momentum
-/// stays, and A is free to leave. With both at d left and right of below the centre and the centre h above the ground, it is
+/// stays, and A is free to leave. With both at d left and right of below the center and the center h above the ground, it is
 /// I ω + m (h² − d²) ω before and (I + m (h² + d²)) ω' after: 11/17 of the spin for a hexagon, 1 − 3/2 sin² α for a box.
 fn edges(lab: &Lab) -> Result<Finding, Failure> {
     let hexagon: Vec<[f64; 2]> =
@@ -114,7 +114,7 @@ fn edges(lab: &Lab) -> Result<Finding, Failure> {
         world.step()?;
         let kept = spin(&world, 1) / -rate;
         worst = largest([worst, (kept - truth).abs()]);
-        note += &format!("{kept:.5} for {truth:.5}; ");
+        note += &format!("{kept:.5} instead of {truth:.5};  ");
     }
     Ok(Finding::new(worst, 0.0, 1e-3).note(note.trim_end_matches("; ")))
 }
@@ -145,7 +145,7 @@ fn energy(lab: &Lab) -> Result<Finding, Failure> {
 fn rod(lab: &Lab) -> Result<Finding, Failure> {
     let (half, thin, mu) = (1.0f64, 0.02f64, 1.0);
     let inertia = (half * half + thin * thin) / 3.0;
-    // Its lowest corner, about the centre.
+    // Its lowest corner, about the center.
     let diagonal = 0.5f64.sqrt();
     let [x, y] = [diagonal * (thin - half), -diagonal * (half + thin)];
     // n = (0, 1) and t = (1, 0): of an impulse (N, T) the corner gains k (N, T).
@@ -186,5 +186,5 @@ fn rod(lab: &Lab) -> Result<Finding, Failure> {
         let off = [vx - truth[0], vy - truth[1], w - truth[2]];
         worst = largest(off.map(f64::abs).into_iter().chain([worst]));
     }
-    Ok(Finding::new(worst, 0.0, 1e-4).note(format!("Newton and Coulomb make up to {gain:.2} J")))
+    Ok(Finding::new(worst, 0.0, 1e-4).note(format!("Newton's and Coulomb's laws gain up to {gain:.2} J")))
 }

@@ -18,21 +18,21 @@ pub(super) static CASES: &[Case] = &[
         "A6.elastic",
         "apexes of twenty elastic bounces from 1 m, worst",
         "m",
-        "list: 0.5 %",
+        "0.5 %",
         elastic,
         Yes("the rebound keeps the discrete energy of flight"),
     ),
     Case::new(
         "A6.flat",
-        "apexes of five elastic bounces of a box that falls flat from 1 m, and its turn at its corner, worst",
+        "apexes of five elastic bounces of a box dropped flat from 1 m, and the displacement of its corner by rotation, worst",
         "m",
-        "list: 0.5 %",
+        "0.5 %",
         flat_bounces,
         Yes("both corners bounce at once"),
     ),
     Case::new(
         "A7.oblique",
-        "speeds after an oblique elastic collision, worse of two",
+        "speeds after an oblique elastic collision, larger error",
         "m/s",
         "1e-5 of 2 m/s: exact in f32",
         oblique,
@@ -42,89 +42,89 @@ pub(super) static CASES: &[Case] = &[
         "A17.billiards",
         "change of kinetic energy over 1e4 elastic collisions, over the first",
         "1",
-        "list: 1e-3",
+        "1e-3",
         billiards,
-        Yes("impacts come before the step, so that discs hardly overlap"),
+        Yes("impacts are solved before the step, so discs hardly overlap"),
     ),
     Case::new(
         "A18.sequence",
         "speed of the last of five discs with small gaps, over the first's",
         "1",
-        "1 %: one law or the other",
+        "1 %: far less than the difference between the laws",
         cradle_sequence,
-        Yes("impacts run from body to body in waves"),
+        Yes("impacts spread from body to body in waves"),
     ),
     Case::new(
         "A18.law",
         "distance of the outcome of three touching discs to the nearer of two laws",
         "1",
-        "1 %: one law or the other",
+        "1 %: far less than the difference between the laws",
         cradle_law,
-        Yes("impacts run from body to body in waves"),
+        Yes("impacts spread from body to body in waves"),
     ),
     Case::new(
         "A18.energy",
         "largest gain of energy in four cradles, over the first's",
         "1",
-        "1e-5: none, in f32",
+        "1e-5: zero in f32",
         cradle_energy,
-        Yes("an impact between two smooth bodies makes no energy, and waves are such impacts"),
+        Yes("a frictionless impact of two bodies gains no energy, and waves consist of such impacts"),
     ),
     Case::new(
         "A19.disc",
-        "velocities after a rough oblique impact of a disc, worst of e and µ",
+        "velocities after an oblique impact of a disc with friction, worst of e and µ",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         rough_disc,
-        Yes("friction of an impact is bounded by all of its normal impulse"),
+        Yes("friction of an impact is bounded by its whole normal impulse"),
     ),
     Case::new(
         "A19.corner",
-        "velocities after a rough oblique impact of a corner, worst of e and µ",
+        "velocities after an oblique impact of a corner with friction, worst of e and µ",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         rough_corner,
-        Yes("normal and tangential impulse of an impact are found together"),
+        Yes("normal and tangential impulses of an impact are solved together"),
     ),
     Case::new(
         "A19.fallen",
-        "the same of a disc that comes from above, and meets the ground anywhere within a step",
+        "the same for a disc that falls and lands at any time within a step",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         fallen_disc,
-        Yes("against a body that does not move, arms end at the own surface"),
+        Yes("on a static body the contact point lies on the other body's surface"),
     ),
     Case::new(
         "A19.caught",
-        "the same of a corner",
+        "the same for a corner",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         fallen_corner,
-        Yes("against a body that does not move, arms end at the own surface"),
+        Yes("on a static body the contact point lies on the other body's surface"),
     ),
     Case::new(
         "A19.plastic",
-        "the same of a disc and of a corner without restitution, from touch",
+        "the same for a disc and a corner without restitution, starting in contact",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         plastic,
-        Yes("what comes in without restitution is stopped before the step, both rows at once"),
+        Yes("plastic impacts are solved before the step, both rows at once"),
     ),
     Case::new(
         "A19.landed",
-        "the same from above, whenever within a step they meet the ground",
+        "the same after a fall, landing at any time within a step",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         landed,
-        Yes("what comes in without restitution is stopped before the step, both rows at once"),
+        Yes("plastic impacts are solved before the step, both rows at once"),
     ),
     Case::new(
         "A19.flat",
-        "velocities of a rough box that lands flat at 4 m/s and 3 m/s along the ground, worst of height and µ",
+        "velocities of a box with friction that lands flat at 4 m/s and 3 m/s along the ground, worst of height and µ",
         "m/s",
-        "1e-3 of 4 m/s: where impulses stop to spread, and soft contacts do the rest",
+        "1e-3 of 4 m/s: the tolerance at which impacts stop spreading; soft contacts do the rest",
         flat_landing,
-        Yes("both points of a face are hit, and no spin comes of it unless one lets go"),
+        Yes("both points of a face are hit; spin arises only if one of them separates"),
     ),
 ];
 
@@ -243,7 +243,7 @@ fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(gain, 0.0, 1e-5))
 }
 
-/// A body of 1 kg that touches the ground with one point, `arm` from its centre (m), and comes in at
+/// A body of 1 kg that touches the ground with one point, `arm` from its center (m), and comes in at
 /// `velocity` (m/s).
 struct Rough {
     shape: SceneShape,
@@ -376,7 +376,7 @@ fn disc() -> Rough {
     }
 }
 
-/// A19. A unit square on a corner, 20° to the left of below its centre.
+/// A19. A unit square on a corner, 20° to the left of below its center.
 fn rough_corner(lab: &Lab) -> Result<Finding, Failure> {
     rough_impact(lab, corner)
 }

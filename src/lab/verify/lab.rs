@@ -1,4 +1,4 @@
-//! Where cases are run: worlds of one solver, and readings of their state in `f64`.
+//! Tools of the cases: worlds of one solver, and measurements of their state in `f64`.
 
 use super::{Failure, Finding, Sweep, SweepRow};
 use crate::engine::bodies::BodyKind;
@@ -72,18 +72,19 @@ impl Lab {
         Ok(world)
     }
 
-    /// Runs a scene of the catalogue over its own length; the measured value is the error that
+    /// Runs a scene of the catalog over its own length; the measured value is the error that
     /// its truth's observer sees.
     pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Result<Finding, Failure> {
         let loaded = scenes::load(name)?;
-        let mut truth = loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no truth")))?;
+        let mut truth =
+            loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no reference value")))?;
         let seconds = f64::from(loaded.scene.steps) * loaded.scene.dt;
         self.run(loaded.scene, seconds, |world| truth.observer.observe(world))?;
         let error = truth.observer.error().ok_or_else(|| Failure::Unmeasured("nothing observed".into()))?;
         Ok(Finding::new(error, 0.0, tolerance))
     }
 
-    /// A scene of the catalogue, to be watched by a case's own eyes.
+    /// A scene of the catalog, to be watched by a case's own eyes.
     pub(super) fn scene(&self, name: &str) -> Result<Scene, Failure> {
         Ok(scenes::load(name)?.scene)
     }
@@ -122,7 +123,7 @@ pub(super) fn time(world: &World) -> f64 {
     world.step_index as f64 * f64::from(world.settings.dt)
 }
 
-/// Centre of mass of body `i` (m).
+/// Center of mass of body `i` (m).
 pub(super) fn center(world: &World, i: usize) -> [f64; 2] {
     world.bodies.center(i)
 }
@@ -310,7 +311,7 @@ pub(super) fn ground(half: f64, friction: f64) -> SceneBody {
     SceneBody::fixed([0.0, 0.0], SceneShape::line(half).friction(friction))
 }
 
-/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its centre
+/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its center
 /// `height` above it (m).
 pub(super) fn on_slope(angle: f64, friction: f64, shape: SceneShape, height: f64) -> Scene {
     let (sin, cos) = angle.sin_cos();

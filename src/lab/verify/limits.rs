@@ -13,21 +13,19 @@ pub(super) static CASES: &[Case] = &[
         "m",
         "A1.stick: 1e-4 m",
         deck,
-        Yes(
-            "impulses begin with the loads of statics, whose friction has the part of its cone that it needs at all points",
-        ),
+        Yes("impulses start from the loads of statics, which spread friction evenly over the points"),
     ),
     Case::new(
         "B24.bricks",
-        "overhang of eight bricks at which they fall, over L/2 (1 + 1/2 + … + 1/8)",
+        "overhang at which eight bricks fall, over L/2 (1 + 1/2 + … + 1/8)",
         "1",
         "0.1 %, as for A1",
         bricks,
-        Yes("two points have the preload of their own loads, and no joint turns"),
+        Yes("each point's spring is shortened by the sag of its own load, so no joint turns"),
     ),
     Case::new(
         "B24.logs",
-        "least friction under three logs, and between them, over (2 − √3)/3 and 2 − √3, worse of two",
+        "smallest friction under and between three stacked logs, over (2 − √3)/3 and 2 − √3, larger error",
         "1",
         "1 %, as for B10",
         logs,
@@ -35,9 +33,9 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "B24.shaft",
-        "loads of two frictionless discs in a shaft, on floor, walls and each other, worst",
+        "loads of two frictionless discs in a shaft (floor, walls, each other), worst",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         shaft,
         Yes("two bodies: their four rows converge in a few warm-started steps"),
     ),
@@ -59,7 +57,7 @@ fn deck(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(off), 0.0, 1e-4))
 }
 
-/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their centre of mass over its edge.
+/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their center of mass over its edge.
 fn bricks(lab: &Lab) -> Result<Finding, Failure> {
     let (count, half, high) = (8, 1.0, 0.25);
     let found = bisect(0.9, 1.1, |part| {
@@ -97,7 +95,7 @@ fn logs(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 1.0, 0.01).note(format!("{below:.5} under, {beside:.5} between")))
 }
 
-/// B24. Discs of radius r in a shaft of width w touch with their line of centres at sin β = (w − 2 r)/2 r from the vertical: the
+/// B24. Discs of radius r in a shaft of width w touch with their line of centers at sin β = (w − 2 r)/2 r from the vertical: the
 /// floor bears 2 m g, each wall m g tan β, and they bear m g/cos β from each other.
 fn shaft(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, width) = (0.5, 1.6);

@@ -1,61 +1,61 @@
 //! Hard test cases with known analytic answers, run against every solver.
 //!
-//! A case runs a scene, reads one number from the state in `f64` and compares it with the
-//! truth. It does not know which solver ran. A new case is one function and one row in the file of
-//! its group; [`CASES`] has them all. Ids such as A5 or B12 are those of the list of hard cases.
+//! A case runs a scene, reads one number from the state in `f64` and compares it with the known answer. It does not
+//! know which solver ran. A new case is one function and one row in the file of its group; [`CASES`] has them all. An
+//! id is a family (A: few bodies, B: many) and a name.
 //!
 //! # Tolerances
 //!
-//! They come from the list of hard cases or from a derivation that stands in the row, never from
-//! what passes. What fails is shown as failing.
+//! They are requirements or follow from the derivation in the row, never from what passes. Failures are shown as
+//! failures.
 //!
 //! # What is required
 //!
-//! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], preloaded soft
-//! contacts in substeps) is required to pass, and which promise of its mathematics that rests on, or which it
-//! lacks. The exit code of `simpulse verify` requires exactly those. A required case that fails stays
-//! required.
+//! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], soft contacts in substeps,
+//! shortened by the loads of statics) is required to pass, and on which promise that rests, or which promise is
+//! missing. The exit code of `simpulse verify` requires exactly those. A required case that fails stays required.
 //!
 //! | promise | because |
 //! |---|---|
 //! | free motion is exact on its discrete formula | semi-implicit Euler |
 //! | one body slides, sticks and rolls by Coulomb's law once loads are warm | friction rows are rigid, solved last |
-//! | columns stand, whatever their height, as long as sweeps are left | springs beyond Southwell's bound |
+//! | columns stand | loads of statics are fed forward, at the places of the step, so a lean decays |
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
-//! | piles whose Gauss–Seidel rate leaves no error within the run come to rest | cos²(π/2N) and R/(1+R) per sweep |
-//! | overlap is pushed apart no faster than 3 m/s | the cap |
-//! | the distance from the origin and the length of a step do not matter | positions keep what their sums round away |
+//! | a pile comes to rest if the Gauss–Seidel rate leaves no error within the run | cos²(π/2N) and R/(1+R) per sweep |
+//! | overlap is pushed apart at 3 m/s at most | the push speed is limited |
+//! | the distance from the origin and the length of a step do not matter | positions keep their rounding error in a second float |
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
-//! | impacts run from body to body, with friction up to µ times all of their impulse | waves before the step, without restitution from each body that is pushed to those it touches |
-//! | impacts and pushes keep angular momentum | spins give back what the displacement of arms adds |
+//! | impacts spread from body to body, with friction up to µ times their whole impulse | waves before the step; a plastic impact spreads from each pushed body to those that it touches |
+//! | impacts and pushes keep angular momentum | spins are corrected for the displacement of the arms |
 //! | discs roll without lifting off | their contact points do not turn with them |
-//! | on a held body friction acts at the own surface, however deep | contact points lie there, and midway between two bodies that move |
-//! | discs feel only what they touch | their gaps are those at the end of their way |
+//! | on a static body friction acts at the moving body's surface, at any depth | contact points lie there, and midway between two dynamic bodies |
+//! | discs feel only what they touch | gaps of circles are taken at their closest approach |
 //! | scale does not matter | stiffness follows from the substep, no length enters |
 //!
 //! It does not promise:
 //!
 //! - One solution where the sweeps of a step have not converged.
-//! - Heavy loads on light bodies, before preload has followed: the depth F/(m ω²) itself may exceed the body.
+//! - Heavy loads on light bodies before their loads are known: the depth F/(m ω²) itself may exceed the body.
 //! - **High stacks of soft contacts.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
-//!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A
-//!   column of N links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam
-//!   does, at q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔. More iterations do not help; stiffer springs do, which
-//!   the default solver has up to 100 boxes.
-//! - **Friction in the first substep.** A box on a slope has contact points ½ m below its centre:
-//!   k = 1 + (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of what stops the box, and
-//!   turns it for the rest. Two sweeps with friction leave up to 0.6² g h sin θ, once, and friction
-//!   that exceeds tan θ by little takes long to stop that.
-//! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometre sees the
+//!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A column of N
+//!   links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam does, at q N³ = 7.837 K: N =
+//!   14.1, and N ∝ f^⅔. More iterations do not help; the loads that the default solver feeds forward do
+//!   (`papers/shim.md`).
+//! - **Friction in the first substep.** A box on a slope has contact points ½ m below its center: k = 1 + (½)²·6 =
+//!   2.5, so the impulse that stops the points is 1/2.5 of the one that stops the box; the rest turns it. Two sweeps
+//!   with friction leave up to 0.6² g h sin θ, once, and friction that exceeds tan θ by little takes long to stop
+//!   that.
+//! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometer sees the
 //!   side of the next tile (A24.tiles).
-//! - **Plastic impacts in crowds.** Where more than 32 contacts are hit at once, or impacts that run far are not
-//!   rare, sweeps do the rest: two in a substep, whose impulses are where the next one starts.
-//! - **What is carried round.** Within a step bodies move along tangents and contacts keep their normals: what a turning frame carries
-//!   creeps outwards (A26.turntable). What rolls on a round contact does so without lag under `shim` alone.
-//! - **Sudden loads.** The first substep begins with the impulses of the step before, of a load that has gone or wandered on (B23).
-//! - **The moment of an impact.** Between free bodies that are no discs it is the beginning of the step, with restitution.
-//! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as
-//!   corners do; a rounded body that is no disc and rolls by φ seems to lift off by r (1 − cos φ).
+//! - **Plastic impacts of many bodies.** Where an impact takes more visits than its bound, sweeps do the rest: two in
+//!   a substep, from whose impulses the next one starts.
+//! - **Rotating frames.** Within a step bodies move along tangents and contacts keep their normals: a body on a
+//!   turntable creeps outward (A26.turntable). Round contacts roll without lag under `shim` only.
+//! - **Sudden loads.** The first substep starts from the impulses of the previous step, even if their load was
+//!   removed or has moved to another contact (B23).
+//! - **The time of an impact.** Elastic impacts between free bodies other than discs happen at the start of the step.
+//! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as corners do; a rounded
+//!   body other than a disc that rolls by φ appears to lift off by r (1 − cos φ).
 
 mod balance;
 mod bullets;
@@ -89,19 +89,19 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Divergence;
 use crate::lab::error::Error;
 
-/// Which solvers a truth is the law of, as their rows tell.
+/// The solvers whose own law an answer follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LawOf {
     /// All of them.
     Everyone,
     /// Those whose contacts are springs at rest.
     Springs,
-    /// Those that sweep such contacts once per substep, whose every step the truth follows.
+    /// Those that sweep such contacts once per substep; the answer holds for each of their steps.
     SpringsSweptOnce,
 }
 
 impl LawOf {
-    /// Whether the truth is a law of this solver.
+    /// Whether the answer follows the law of this solver.
     pub fn includes(self, solver: &Variant) -> bool {
         let springs = solver.softness.is_some();
         match self {
@@ -111,7 +111,7 @@ impl LawOf {
         }
     }
 
-    /// For lists; empty for everyone.
+    /// Text for lists; empty for all solvers.
     pub fn text(self) -> &'static str {
         match self {
             LawOf::Everyone => "",
@@ -127,15 +127,15 @@ pub struct Case {
     pub id: &'static str,
     /// What is measured.
     pub summary: &'static str,
-    /// Of the measured value, the truth and the tolerance.
+    /// Unit of the measured value, the reference value and the tolerance.
     pub unit: &'static str,
-    /// Where the tolerance is from.
+    /// Source of the tolerance.
     pub tolerance: &'static str,
     /// Whether the default solver must pass, and why.
     pub required: Required,
-    /// The solvers whose own law the truth is.
+    /// The solvers whose own law the reference value follows.
     pub law_of: LawOf,
-    /// Runs it.
+    /// Runs the case.
     pub measure: Measure,
 }
 
@@ -178,18 +178,18 @@ impl Required {
     }
 }
 
-/// What a case measured.
+/// Result of a case.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Finding {
     /// As read from the run.
     pub measured: f64,
-    /// What it should have been.
+    /// The reference value.
     pub truth: f64,
-    /// How far off it may be, ≥ 0.
+    /// The tolerance, ≥ 0.
     pub tolerance: f64,
-    /// What else is worth knowing; often empty.
+    /// Further remarks; often empty.
     pub note: String,
-    /// Where the truth is a threshold, how it was found.
+    /// If the reference value is a threshold, the sweep that found it.
     pub sweep: Option<Sweep>,
 }
 
@@ -250,7 +250,7 @@ pub enum Failure {
     /// The simulation left all bounds.
     #[error("{0}")]
     Diverged(Divergence),
-    /// What should have been measured never happened.
+    /// The event to be measured never happened.
     #[error("not measured: {0}")]
     Unmeasured(String),
     /// The case itself is wrong.

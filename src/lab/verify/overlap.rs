@@ -19,47 +19,47 @@ pub(super) static CASES: &[Case] = &[
     .swept_once(),
     Case::new(
         "B3.apart",
-        "speed that two boxes keep that begin a fifth in each other, without weight",
+        "speed left when two weightless boxes that start overlapping by a fifth have separated",
         "m/s",
         "f32, as A17: 1e-6 √sweeps of the push speed of 3 m/s",
         apart,
-        Yes("what pushes is taken back: one contact, one block"),
+        Yes("relaxing takes the push back: one contact, one block"),
     ),
     Case::new(
         "B3.pile",
-        "ground load of a pile that started overlapping, last second of five",
+        "ground load of a pile that starts overlapping, last second of five",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         pile,
-        Yes("ten boxes: the rate of four rows leaves nothing after 5 s"),
+        Yes("ten boxes: the rate for four rows leaves no error after 5 s"),
     ),
     Case::new(
         "B19.peak",
-        "greatest rms speed in the over-full box",
+        "largest rms speed in a box with too many bodies",
         "m/s",
-        "every contact at the cap",
+        "every contact at the push speed",
         confined_peak,
-        Yes("the push is capped"),
+        Yes("the push speed is limited"),
     ),
     Case::new(
         "B19.decay",
-        "rms speed of the last second of ten, over the greatest",
+        "rms speed in the last second of ten, over the largest",
         "1",
         "a hundredth of the energy",
         confined_decay,
-        No("that it comes to rest follows from no promise: the problem has no solution"),
+        No("nothing promises that it comes to rest: the problem has no solution"),
     ),
     Case::new(
         "B19.share",
-        "greatest overlap over the mean",
+        "largest overlap over the mean",
         "1",
-        "list: below 3",
+        "below 3",
         confined_share,
-        Yes("springs bear a load however deep: the deepest pushes hardest"),
+        Yes("springs carry load at any depth: the deepest pushes hardest"),
     ),
 ];
 
-/// B3. A disc a quarter of a metre deep in the ground: the worst difference from the soft contact's own
+/// B3. A disc a quarter of a meter deep in the ground: the worst difference from the soft contact's own
 /// recovery over half a second, which a substep advances by d' = d − h min(γ β d, v_max) + γ_i g h²
 /// with ω = 2π 60 Hz, ζ = 10. Positions are read at 0.25 to 0.5 m, where `f32`s are 2⁻²⁵ m apart: 30
 /// steps may be half of that off each.
@@ -148,7 +148,7 @@ fn share(depths: impl Iterator<Item = f64>) -> f64 {
     if sum > 0.0 { most / (sum / count) } else { f64::INFINITY }
 }
 
-/// B19. Kinetic energy is bounded: if each of the 12 contacts between the centre and a wall opens at
+/// B19. Kinetic energy is bounded: if each of the 12 contacts between the center and a wall opens at
 /// the cap of 3 m/s, speeds grow from 0 to 36 m/s along x and y, √(2/3) of that in the mean.
 fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
     let bound = (2.0f64 / 3.0).sqrt() * 12.0 * f64::from(MAX_PUSH_SPEED);

@@ -9,19 +9,19 @@ use std::f64::consts::PI;
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A20.discs",
-        "velocities after a rough oblique impact of two discs, worst of e and µ",
+        "velocities after an oblique impact of two discs with friction, worst of e and µ",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         rough_discs,
-        Yes("friction of an impact is bounded by all of its normal impulse"),
+        Yes("friction of an impact is bounded by its whole normal impulse"),
     ),
     Case::new(
         "A20.corner",
-        "velocities after a rough impact of a box's corner on a box, worst of e and µ",
+        "velocities after an impact of a box's corner on a box with friction, worst of e and µ",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         rough_boxes,
-        Yes("normal and tangential impulse of an impact are found together"),
+        Yes("normal and tangential impulses of an impact are solved together"),
     ),
     Case::new(
         "A20.chain",
@@ -29,53 +29,51 @@ pub(super) static CASES: &[Case] = &[
         "1",
         "1e-4",
         chain,
-        Yes("impacts run from body to body in waves"),
+        Yes("impacts spread from body to body in waves"),
     ),
     Case::new(
         "A20.stacked",
-        "speed of a disc that falls on one three times its mass as that rebounds, over that of the fall",
+        "speed of a disc that hits one of three times its mass as it rebounds, over the speed of the fall",
         "1",
         "1 %: the order of impacts",
         stacked,
-        Yes("impacts run from body to body in waves"),
+        Yes("impacts spread from body to body in waves"),
     ),
     Case::new(
         "A20.plastic",
-        "speeds after a plastic impact of a box on a row of four, over the common one",
+        "speeds after a plastic impact of a box on a row of four, over the common speed",
         "1",
         "1 %",
         plastic_row,
-        Yes("an impact without restitution spreads from body to body before the step"),
+        Yes("plastic impacts spread from body to body before the step"),
     ),
     Case::new(
         "A20.coupling",
-        "speeds after a plastic impact on a row of six boxes of 1 to 4 kg, over the common one",
+        "speeds after a plastic impact on a row of six boxes of 1 to 4 kg, over the common speed",
         "1",
         "1 %",
         coupling,
-        No(
-            "visits of an impact are bounded by the points that it reaches: 8 each, where this row takes hundreds",
-        ),
+        No("an impact may visit each point that it reaches 8 times on average; this row takes hundreds"),
     ),
     Case::new(
         "A20.caught",
-        "velocities after rough plastic impacts of two discs, and of a corner on a box, worst of µ",
+        "velocities after plastic impacts with friction of two discs, and of a corner on a box, worst of µ",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         caught,
-        Yes("normal and tangential impulse of an impact are found together"),
+        Yes("normal and tangential impulses of an impact are solved together"),
     ),
     Case::new(
         "A20.miss",
-        "change of velocity of a disc that passes another in a distance of 1, 5 or 15 mm",
+        "change of velocity of a disc that passes another at a distance of 1, 5 or 15 mm",
         "m/s",
-        "none, in f32: 1e-5 of 5 m/s",
+        "1e-5 of 5 m/s: zero in f32",
         near_miss,
-        Yes("gaps of circles are those at the end of their way"),
+        Yes("gaps of circles are taken at their closest approach"),
     ),
     Case::new(
         "A21.wedge",
-        "way of a smooth wedge from under a smooth block that slides down it",
+        "displacement of a frictionless wedge under a block that slides down it",
         "m",
         "1 %, as for A1.slip",
         wedge,
@@ -91,11 +89,11 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A22.disc",
-        "speed of a disc that comes to roll on a plank that glides on ice",
+        "speed of a disc once it rolls on a plank that glides on ice",
         "m/s",
         "0.5 %, as for A3",
         disc_on_plank,
-        Yes("impulses act at a point of both bodies"),
+        Yes("impulses act at one common point of both bodies"),
     ),
 ];
 
@@ -292,12 +290,12 @@ fn near_miss(lab: &Lab) -> Result<Finding, Failure> {
 fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     let (m, big, alpha) = (1.0, 2.0, 30f64.to_radians());
     let (sin, cos) = alpha.sin_cos();
-    // Falls to the right, from 4 m high at the left; its centre of mass is at a third of base and height.
+    // Falls to the right, from 4 m high at the left; its center of mass is at a third of base and height.
     let (base, high) = (4.0 * cos / sin, 4.0);
     let triangle = SceneShape::polygon(vec![[0.0, 0.0], [base, 0.0], [0.0, high]]);
     let density = big / (0.5 * base * high);
     let wedge = SceneBody::dynamic([0.0, 0.0], triangle.density(density).friction(0.0));
-    // Flush, half a metre from the top.
+    // Flush, half a meter from the top.
     let at = [0.5 * cos + 0.25 * sin, high - 0.5 * sin + 0.25 * cos];
     let block = SceneShape::rectangle(0.25, 0.25).density(m / 0.25).friction(0.0);
     let bodies = vec![ground(60.0, 0.0), wedge, SceneBody::dynamic(at, block).turned(-alpha)];
@@ -328,7 +326,7 @@ fn box_on_plank(lab: &Lab) -> Result<Finding, Failure> {
     let [slip, plank, rider, _] = on_plank(lab, SceneShape::rectangle(0.5, 0.5), 0.5, mu)?;
     let h = 1.0 / 60.0 / lab.substeps();
     let truth = 16.0 / (2.0 * mu * G * 1.5) - 0.5 * 4.0 * h;
-    let note = format!("speeds {plank:.5} and {rider:.5} m/s, 4/3 in truth");
+    let note = format!("speeds {plank:.5} and {rider:.5} m/s, exact 4/3");
     Ok(Finding::new(slip, truth, 0.01 * truth).note(note))
 }
 
@@ -337,7 +335,7 @@ fn disc_on_plank(lab: &Lab) -> Result<Finding, Failure> {
     let disc = SceneShape::disc(0.5).density(4.0 / PI);
     let [_, plank, rider, _] = on_plank(lab, disc, 0.5, 0.4)?;
     let truth = 4.0 * 2.5 / 3.5;
-    Ok(Finding::new(rider, truth, 0.005 * truth).note(format!("plank {plank:.5} m/s, 4/7 in truth")))
+    Ok(Finding::new(rider, truth, 0.005 * truth).note(format!("plank {plank:.5} m/s, exact 4/7")))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "B10.statics",
-        "least friction under leaning cards by statics, relative",
+        "smallest friction that holds leaning cards, by statics, relative",
         "1",
         "1e-6: six digits",
         cards_in_statics,
@@ -18,27 +18,27 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "B10.cards",
-        "least friction under leaning cards by simulation",
+        "smallest friction that holds leaning cards, by simulation",
         "1",
-        "1 %: overlap of a slop turns the cards",
+        "1 %: an overlap of one slop turns the cards",
         cards_in_motion,
         Yes("Coulomb's law in the last sweep"),
     ),
     Case::new(
         "B12.impulse",
-        "impulse on the end of Painlevé's rod",
+        "impulse at the end of Painlevé's rod",
         "N s",
         "twice the term of order h",
         rod_impulse,
-        No("Gauss-Seidel on a matrix that friction makes indefinite need not converge"),
+        No("friction makes the matrix indefinite, so Gauss–Seidel need not converge"),
     ),
     Case::new(
         "B12.end",
-        "speed of the end, which sticks",
+        "speed of that end, which sticks",
         "m/s",
-        "1 % of what it was",
+        "1 % of its initial value",
         rod_end,
-        No("Gauss-Seidel on a matrix that friction makes indefinite need not converge"),
+        No("friction makes the matrix indefinite, so Gauss–Seidel need not converge"),
     ),
 ];
 
@@ -87,7 +87,7 @@ const CARD: [f64; 2] = [2.0, 0.02];
 
 /// B10. The same by simulation, P = 0: the friction below which the tops drop by 5 cm in three seconds.
 /// A card of half length l and half thickness t stands on the inner corner of its foot and leans with
-/// the outer one of its top, so its centre is t cos φ nearer to the line through the top: µ = tan φ/2 −
+/// the outer one of its top, so its center is t cos φ nearer to the line through the top: µ = tan φ/2 −
 /// t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and the threshold
 /// by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
 fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {

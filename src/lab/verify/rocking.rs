@@ -11,35 +11,37 @@ use std::f64::consts::{PI, TAU};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A26.plank",
-        "amplitude of a plank that rocks on a round support, the tenth second over the first",
+        "amplitude of a plank that rocks on a round support, tenth second over first",
         "1",
-        "1 %: a peak between two steps is missed by (ω dt)²/8, a thousandth",
+        "1 %: sampling misses a peak by (ω dt)²/8, 0.1 %",
         plank,
-        Yes("what rolls has the frame of the mean time of the substeps, and no torque lags"),
+        Yes("rolling contacts use the frame of the middle of the step, so no torque lags"),
     ),
     Case::new(
         "A26.eccentric",
-        "the same of a disc whose heavy core is off its centre, and which rolls to and fro",
+        "the same for a disc with an off-center core that rolls to and fro",
         "1",
         "1 %, as for A26.plank",
         eccentric,
-        Yes("what rolls has the frame of the mean time of the substeps, and no torque lags"),
+        Yes("rolling contacts use the frame of the middle of the step, so no torque lags"),
     ),
     Case::new(
         "A26.block",
-        "energy that a rocking block keeps when it comes down on its other corner, (1 - 3/2 sin²α)²",
+        "energy that a rocking block keeps when it lands on its other corner, (1 - 3/2 sin²α)²",
         "1",
         "1 %, as for A1.slip",
         block,
-        Yes("impacts run from body to body, and what an impact releases has borne its body until then"),
+        Yes(
+            "impacts spread from body to body; a contact that an impact releases has carried its load until then",
+        ),
     ),
     Case::new(
         "A26.rollers",
-        "period of a plank on two rollers that turn towards each other",
+        "period of a plank on two rollers that turn toward each other",
         "s",
         "1 %, as for A1.slip",
         rollers,
-        Yes("friction is µ times loads that are found together with it"),
+        Yes("friction is solved together with the loads"),
     ),
     Case::new(
         "A26.corner",
@@ -51,13 +53,11 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A26.turntable",
-        "slip in 10 s of a box that a turning frame carries, farther from the axis than its friction needs",
+        "slip in 10 s of a box on the inside of a rotating frame",
         "m",
         "A1.stick: 1e-4 m",
         turntable,
-        No(
-            "within a step bodies move along tangents, and what is carried outwards is pushed back along the wall's normal",
-        ),
+        No("within a step bodies move along tangents, and the wall pushes back along its normal only"),
     ),
 ];
 
@@ -96,7 +96,7 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     growth(lab, Scene::new("plank", vec![support, plank]), period)
 }
 
-/// A26. A light disc of radius R with a dense core of radius r, d below its centre; its centre of mass is e below it.
+/// A26. A light disc of radius R with a dense core of radius r, d below its center; its center of mass is e below it.
 /// T = 2π √((I + m (R − e)²)/(m g e)).
 fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, core, below, dense, start) = (0.5, 0.1, 0.3, 100.0, 0.1);
@@ -129,13 +129,13 @@ fn block(lab: &Lab) -> Result<Finding, Failure> {
     })?;
     let pair = down.and_then(|step| Some((*energies.get(step.checked_sub(2)?)?, *energies.get(step + 5)?)));
     let Some((before, after)) = pair else {
-        return Err(Failure::Unmeasured("the block does not come down".into()));
+        return Err(Failure::Unmeasured("the block does not land".into()));
     };
     let truth = (1.0 - 1.5 * b * b / (b * b + h * h)).powi(2);
     Ok(Finding::new(after / before, truth, 0.01 * truth))
 }
 
-/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its centre:
+/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its center:
 /// N₁ − N₂ = −m g x/(d − µ b), so that T = 2π √((d − µ b)/(µ g)).
 fn rollers(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, d, b, radius, start) = (0.3, 1.0, 0.01, 0.25, 0.2);

@@ -7,7 +7,7 @@ use crate::lab::error::Error;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What came of one case with one solver.
+/// Result of one case with one solver.
 #[derive(Debug)]
 pub enum Cell {
     /// A number beside its truth.

@@ -8,35 +8,35 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "B24.pressed",
-        "movement in 10 s of five boxes side by side that 27 times a box's weight presses to a wall, 25 in truth",
+        "displacement in 10 s of five boxes in a row that 27 box weights press against a wall (25 suffice)",
         "m",
         "the slop",
         pressed,
-        Yes("what users push with is a load as others are, and preload takes away the sag of it"),
+        Yes("user forces count as loads, and springs are shortened by their sag"),
     ),
     Case::new(
         "B24.needles",
-        "movement in 20 s of ten boxes of 0.1 m × 1 m on each other",
+        "displacement in 20 s of a stack of ten boxes of 0.1 m × 1 m",
         "m",
         "the slop",
         needles,
-        Yes("springs are stiffer than those on which the column would buckle"),
+        Yes("loads are fed forward, so a lean decays"),
     ),
     Case::new(
         "B24.tree",
-        "movement in 20 s of five storeys, each a plank on a post with a weight at each end",
+        "displacement in 20 s of five stories, each a plank on a post with a weight at each end",
         "m",
         "the slop",
         tree,
-        Yes("springs are stiffer than those on which the column would buckle"),
+        Yes("loads are fed forward, so a lean decays"),
     ),
     Case::new(
         "B24.turned",
-        "movement in 20 s of twenty boxes with everything turned by 45°, gravity as well",
+        "displacement in 20 s of a stack of twenty boxes in a world rotated by 45°",
         "m",
         "the slop",
         turned,
-        Yes("nothing knows where down is but from gravity"),
+        Yes("only gravity defines a direction"),
     ),
 ];
 

@@ -11,31 +11,31 @@ pub(super) static CASES: &[Case] = &[
         "A1.stick",
         "drift of a box on an incline, µ 2 % above tan θ, 60 s",
         "m",
-        "list: 1e-4 m",
+        "1e-4 m",
         stick,
-        Yes("friction rows are rigid and warm started"),
+        Yes("friction rows are rigid and warm-started"),
     ),
     Case::new(
         "A1.creep",
         "its speed from 30 s to 60 s",
         "m/s",
-        "list: 1e-6 m/s",
+        "1e-6 m/s",
         creep,
-        Yes("friction rows are rigid and warm started"),
+        Yes("friction rows are rigid and warm-started"),
     ),
     Case::new(
         "A1.slip",
         "distance slid with µ below tan θ, worst of all steps",
         "m",
-        "list: 1 % of 0.297 m",
+        "1 % of 0.297 m",
         slip,
         Yes("Coulomb's law in the last sweep"),
     ),
     Case::new(
         "A1.threshold",
-        "stick/slip angle over atan µ - 1, worst of µ = 0.1, 0.3, 0.6",
+        "stick/slip angle over atan µ, minus 1, worst of µ = 0.1, 0.3, 0.6",
         "1",
-        "list: 0.1 %",
+        "0.1 %",
         slope_threshold,
         Yes("Coulomb's law in the last sweep"),
     ),
@@ -49,7 +49,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A2.stop",
-        "distance of a box until friction stops it, worst of all steps",
+        "distance that a box slides until friction stops it, worst of all steps",
         "m",
         "1 % of 1.5 m, as for slip",
         stop,
@@ -59,13 +59,13 @@ pub(super) static CASES: &[Case] = &[
         "A3.roll",
         "distance of a rolling disc, worst of all steps",
         "m",
-        "list: 0.5 %",
+        "0.5 %",
         roll,
         Yes("Coulomb's law in the last sweep"),
     ),
     Case::new(
         "A3.slip",
-        "distance of a disc that slips, worst of all steps",
+        "distance of a slipping disc, worst of all steps",
         "m",
         "0.5 %, as for rolling",
         slipping_disc,
@@ -75,13 +75,13 @@ pub(super) static CASES: &[Case] = &[
         "A3.contact",
         "speed of the rolling disc's contact point",
         "m/s",
-        "list: 1e-4 m/s",
+        "1e-4 m/s",
         slip_speed,
-        Yes("preload takes away the sag that would lift the contact point"),
+        Yes("springs are shortened by the sag that would lift the contact point"),
     ),
     Case::new(
         "A3.threshold",
-        "least friction for rolling, tan θ/3",
+        "smallest friction for rolling, tan θ/3",
         "1",
         "0.1 %, as for A1",
         roll_threshold,
@@ -97,7 +97,7 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A4.back",
-        "speed of a disc that back-spin brings back",
+        "speed of a disc that returns by back-spin",
         "m/s",
         "arm shorter by half a slop: 7/9 δ/r v0",
         back_spin,
@@ -105,23 +105,23 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "A4.deep",
-        "speed at which a disc rolls that starts to slide a tenth of its radius deep in the ground",
+        "rolling speed of a disc that starts sliding with a tenth of its radius in the ground",
         "m/s",
-        "f32: 1e-4 of a metre per second",
+        "f32 rounding: 1e-4 m/s",
         deep_roll,
-        Yes("against a body that does not move, arms end at the own surface"),
+        Yes("on a static body the contact point lies on the other body's surface"),
     ),
     Case::new(
         "A4.dropped",
-        "speed of a disc that spins, falls, bounces and comes to roll, r w0/3",
+        "rolling speed of a spinning disc that falls and bounces, r ω₀/3",
         "m/s",
-        "arm shorter by half a slop: 7/9 δ/r of r w0",
+        "arm shorter by half a slop: 7/9 δ/r of r ω₀",
         dropped_spin,
-        Yes("whatever friction gives at its radius keeps angular momentum about the line of contact"),
+        Yes("friction at the radius keeps angular momentum about the line of contact"),
     ),
     Case::new(
         "A8.conveyor",
-        "slip of a box on a moving belt until it is as fast",
+        "slip of a box on a moving belt until it moves with it",
         "m",
         "1 %, as for A1",
         conveyor,
@@ -129,11 +129,11 @@ pub(super) static CASES: &[Case] = &[
     ),
     Case::new(
         "B13.hop",
-        "height to which a sliding box is lifted",
+        "height by which a sliding box lifts off",
         "m",
         "the slop; the convex relaxation lifts it by 0.033 m",
         hop,
-        Yes("normal and friction rows are separate: no dilatation"),
+        Yes("normal and friction rows are separate: no dilation"),
     ),
 ];
 
@@ -190,7 +190,7 @@ fn worst(found: &Finding) -> f64 {
 }
 
 /// A1. A box of 2 kg and side 1 that slides on the flat with µ = 0.3 leans forward: moments about its
-/// centre give N = m g/2 (1 ± µ H/w), 13 N in front.
+/// center give N = m g/2 (1 ± µ H/w), 13 N in front.
 fn split(lab: &Lab) -> Result<Finding, Failure> {
     let (mass, friction) = (2.0, 0.3);
     let shape = SceneShape::rectangle(0.5, 0.5).density(mass).friction(friction);

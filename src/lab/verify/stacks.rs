@@ -10,17 +10,17 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "B6.doubling",
-        "ground load under boxes of sides 1 to 32 m, the smallest below, 9 s to 10 s",
+        "ground load under boxes of 1 to 32 m, smallest at the bottom, 9 s to 10 s",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         doubling,
-        Yes("preload takes away the sag under 1364 kg on 1 kg"),
+        Yes("springs are shortened by the sag of 1364 kg on 1 kg"),
     ),
     Case::new(
         "B7.pyramid",
         "ground load of a pyramid of 55 boxes, last second of five",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         pyramid,
         Yes("cos²(π/20) per sweep to the power 1920 is 2e-21"),
     ),
@@ -28,7 +28,7 @@ pub(super) static CASES: &[Case] = &[
         "B7.large",
         "ground load of a pyramid of 5050 boxes, last second of 8.3",
         "N",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         large_pyramid,
         No("cos²(π/200) per sweep to the power 3500 is 0.4: no rest by then"),
     ),
@@ -36,41 +36,41 @@ pub(super) static CASES: &[Case] = &[
         "B8.plank",
         "sum and moment of the loads on a plank on three discs, relative",
         "1",
-        "what the jitter limit of B5 does to momentum in a step",
+        "momentum per step at the speed limit of B5.jitter",
         plank,
-        Yes("sum and moment are unique, and two rows deep converge"),
+        Yes("sum and moment are unique, and a pile two rows deep converges"),
     ),
     Case::new(
         "B9.speed",
-        "upward speed after the heavy third disc is taken away",
+        "upward speed after the heavy third disc is removed",
         "m/s",
-        "list: 0.05 m/s",
+        "0.05 m/s",
         release_speed,
-        Yes("preload leaves little to spring back, and the first substep relaxes once more"),
+        Yes("shortened springs store little energy, and the first substep relaxes once more"),
     ),
     Case::new(
         "B9.gap",
         "gap that opens then",
         "m",
-        "list: the slop",
+        "the slop",
         release_gap,
-        Yes("stiff springs store little, and preload drops with its load"),
+        Yes("stiff springs store little energy, and are shortened by the new load"),
     ),
     Case::new(
         "B21.three",
         "speed of three boxes on an incline of 0.05 rad, µ 10 % above tan θ, 5 min to 10 min",
         "m/s",
-        "list: 1e-5 m/s",
+        "1e-5 m/s",
         creep_of_three,
-        Yes("friction rows are rigid and warm started"),
+        Yes("friction rows are rigid and warm-started"),
     ),
     Case::new(
         "B21.ten",
-        "the same of ten boxes",
+        "the same for ten boxes",
         "m/s",
-        "list: 1e-5 m/s",
+        "1e-5 m/s",
         creep_of_ten,
-        Yes("preload takes away the sag that would turn the upper boxes"),
+        Yes("springs are shortened by the sag that would turn the upper boxes"),
     ),
 ];
 
@@ -126,7 +126,7 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, load_tolerance(1.0, world.settings.dt.into()) / G))
 }
 
-/// Upward impulse on a body in the last step (N·s) and its moment about the body's centre (N·m·s).
+/// Upward impulse on a body in the last step (N·s) and its moment about the body's center (N·m·s).
 fn bearing(world: &World, body: u32) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for c in world.contacts.iter().filter(|c| c.body_a == body || c.body_b == body) {
@@ -172,7 +172,7 @@ fn release_gap(lab: &Lab) -> Result<Finding, Failure> {
 }
 
 /// B21. Boxes on an incline of 0.05 rad with µ = 1.1 tan 0.05, for ten minutes: speed of the fastest
-/// from 5 min on. (At 0.25 rad ten would topple: their centre is 5 m up and the base ± ½ m wide, so tan
+/// from 5 min on. (At 0.25 rad ten would topple: their center is 5 m up and the base ± ½ m wide, so tan
 /// θ < 1/10.)
 fn creep(lab: &Lab, count: u32) -> Result<Finding, Failure> {
     let angle: f64 = 0.05;
@@ -221,7 +221,7 @@ mod tests {
         let manifold = Manifold { normal: Vec2::Y, count: 2, points: [at(-1.0), at(2.0)] };
         let step_impulse = [[3.0, 1.0], [1.0, 0.0]];
         world.contacts = vec![Contact { body_a: 0, body_b: 1, manifold, step_impulse, ..Default::default() }];
-        // Normals −1·3 + 2·1; the friction 1 along (1, 0) half a metre below: +0.5.
+        // Normals −1·3 + 2·1; the friction 1 along (1, 0) half a meter below: +0.5.
         assert_eq!(bearing(&world, 1), [4.0, -0.5]);
         assert_eq!(bearing(&world, 0)[0], -4.0);
     }

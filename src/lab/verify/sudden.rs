@@ -10,12 +10,12 @@ use std::f64::consts::PI;
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "B23.release",
-        "spread of the velocities of ten boxes after the support of their column is gone",
+        "spread of the velocities of ten boxes after the support of their column is removed",
         "m/s",
-        "list, as for B9: 0.05 m/s",
+        "0.05 m/s, as for B9",
         release,
         No(
-            "the first substep begins with the impulses of a load that is gone, and sweeps do not take all back",
+            "the first substep starts from the impulses of the removed load, and sweeps do not undo all of them",
         ),
     ),
     Case::new(
@@ -24,24 +24,24 @@ pub(super) static CASES: &[Case] = &[
         "m/s",
         "1 %, as for A1.slip",
         rolling,
-        No("a box that comes under load sinks before preload follows, and the next edge is a step"),
+        No("a box under new load sinks before its springs are shortened, so the next edge is a step"),
     ),
     Case::new(
         "B23.dropped",
-        "greatest upward speed of ten boxes of 0.1 m that fall on each other over gaps of 1 cm",
+        "largest upward speed of ten 0.1 m boxes that fall on each other across 1 cm gaps",
         "m/s",
-        "g dt: the rounding of time to steps",
+        "g dt: time is resolved to one step",
         dropped,
-        Yes("what comes in at twice a dt is stopped before the step, and moves no body apart"),
+        Yes("impacts faster than 2 a dt are solved before the step, and push no bodies apart"),
     ),
     Case::new(
         "B23.heavy",
-        "greatest upward speed of a box of 300 times the mass that falls from 2 m on ten boxes, and on a pyramid of 55",
+        "largest upward speed of a box of 300 times the mass dropped from 2 m on a stack of ten boxes, and on a pyramid of 55",
         "m/s",
-        "g dt: the rounding of time to steps",
+        "g dt: time is resolved to one step",
         heavy,
         No(
-            "visits of an impact are bounded by the points that it reaches: 8 each, where 300 times the mass takes thousands",
+            "an impact may visit each point that it reaches 8 times on average; 300 times the mass takes thousands",
         ),
     ),
 ];

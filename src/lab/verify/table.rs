@@ -6,7 +6,7 @@ use super::{
 };
 use std::sync::LazyLock;
 
-/// Cases of the list that need joints or springs, which the crate does not have: skipped, visibly.
+/// Hard cases that need joints or springs, which the crate does not have: listed as skipped.
 pub static NEEDS_JOINTS: &[(&str, &str)] = &[
     ("A9", "oscillator damped by Coulomb friction"),
     ("A10", "block on a belt, held by a spring"),
@@ -18,7 +18,7 @@ pub static NEEDS_JOINTS: &[(&str, &str)] = &[
     ("B20", "bridge of 160 links"),
 ];
 
-/// Every case, by family. The rows of a group stand in its file.
+/// Every case, by family. The rows of a group are in its file.
 pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
         balance::CASES,

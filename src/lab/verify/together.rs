@@ -9,27 +9,27 @@ use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 pub(super) static CASES: &[Case] = &[
     Case::new(
         "A20.pair",
-        "velocities after a frictionless disc has hit two that touch, with e = 1, 1/2 and 0, worst of its way",
+        "velocities after a frictionless disc hits two touching discs, e = 1, 1/2 and 0, worst of starting distances",
         "m/s",
-        "1e-3 of 4 m/s: where impulses stop to spread",
+        "1e-3 of 4 m/s: the tolerance at which impacts stop spreading",
         pair,
-        Yes("all points of an impact are found together, and a step knows when it is"),
+        Yes("all points of an impact are solved together, at its time within the step"),
     ),
     Case::new(
         "A20.wedge",
-        "velocities after a frictionless disc has fallen on a frictionless wedge that glides on ice, worst of its way",
+        "velocities after a frictionless disc falls on a frictionless wedge that glides on ice, worst of starting distances",
         "m/s",
         "1e-3 of 4 m/s, as A20.pair",
         wedge,
-        Yes("an impact without restitution spreads from body to body before the step"),
+        Yes("plastic impacts spread from body to body before the step"),
     ),
     Case::new(
         "A20.kerb",
-        "spin of a box that glides against a kerb, over v a/(k² + b² + a²), worst of its way",
+        "spin of a box that slides against a curb, over v a/(k² + b² + a²), worst of starting distances",
         "1",
         "1e-3, as A27.edges",
         kerb,
-        Yes("an impact without restitution spreads from body to body before the step"),
+        Yes("plastic impacts spread from body to body before the step"),
     ),
 ];
 
@@ -94,8 +94,8 @@ fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3 * SPEED))
 }
 
-/// A20. The kerb stops the box at its upper edge, a below the box's centre, and the ground its front edge, b before it: both
-/// impulses go through the kerb's edge, about which angular momentum stays.
+/// A20. The curb stops the box at its upper edge, a below the box's center, and the ground its front edge, b before it: both
+/// impulses go through the curb's edge, about which angular momentum stays.
 fn kerb(lab: &Lab) -> Result<Finding, Failure> {
     let (b, half, height) = (0.5, 1.0, 0.3);
     let (a, squared) = (half - height, (b * b + half * half) / 3.0);

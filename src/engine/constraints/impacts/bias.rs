@@ -1,4 +1,4 @@
-//! Restitution as a velocity bias: rows ask for the speed of the rebound.
+//! Restitution as a velocity bias: the rebound speed is the target of the rows.
 //!
 //! A point that comes in at v⁻ < −1 m/s and reaches the surface within the substep shall leave at u = e |v⁻|, so that its
 //! row is

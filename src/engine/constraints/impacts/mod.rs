@@ -11,12 +11,14 @@
 use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::params::RESTITUTION_THRESHOLD;
 
+#[doc(hidden)]
 pub mod bias;
+#[doc(hidden)]
 pub mod restitution;
 pub(crate) mod spread;
 pub(crate) mod touch;
 
-/// Which treatment of impacts a run takes.
+/// Choice of the impact law of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
@@ -31,7 +33,7 @@ pub enum Impacts {
 }
 
 impl Impacts {
-    /// Every treatment.
+    /// Every choice.
     pub const ALL: [Impacts; 3] = [Impacts::Own, Impacts::Waves, Impacts::None];
 
     /// Name on the command line and in records.
@@ -43,7 +45,7 @@ impl Impacts {
         }
     }
 
-    /// What a step does under a solver whose own law is `own`.
+    /// The impact law of a step under a solver whose own law is `own`.
     pub fn law(self, own: ImpactLaw) -> ImpactLaw {
         match self {
             Impacts::Own => own,
@@ -53,18 +55,18 @@ impl Impacts {
     }
 }
 
-/// What a step does where bodies hit each other; see the [module](self).
+/// How impacts are solved; see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImpactLaw {
     /// Nothing bounces.
     None,
-    /// The rows of the step ask for the speed of the rebound.
+    /// The rebound speed is the target of the rows.
     Bias,
     /// A pass at the end of the step.
     EndPass {
-        /// Approach (m/s) that a point has to exceed to bounce.
+        /// Approach speed above which a point bounces (m/s).
         threshold: f32,
-        /// Points that bore an impulse in the step before bounce only if e ≥ 1.
+        /// Points that carried an impulse in the previous step bounce only if e ≥ 1.
         only_new: bool,
     },
     /// Waves before the step, and for what only others push together a pass at its end.
@@ -108,10 +110,10 @@ impl ImpactLaw {
     }
 }
 
-/// Side records of what bounces.
+/// Side records for restitution.
 #[derive(Clone, Debug, Default)]
 pub struct ImpactRecords {
-    /// Of the coloured batches, and of the serial ones.
+    /// Of the colored batches, and of the serial ones.
     pub bounces: [Bounces; 2],
     /// Impacts before the step.
     pub(crate) spread: spread::Spread,

@@ -1,11 +1,11 @@
-//! Bouncing: one pass at the end of a step, and its own side records.
+//! Restitution as one pass at the end of a step, with its own side records.
 //!
-//! Newton's law wants v_n⁺ = −e v_n⁻ at the moment of impact. A step does not stop there: the speed of approach is read at its
-//! start, and the bounce is applied at its end.
+//! Newton's law requires v_n⁺ = −e v_n⁻ at the time of impact. A step does not stop there: the approach speed is read
+//! at its start, and the rebound is applied at its end.
 //!
-//! Every point that came in faster than the threshold and pushed at all is given the impulse
-//! λ = −m_eff (v_n − e |v_n⁻|), clamped on the accumulated impulse. Scenes in which nothing bounces have
-//! neither the pass nor the side records.
+//! Every point that approached faster than the threshold and carried an impulse gets the impulse λ = −m_eff (v_n − e
+//! |v_n⁻|), clamped on the accumulated impulse. Scenes in which nothing bounces have neither the pass nor the side
+//! records.
 //!
 //! Source: `catto2024box2d`.
 

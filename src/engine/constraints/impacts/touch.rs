@@ -1,6 +1,6 @@
 //! The moment of an impact of round shapes, and the frame that they have then.
 //!
-//! Two centres (a corner is one) are d apart at the beginning of a step, and fly with u against each other. Their shapes touch when
+//! Two centers (a corner is one) are d apart at the beginning of a step, and fly with u against each other. Their shapes touch when
 //!
 //! ```text
 //! |d + u t| = R,   t = c/(−b + √(b² − u² c)),   b = d·u < 0,   c = (|d| − R)(|d| + R)
@@ -8,7 +8,7 @@
 //!
 //! R being the sum of both radii: t > 0 in the coming step, t < 0 where they were first seen as an overlap. What they do to each
 //! other is along n = (d + u t)/R, and not along d, from which that is up to |u| dt/R away: discs
-//! of half a metre that meet at 10 m/s left in directions that were 7 % off. Arms end at the point where they touch then.
+//! of half a meter that meet at 10 m/s left in directions that were 7 % off. Arms end at the point where they touch then.
 //!
 //! An impact is solved at the beginning of the step, in a row that is put in the place of the one of the beginning, with the gap
 //! −v_n t from which it gets to the touch. Only impacts that are solved before the step: in a crowd, where sweeps do that,
@@ -24,13 +24,13 @@ use glam::Vec2;
 /// A round contact, with the frame of the beginning of the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Round {
-    /// From the centres of mass to what it is round about (m).
+    /// From the centers of mass to what it is round about (m).
     centers: [Vec2; 2],
     /// Between these at the beginning of the step (m).
     between: Vec2,
     /// R (m).
     reach: f32,
-    /// From the centres to the point of touch (m).
+    /// From the centers to the point of touch (m).
     radii: [f32; 2],
 }
 

@@ -3,7 +3,7 @@
 //! # Contact frame
 //!
 //! A contact has the unit normal n (from a to b) and the tangent t = (n_y, −n_x). With
-//! the velocities v, ω of the two bodies and the arms r from their centres of mass to
+//! the velocities v, ω of the two bodies and the arms r from their centers of mass to
 //! the contact point, the relative velocity of the point along an axis u is
 //!
 //! ```text

@@ -5,10 +5,13 @@
 //! how a kernel is added, [`types`] how constraints of other types take part, and [`observe`] how metrics see a rule.
 
 pub mod frame;
+#[doc(hidden)]
 pub mod motion;
+#[doc(hidden)]
 pub mod observe;
 pub mod pass;
 pub mod position;
+#[doc(hidden)]
 pub mod prepare;
 pub mod stages;
 pub mod types;

@@ -16,7 +16,7 @@ use crate::engine::lanes::{BodyRow, held};
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
-/// How velocities and positions follow each other.
+/// Order of velocity and position updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
@@ -27,18 +27,18 @@ pub enum Integrator {
     ExplicitEuler,
 }
 
-/// How a spin turns a body within a substep.
+/// Rotation update of a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RotationUpdate {
     /// By h ω.
     #[default]
     Exact,
-    /// By atan(h ω): what q ← normalise(q + h ω q⊥) does, as many engines have it.
+    /// By atan(h ω): what q ← normalize(q + h ω q⊥) does, as many engines have it.
     Normalized,
 }
 
-/// What [`Motion::load`] is given besides the bodies.
+/// Inputs of [`Motion::load`] besides the bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput {
     /// m/s²
@@ -53,7 +53,7 @@ pub struct MotionInput {
     pub rotation: RotationUpdate,
 }
 
-/// What a step needs to move bodies, one entry per row.
+/// Data for moving bodies, one entry per row.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// What forces add to a velocity in one substep: `[h aₓ, h a_y, h α, 0]`.
@@ -209,7 +209,7 @@ impl Motion {
     /// Takes the turns of round bodies out of their rows, until [`Self::finish`].
     pub(crate) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
         // A contact's anchor turns with its body, as a corner does. The contact point of a disc
-        // does not: it stays on the line of centres however the disc rolls. So sweeps are
+        // does not: it stays on the line of centers however the disc rolls. So sweeps are
         // not shown the turn of a round body; it is kept here for its pose. Without this a disc
         // that rolls at 7 rad/s and 60 Hz seems to lift off by 3 mm in the course of a step.
         for (body, turned) in &mut self.round {

@@ -11,7 +11,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 
-/// What a pass runs on: the rows of all bodies and one set of batches.
+/// Input of a pass: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
     /// One row per body, and an inert one at the end.
     pub rows: &'a mut [BodyRow],
@@ -19,7 +19,7 @@ pub struct PassInput<'a> {
     pub batches: &'a mut Batches,
     /// Which of both.
     pub part: Part,
-    /// What those contacts keep for bouncing; empty in scenes without restitution.
+    /// Side records for restitution; empty in scenes without it.
     pub bounces: &'a mut Bounces,
     /// All contacts.
     pub contacts: &'a mut [Contact],
@@ -29,7 +29,7 @@ pub struct PassInput<'a> {
     pub increments: &'a [[f32; 4]],
 }
 
-/// What a pass requests per contact.
+/// Memory requests of a pass per contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PerLane {
     /// Floats of records that are read.
@@ -59,7 +59,7 @@ impl PerLane {
     }
 }
 
-/// How a pass treats bodies, for constraints that bring kernels of their own.
+/// Body access of a pass, for constraint types with their own kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PassMode {
     /// Each constraint sees what those before it have done to its bodies.
@@ -91,10 +91,10 @@ pub(crate) use at_width;
 ///
 /// To add one, implement this; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is the example.
 pub trait Pass {
-    /// What it requests per contact with records of this layout.
+    /// Memory requests per contact with records of this layout.
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
-    /// How constraints of other types take part.
+    /// Participation of constraints of other types.
     fn mode(&self) -> PassMode {
         PassMode::InTurn
     }

@@ -40,7 +40,7 @@ pub struct PositionSweep {
     pub fraction: f32,
     /// Overlap that is left alone (m).
     pub slop: f32,
-    /// C_max (m): more would turn bodies further than a linearised contact can follow.
+    /// C_max (m): more would turn bodies further than a linearized contact can follow.
     pub max_correction: f32,
     /// Arms follow the bodies' turn within the step.
     pub turned: bool,

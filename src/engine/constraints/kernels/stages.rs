@@ -1,4 +1,4 @@
-//! How a kernel goes through the batches of a segment: one by one, or several together in stages.
+//! Iteration of a kernel over the batches of a segment: one by one, or several together in stages.
 //!
 //! A sweep gathers bodies and forms rows, solves the rows, and applies and scatters: three stages. One batch needs more
 //! registers than there are, and its chain of a hundred dependent instructions fills the window of out-of-order

@@ -33,7 +33,7 @@ pub type Pair = [f64; 2];
 pub struct CoulombLcp {
     a: Matrix,
     q: Vec<f64>,
-    /// What q was divided by.
+    /// Scale of q.
     unit: f64,
     /// 1/√G_ii
     scale: Vec<Pair>,

@@ -7,7 +7,7 @@
 //!
 //! **Source**: Cottle, Pang & Stone, *The Linear Complementarity Problem*, §4.4 (the method) and
 //! §4.9 (lexicographic ties). **Kept exact by**: rebuilding the tableau from A and q through an LU
-//! factorisation every [`REBUILD`] pivots, and computing the final basic solution by LU with
+//! factorization every [`REBUILD`] pivots, and computing the final basic solution by LU with
 //! iterative refinement, so that pivot errors do not add up.
 //!
 //! With `x_B` the basic and `x_N` the other variables, the tableau holds T = B⁻¹ N and q̄ = B⁻¹ q of
@@ -20,7 +20,7 @@ use std::cmp::Ordering;
 /// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
 pub const REBUILD: usize = 50;
 
-/// How Lemke's method ended.
+/// Outcome of Lemke's method.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// z, with w = A z + q and the complementarity pattern that LU refined.
@@ -194,7 +194,7 @@ impl Tableau {
                 -d[i]
             }
         };
-        // Unit columns first, which cost the factorisation nothing.
+        // Unit columns first, which cost the factorization nothing.
         self.basic.sort_unstable();
         let basis = Matrix::from_fn(n, n, |i, j| coefficient(i, self.basic[j]));
         let right = Matrix::from_fn(n, n + 2, |i, j| match self.nonbasic.get(j) {

@@ -70,7 +70,7 @@ impl IndexMut<(usize, usize)> for Matrix {
 
 /// Replaces a square matrix of `n` columns, by rows, by its factors: U on and above the diagonal, L below. Tells
 /// `exchange` which rows P exchanges, in turn. False if a column leaves no pivot above `floor` that is finite.
-fn factorise(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(usize, usize)) -> bool {
+fn factorize(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(usize, usize)) -> bool {
     for k in 0..n {
         let size = |i: usize| cells[i * n + k].abs();
         let pivot = (k..n).max_by(|&i, &j| size(i).total_cmp(&size(j))).filter(|&i| size(i) > floor);
@@ -100,7 +100,7 @@ fn factorise(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(u
 pub fn solve_in_place(a: &mut [f64], b: &mut [f64], least: f64) -> bool {
     let n = b.len();
     let floor = least * a.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    if !factorise(a, n, floor, |k, pivot| b.swap(k, pivot)) {
+    if !factorize(a, n, floor, |k, pivot| b.swap(k, pivot)) {
         return false;
     }
     for i in 1..n {
@@ -123,12 +123,12 @@ pub struct Lu {
 }
 
 impl Lu {
-    /// Factorises a square matrix; none if a column leaves no pivot that is finite and not zero.
+    /// Factorizes a square matrix; none if a column leaves no pivot that is finite and not zero.
     pub fn new(matrix: Matrix) -> Option<Self> {
         let n = matrix.columns;
         let mut factors = matrix.clone();
         let mut order: Vec<usize> = (0..n).collect();
-        let is_regular = factorise(&mut factors.cells, n, 0.0, |k, pivot| order.swap(k, pivot));
+        let is_regular = factorize(&mut factors.cells, n, 0.0, |k, pivot| order.swap(k, pivot));
         is_regular.then_some(Lu { matrix, factors, order })
     }
 
@@ -159,7 +159,7 @@ impl Lu {
         solution
     }
 
-    /// L Y = P R downwards, then U X = Y upwards.
+    /// L Y = P R downward, then U X = Y upward.
     fn solve_strips(&self, right: &[Strip]) -> Vec<Strip> {
         let mut x: Vec<Strip> = self.order.iter().map(|&i| right[i]).collect();
         for i in 1..x.len() {

@@ -1,4 +1,4 @@
-//! What the points under a body bear at rest.
+//! Loads of the points under a body at rest.
 //!
 //! The loads F of the points balance a force f and a torque τ as well as their laws allow: with the columns
 //! (u, r × u/ρ) of the unit normals and tangents u in A, and ρ the radius of gyration,
@@ -31,9 +31,9 @@ pub(crate) struct Support {
     pub contact: u32,
     /// Which of its points it is.
     pub point: usize,
-    /// Unit normal towards the body.
+    /// Unit normal toward the body.
     pub normal: DVec2,
-    /// From the body's centre of mass (m).
+    /// From the body's center of mass (m).
     pub arm: DVec2,
     /// Coulomb coefficient (1).
     pub friction: f64,
@@ -52,7 +52,7 @@ impl Support {
         self.load[1].abs() >= self.friction * self.load[0]
     }
 
-    /// What it pushes the body with (N).
+    /// Its force on the body (N).
     pub fn force(&self) -> DVec2 {
         self.load[0] * self.normal + self.load[1] * self.tangent()
     }

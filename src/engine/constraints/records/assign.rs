@@ -50,7 +50,7 @@ pub struct Assignment {
     pub overflow: usize,
 }
 
-/// What lanes are assigned for.
+/// Inputs of the assignment of lanes.
 pub struct Sides<'a, F> {
     /// Number of bodies; the row of this number is the inert one.
     pub bodies: usize,

@@ -1,5 +1,4 @@
-//! What contacts keep for bouncing, beside their records: only scenes in which something bounces
-//! have it.
+//! Side records for restitution: only scenes in which something bounces have it.
 
 use crate::engine::constraints::records::segment::Segment;
 use crate::engine::lanes::{Block, Lanes, held};

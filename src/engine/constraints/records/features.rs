@@ -1,11 +1,11 @@
-//! What a scene needs of its constraints; what it does not need is not compiled in.
+//! Features of a scene's constraints; unused ones are not compiled in.
 
-/// What the contacts of a scene can need, found once when the scene is built.
+/// Features that the contacts of a scene use, determined as bodies are added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Features {
     /// Some contact can turn a body. Not so when every dynamic body is a disc about
-    /// its own centre, nothing spins at the start and there is no friction.
+    /// its own center, nothing spins at the start and there is no friction.
     pub rotation: bool,
     /// Some pair of surfaces has a friction coefficient above zero.
     pub friction: bool,
@@ -68,7 +68,7 @@ impl<const R: bool, const F: bool, const P: usize> KernelFeatures for Kernel<R, 
     const POINTS: usize = P;
 }
 
-/// What stands opposite the dynamic body b of a contact.
+/// Kind of body a of a contact; body b is dynamic.
 pub trait Opposite: Copy + 'static {
     /// Body a has a velocity and a motion: its row is gathered.
     const HAS_ROW: bool;

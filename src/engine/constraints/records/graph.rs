@@ -1,6 +1,6 @@
 //! The contact graph: bodies are nodes, contacts are edges.
 //!
-//! For solvers that go from body to body (block descent on bodies) or from the ground upwards
+//! For solvers that go from body to body (block descent on bodies) or from the ground upward
 //! (shock propagation). Built only for a solver that requests it, in time linear in contacts.
 //! Edges are numbered as contacts are; nothing here knows what an edge is.
 

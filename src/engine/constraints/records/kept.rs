@@ -1,13 +1,13 @@
 //! Numbers that a solver keeps from step to step, per contact, per contact point and per body.
 //!
 //! Multipliers, penalties, rest lengths: what they mean is the solver's affair. A contact point
-//! is recognised by its shape pair and its feature id, as its impulses are; a new one starts with
+//! is recognized by its shape pair and its feature id, as its impulses are; a new one starts with
 //! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
 
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{LaneVec, held};
 
-/// How many numbers a solver keeps.
+/// Numbers that a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KeptSize {
@@ -54,7 +54,7 @@ impl Kept {
         self.size
     }
 
-    /// What is kept of contact `contact`.
+    /// Numbers of contact `contact`.
     ///
     /// # Panics
     /// If there is no such contact, or nothing is kept.
@@ -68,7 +68,7 @@ impl Kept {
         &mut self.contacts
     }
 
-    /// What is kept at point `point` (0 or 1) of contact `contact`.
+    /// Numbers of point `point` (0 or 1) of contact `contact`.
     ///
     /// # Panics
     /// If there is no such contact, or nothing is kept.
@@ -78,7 +78,7 @@ impl Kept {
         &mut self.points[(point * self.names.len() + contact) * size..][..size]
     }
 
-    /// What is kept of body `body`.
+    /// Numbers of body `body`.
     ///
     /// # Panics
     /// If there is no such body, or nothing is kept.

@@ -4,10 +4,13 @@
 //! follow each other, [`assign`] which contact is in which lane, and [`order`] in which order a sweep visits them. [`graph`],
 //! [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
 
+#[doc(hidden)]
 pub mod assign;
 pub mod batches;
+#[doc(hidden)]
 pub mod bounces;
 pub mod features;
+#[doc(hidden)]
 pub mod graph;
 pub mod kept;
 pub mod order;

@@ -7,7 +7,7 @@ use crate::engine::constraints::records::features::OppositeKind;
 /// No dynamic body occurs twice in a segment, unless the segment is serial (width 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// What stands opposite body b.
+    /// Kind of the other body, a.
     pub opposite: OppositeKind,
     /// First lane slot (a multiple of the width).
     pub first_lane: usize,
@@ -37,7 +37,7 @@ impl Segment {
         self.opposite == OppositeKind::Dynamic
     }
 
-    /// How many lanes of a batch hold a contact.
+    /// Number of lanes of a batch that hold a contact.
     #[inline(always)]
     pub fn filled(&self, batch: usize, width: usize) -> usize {
         self.contacts.saturating_sub(batch * width).min(width)

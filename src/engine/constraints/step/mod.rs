@@ -28,8 +28,8 @@ use crate::engine::params::Budget;
 
 /// One step's problem, prepared.
 ///
-/// Each method is one pass over all bodies or all constraints. Coloured batches run
-/// first, colour by colour; then the serial ones. Nothing here is generic: passes are
+/// Each method is one pass over all bodies or all constraints. Colored batches run
+/// first, color by color; then the serial ones. Nothing here is generic: passes are
 /// compiled per width and features, schedules once.
 pub struct Passes<'a> {
     work: &'a mut Workspace,
@@ -56,7 +56,7 @@ pub struct StepParts<'p> {
     pub input: &'p StepInput,
     /// Books what they read and write.
     pub clock: &'p mut Clock,
-    /// Lanes of the coloured batches.
+    /// Lanes of the colored batches.
     pub width: LaneWidth,
 }
 
@@ -197,7 +197,7 @@ impl<'a> Passes<'a> {
         self.count
     }
 
-    /// Coloured batches at the width of the step, then serial ones at one lane; in reverse order the
+    /// Colored batches at the width of the step, then serial ones at one lane; in reverse order the
     /// other way round. Constraints of other types take part.
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
         if self.work.types.is_empty() {

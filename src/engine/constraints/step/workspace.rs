@@ -21,7 +21,7 @@ pub struct Workspace {
     pub rows: Vec<BodyRow>,
     /// Forces, damping, integration.
     pub motion: Motion,
-    /// Coloured batches at the chosen width.
+    /// Colored batches at the chosen width.
     pub lanes: Batches,
     /// What is solved one after the other: everything in natural order, else the overflow.
     pub serial: Batches,

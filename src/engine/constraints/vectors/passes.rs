@@ -10,7 +10,7 @@ use crate::engine::constraints::records::point_vector::places;
 use crate::engine::constraints::records::segment::Segment;
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
 
-/// What a pass works on: bodies, and one set of batches with its part of a vector.
+/// Input of a pass: bodies, and one set of batches with its part of a vector.
 pub(crate) struct On<'a> {
     pub rows: &'a mut [BodyRow],
     pub batches: &'a mut Batches,

@@ -217,7 +217,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// What the Jacobian of a point is made of; see [`PointRows`].
+    /// Components of the Jacobian of a point; see [`PointRows`].
     pub fn point_rows(&self) -> impl Iterator<Item = PointRows> {
         self.view().points().map(|(at, bodies, axes, arms)| PointRows { at, bodies, axes, arms })
     }
@@ -249,7 +249,7 @@ pub struct PointRows {
 /// Bytes of a point's geometry and its two bodies.
 const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
 
-/// What does not change while impulses do.
+/// Quantities that do not depend on impulses.
 #[derive(Clone, Copy)]
 struct Points<'a> {
     rows: &'a [BodyRow],
@@ -271,7 +271,7 @@ impl<'a> Points<'a> {
         self.rows.get(body as usize).copied().unwrap_or_default()
     }
 
-    /// How fast the surfaces part and slide at a point (m/s).
+    /// Relative normal and tangential velocity at a point (m/s).
     fn velocity(&self, [a, b]: [u32; 2], [n, t]: [[f32; 2]; 2], [arms_n, arms_t]: [Pair; 2]) -> Pair {
         let (va, vb) = (self.row(a).velocity, self.row(b).velocity);
         let d = [vb[0] - va[0], vb[1] - va[1]];

@@ -1,4 +1,4 @@
-//! Block descent: bodies go, one colour after the other, where their inertia and the penalties of their contacts
+//! Block descent: bodies go, one color after the other, where their inertia and the penalties of their contacts
 //! are in balance. The method is told in `solvers/avbd.rs`.
 //!
 //! # A contact as seen from a body
@@ -60,7 +60,7 @@ const IS_THERE: usize = 8;
 /// Lane vectors of a body: its inertial place, M/h² (kg/s²), I/h², and 0 if it does not turn.
 const BODY: usize = 6;
 
-/// What block descent works with, kept from step to step so that nothing is allocated.
+/// Buffers of block descent, kept from step to step to avoid allocation.
 #[derive(Clone, Debug, Default)]
 pub struct Descent {
     lanes: BodyLanes,
@@ -71,7 +71,7 @@ pub struct Descent {
     contacts: Vec<Block>,
 }
 
-/// What a pass of block descent is given besides.
+/// Further inputs of a pass of block descent.
 pub(crate) struct Bodies<'a> {
     pub rows: &'a mut [BodyRow],
     pub kept: &'a mut Kept,
@@ -91,7 +91,7 @@ impl Descent {
         self.lanes.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
-    /// Gives bodies their lanes, by colours or one by one in the `sequence` of contacts.
+    /// Gives bodies their lanes, by colors or one by one in the `sequence` of contacts.
     pub(crate) fn assign(
         &mut self,
         rows: &[BodyRow],
@@ -309,7 +309,7 @@ fn descend<L: Lanes>(lanes: &BodyLanes, [bodies, ends]: [&[Block]; 2], on: &mut 
                 let rows = rows(record, p, x, o, kept, alpha);
                 let is_there = record[3 + POINT * p + IS_THERE];
                 // A row at its bound keeps its stiffness: without it a body would go past where the row
-                // takes hold again, and back, for ever.
+                // takes hold again, and back, forever.
                 let rubs = record[2].select_positive(kept[TANGENT_PENALTY], zero);
                 for (axis, penalty) in [kept[NORMAL_PENALTY], rubs].into_iter().enumerate() {
                     let [jx, jy, jw] = rows.jacobian[axis];

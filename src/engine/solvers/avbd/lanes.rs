@@ -1,11 +1,11 @@
 //! Bodies in lanes: which of them are solved together, and with which contacts.
 //!
-//! Bodies of one colour share no contact, so that each of them can be solved as if alone. Colours are given
-//! greedily in the order of the bodies; within a colour bodies with as many contacts stand together. A batch of
+//! Bodies of one color share no contact, so that each of them can be solved as if alone. Colors are given
+//! greedily in the order of the bodies; within a color bodies with as many contacts stand together. A batch of
 //! bodies goes through their contacts by rank: first the first contact of each, then the second, and
 //! a body that has no more gets an empty one. What becomes of a body does not depend on the batch in
-//! which it is, only on its colour: the result has the same bits at every width. Where contacts come one after the
-//! other there are no colours, and bodies come one by one as those contacts name them first.
+//! which it is, only on its color: the result has the same bits at every width. Where contacts come one after the
+//! other there are no colors, and bodies come one by one as those contacts name them first.
 
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::contacts::Contact;
@@ -49,11 +49,11 @@ pub(crate) struct BodyLanes {
     order: Vec<u32>,
     /// By body; [`NONE`] of what is not solved.
     colors: Vec<u32>,
-    /// Which body has last seen a neighbour of this colour.
+    /// Which body has last seen a neighbor of this color.
     seen_by: Vec<u32>,
 }
 
-/// The colour of bodies that are not solved.
+/// The color of bodies that are not solved.
 const NONE: u32 = u32::MAX;
 
 impl Ends {
@@ -87,7 +87,7 @@ impl BodyLanes {
         self.order.iter().map(|&body| body as usize)
     }
 
-    /// Gives lanes to the bodies that have contacts and are dynamic, by colours, or one by one in the `sequence` of
+    /// Gives lanes to the bodies that have contacts and are dynamic, by colors, or one by one in the `sequence` of
     /// contacts; `inert` is the number of bodies.
     pub fn assign(
         &mut self,
@@ -155,7 +155,7 @@ impl BodyLanes {
         }
     }
 
-    /// The smallest colour that no neighbour has, body by body.
+    /// The smallest color that no neighbor has, body by body.
     fn color(&mut self, graph: &Graph) {
         self.seen_by.clear();
         for &body in &self.order {

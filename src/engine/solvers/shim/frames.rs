@@ -1,4 +1,4 @@
-//! The frame that a round contact has in the middle of a step.
+//! The frame of a round contact in the middle of a step.
 //!
 //! A substep solver keeps the normal and the arms of a contact for all n substeps of a step. Where a round shape rolls
 //! they turn meanwhile:
@@ -7,27 +7,28 @@
 //! n(t) = d(t)/|d(t)|,    d(t) = d + u t
 //! ```
 //!
-//! with d from the centre (or the corner) of one shape to the centre of the other, and u the velocity between these. A
+//! with d from the center (or the corner) of one shape to the center of the other, and u the velocity between these. A
 //! force that keeps the direction of the step's beginning lags behind this one by
 //!
 //! ```text
 //! τ = (1 − 1/n) dt/2
 //! ```
 //!
-//! in the mean of the substeps, and to a mode of the frequency ω a restoring force that lags is a negative damping, with the
-//! growth rate ω² τ/2: a plank that rocks on a disc swings 2.6 times as far after ten seconds. So what rolls has the
-//! frame of t = τ, and no lag is left. With one substep that is the beginning of the step: symplectic Euler has none.
+//! on average over the substeps. For a mode of frequency ω, a restoring force that lags acts as negative damping with
+//! the growth rate ω² τ/2: a plank that rocks on a disc swings 2.6 times as far after ten seconds. So rolling
+//! contacts use the frame at t = τ, which removes the lag. With one substep that is the start of the step: symplectic
+//! Euler has no lag.
 //!
-//! What rolls stays in touch: its gap changes by less than a fifth of the slop in the step. What hits, leaves or passes by
-//! has the frame of the beginning. The contact itself keeps that one in any case; only its record turns.
+//! A contact rolls if its gap changes by less than a fifth of the slop in the step. Contacts that close, open or pass
+//! by use the frame of the start of the step. Only the record turns; the contact itself keeps that frame.
 //!
 //! # Arms
 //!
-//! In the directions n and t of the beginning, an arm r is (r·n, r·t) = (−r × t, r × n). The centre of a shape, c = r ± ρ n with
-//! ρ its distance from the contact point, turns by τ ω, and the normal by φ towards t,
+//! In the directions n and t of the beginning, an arm r is (r·n, r·t) = (−r × t, r × n). The center of a shape, c = r ± ρ n with
+//! ρ its distance from the contact point, turns by τ ω, and the normal by φ toward t,
 //!
 //! ```text
-//! φ = τ (t·u)/|d|   between two centres,   φ = −τ ω   on a face of a body with the spin ω
+//! φ = τ (t·u)/|d|   between two centers,   φ = −τ ω   on a face of a body with the spin ω
 //! ```
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.
@@ -40,13 +41,13 @@ use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 use crate::engine::params::LINEAR_SLOP;
 
-/// Change of the gap of what rolls (m): a fifth of the slop.
+/// Largest change of the gap of a rolling contact (m): a fifth of the slop.
 pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;
 
 /// Radii above this are those of faces (m).
 const FLAT: f32 = 1e30;
 
-/// Turns the records of what rolls, and notes the time of their frame.
+/// Turns the records of rolling contacts, and stores the time of their frames.
 pub(super) struct Roll {
     /// τ (s)
     pub middle: f32,

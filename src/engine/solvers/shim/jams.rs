@@ -1,11 +1,11 @@
-//! Two bodies that are caught in each other.
+//! Jammed pairs of bodies.
 //!
-//! Where two bodies overlap at several of their shapes, from opposite sides, no motion parts them: a body of two shapes
-//! that was thrown half through a line, or a disc between two jaws of one body. What one contact pushes the other pushes
-//! back, and no load and no law says how much: impulses that cancel may be any. Springs as stiff as the step allows
-//! press, as overlaps of centimetres never become less, until they hold thousands of times the weight. As soon as a normal
-//! turns by φ, as at the end of the line, sin φ of that is left in the next warm start, and shoots the
-//! bodies apart.
+//! If two bodies overlap at several of their shapes, from opposite sides, no motion separates them: a body of two
+//! shapes that was thrown half-way through a line, or a disc between two jaws of one body. The two contacts push
+//! against each other, and neither loads nor the contact law determine how hard: any impulses that cancel are a
+//! solution. Since the overlap never shrinks, stiff springs build up thousands of times the weight. As soon as a
+//! normal turns by φ, for example at the end of the line, a part sin φ of that remains in the next warm start and
+//! throws the bodies apart.
 //!
 //! So contacts of the same two bodies with
 //!
@@ -13,8 +13,8 @@
 //! n₁ · n₂ < −1/2
 //! ```
 //!
-//! that both are deeper than the slop begin a step without impulses. Within it their normals stay as they are, and
-//! what cancels does so. What a wedge bears at rest is less deep by far, and is kept.
+//! that are both deeper than the slop start a step without impulses. Within the step their normals stay fixed, so
+//! impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep, and keep theirs.
 
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::held;
@@ -23,7 +23,7 @@ use crate::engine::params::LINEAR_SLOP;
 /// Normals with a smaller product oppose each other (1).
 const OPPOSED: f32 = -0.5;
 
-/// Finds them; keeps its memory from step to step.
+/// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jams {
     /// Bodies and index of each deep contact.
@@ -31,7 +31,7 @@ pub(super) struct Jams {
 }
 
 impl Jams {
-    /// Takes the impulses from contacts that push against each other.
+    /// Zeroes the impulses of contacts that push against each other.
     pub fn release(&mut self, contacts: &mut [Contact]) {
         self.deep.clear();
         for (i, contact) in contacts.iter().enumerate() {

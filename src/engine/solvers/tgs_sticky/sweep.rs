@@ -33,7 +33,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::point_vector::places;
 use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
 
-/// What a sweep aims at; see the [module](self). The solver keeps one float per contact point.
+/// Targets of a sweep; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sticky {
     /// Substep (s).

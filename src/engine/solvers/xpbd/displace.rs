@@ -13,13 +13,13 @@
 //! ```
 //!
 //! with σ = sin Δθ and κ = 1 − cos Δθ, as t·r = r × n. The contact point of a disc stays on the line of
-//! centres: its turn counts by Δθ (r × t). Slides since the substep began, as `muller2020` has them, let
+//! centers: its turn counts by Δθ (r × t). Slides since the substep began, as `muller2020` has them, let
 //! stacks of three boxes rock with growing energy; `catto2024solver2d` takes those of the step. Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
 //! the next point sees it. Records hold λ/h, an impulse (N·s).
 //!
 //! # Velocities
 //!
-//! Afterwards v is what moved the bodies, displacements included. Points that pushed lose their
+//! Afterward v is what moved the bodies, displacements included. Points that pushed lose their
 //! normal velocity, and as much of their sliding velocity as kinetic friction takes, µ λ/h at most.
 //!
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
@@ -55,7 +55,7 @@ pub(crate) struct Displace<'a> {
 
 /// Corrects velocities; see the [module](self).
 pub(crate) struct AfterDisplacing<'a> {
-    /// How fast points shall leave (m/s), of the coloured and of the serial batches; empty where nothing bounces.
+    /// Rebound speeds of points (m/s) in the colored and the serial batches; empty where nothing bounces.
     pub rebounds: [&'a mut [Block]; 2],
 }
 
@@ -170,7 +170,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        // Of the centres, since the step began.
+        // Of the centers, since the step began.
         let [mut moved, mut slide] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n);
         let mut angle = [a[TURN], b[TURN]];
         let hidden = [before.a[W], before.b[W]];

@@ -49,7 +49,7 @@ fn shade(margin: f64, passed: bool) -> (String, bool) {
         // A thousand times the tolerance is the darkest.
         false => (BEYOND, margin.max(1.0).log10() / 3.0),
     };
-    let Color(r, g, b, _) = from.towards(to, share);
+    let Color(r, g, b, _) = from.toward(to, share);
     let light = 0.3 * f64::from(r) + 0.6 * f64::from(g) + 0.1 * f64::from(b);
     (format!("#{r:02x}{g:02x}{b:02x}"), light < 130.0)
 }
@@ -108,8 +108,7 @@ pub fn matrix(matrix: &Matrix) -> String {
         }
         text += "</tr>\n";
     }
-    text + "</tbody></table>\n<p class=\"soft\">A cell is the distance to the reference value in tolerances: up to 1 passes, \
-            ✗ fails. * is required of the default solver.</p>\n"
+    text + "</tbody></table>\n<p class=\"soft\">A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.</p>\n"
 }
 
 /// Two digits.

@@ -115,10 +115,9 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     if is_sweep(records) {
         let swept = records.iter().find_map(|r| r.swept).map_or("", |s| s.name);
         let lead = format!(
-            "Time and errors against {}, a curve per solver; a mark is a setting at its fastest lane width, hollow \
-             ones are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the \
-             scene’s tolerance. What falls, slides, tunnels or blows up is at the upper edge and breaks the curve. \
-             All settings of a scene were timed in turns.",
+            "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the \
+             scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. \
+             The settings of a scene were timed interleaved.",
             escaped(swept)
         );
         section("sweep", "Sweep", &lead, sweep::section(records));
@@ -129,16 +128,14 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     section(
         "overview",
         "Speed against error over all scenes",
-        "Small marks: every solver and budget on every scene, in colours, at its fastest lane width. Large marks: \
-         the geometric mean of a budget, from the smallest to the largest; hollow ones leave out scenes on which it \
-         does not hold, and their names say how many. Lower left is better; what fell, slid, tunnelled or blew up is at the right edge.",
+        "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from the smallest budget to the largest; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
         overview::overview(records),
     );
     if !recordings.is_empty() {
         let scene = escaped(&recordings[0].1.scene);
         let lead = format!(
-            "{scene} separates the solvers more than any other scene that is small enough to play. Bodies are \
-             coloured by their deepest overlap; arrows are impulses."
+            "{scene} separates the solvers most, among scenes small enough to play. Bodies are \
+             colored by their deepest overlap; arrows are impulses."
         );
         let panels: Vec<Panel> = recordings
             .iter()
@@ -177,8 +174,7 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     section(
         "lanes",
         "Lanes",
-        "Each solver at its standard budget, coloured: how many times faster than one lane, and how many lanes \
-         hold a contact.",
+        "Each solver at its standard budget in colored order: speed-up over one lane, and the share of lanes that hold a contact.",
         legend() + &sections::lanes(records),
     );
     section(
@@ -190,13 +186,13 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     section(
         "iterations",
         "Iterations against error",
-        "Sweeps over all constraints, of every kind, that a step takes; settings that hold, coloured.",
+        "Constraint sweeps per step, of every kind; settings that hold, in colored order.",
         legend() + &sections::iterations(records),
     );
     let cases = match matrix {
         Some(found) => matrix::matrix(found),
         None => "<p>Not run. <code>simpulse verify --json &gt; DIR/verify.json</code> and then \
-                 <code>simpulse report DIR</code> put it here.</p>\n"
+                 <code>simpulse report DIR</code> adds it here.</p>\n"
             .into(),
     };
     section("verify", "Hard cases with known reference values", "", cases);
@@ -398,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn the_matrix_is_coloured_by_margin() {
+    fn the_matrix_is_colored_by_margin() {
         let json = r#"{"cases":[{"case":"A1","what":"slides","required":true}],"results":[
             {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"truth":1,"tolerance":2},
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},

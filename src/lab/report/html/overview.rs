@@ -75,7 +75,7 @@ pub fn overview(records: &[Record]) -> String {
             format!("{} on {}: {}, {}× the fastest", e.solver, e.scene, e.words(), number(dot.slower));
         match wrong(e) {
             Some(x) => {
-                let title = format!("{title}, error {} tolerances", number(x));
+                let title = format!("{title}, error {} × tolerance", number(x));
                 panel.marker(panel.at(x, dot.slower), 2.6, e.solver, false, true, &title);
             }
             None => {
@@ -101,7 +101,7 @@ pub fn overview(records: &[Record]) -> String {
             let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
             let (held_on, of) = (held.len(), scenes(records).len());
             let title = format!(
-                "{solver}, {name}: holds on {} of {} scenes; there {} tolerances and {}× in the mean",
+                "{solver}, {name}: holds on {} of {} scenes; on those its geometric mean error is {} × tolerance, its time {}× the fastest",
                 held_on,
                 of,
                 number(mean(&xs)),

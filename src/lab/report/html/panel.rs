@@ -15,7 +15,7 @@ pub enum Band {
     None,
     /// Errors grow to the right.
     Right,
-    /// Errors grow upwards.
+    /// Errors grow upward.
     Top,
 }
 

@@ -8,13 +8,13 @@ pub struct Scale {
     log: bool,
     pub low: f64,
     pub high: f64,
-    /// Labelled ones.
+    /// Labeled ones.
     pub ticks: Vec<(f64, String)>,
     /// Those between.
     pub minor: Vec<f64>,
 }
 
-/// Most labelled ticks.
+/// Most labeled ticks.
 const MOST: usize = 7;
 
 impl Scale {

@@ -17,7 +17,7 @@ pub trait Setting {
     fn on_front(&self, axis: ErrorAxis) -> bool;
     /// What went wrong, and when; none if the run holds.
     fn broke(&self) -> Option<String>;
-    /// Whether it has no colours.
+    /// Whether it has no colors.
     fn is_natural(&self) -> bool;
     /// The largest of its errors in their tolerances; none if it does not hold, or missed its truth.
     fn worst(&self) -> Option<f64>;
@@ -97,7 +97,7 @@ pub fn fastest(scene: &[Record]) -> Vec<&Record> {
     kept
 }
 
-/// Of each solver the setting in the middle of its budgets, coloured where there is such a run.
+/// Of each solver the setting in the middle of its budgets, colored where there is such a run.
 pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
     let own: Vec<&Record> = fastest(scene).into_iter().filter(|r| r.solver == solver).collect();
     let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.is_natural()).collect();

@@ -43,12 +43,7 @@ pub fn answer(records: &[Record], steps: Option<u64>) -> String {
         }
         text += &format!("<td>{}</tr>\n", escaped(&own.fails_on.join(", ")));
     }
-    text += "</tbody></table>\n<p class=\"soft\">A plausible run holds, stands for a minute where it has to rest, and \
-             keeps the tolerances of the scene: a centimetre of penetration at bodies of a metre, a tenth of the \
-             weight of the lighter body as the residual of the contact law, its reference value, its speed at rest. \
-             A tight one keeps a tenth of each, an exact one a hundredth. Score: a solver has, in the mean over \
-             scenes, this share of the speed of the fastest solver for the scene; 0 where it is not good enough. \
-             Range: with any scene left out, and with half and twice the tolerances.</p>\n\
+    text += "</tbody></table>\n<p class=\"soft\">A plausible run holds, stands for a minute if it has to rest, and its errors are within the tolerances of the scene: 1 cm of penetration for bodies of 1 m, 10 % of the lighter body’s weight for the contact-law residual, the scene’s reference value, the speed at rest. A tight run is within 10 % of them, an exact run within 1 %. Score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, averaged over scenes (0 where it is not good enough). Range: with any scene left out, and with half or twice the tolerances.</p>\n\
              <table class=\"numbers answer\"><caption>The cheapest setting that is good enough, by scene</caption>\
              <thead><tr><th>scene<th>solver<th>setting<th>mean step<th>median<th>longest<th>penetration<th>residual\
              <th>to reference<th>at rest<th>tight<th>exact<th>next</tr></thead><tbody>\n";
@@ -84,7 +79,7 @@ fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: O
 fn later_lines(records: &[Record]) -> Vec<String> {
     let found = fails_later(records);
     let line = |(r, why): &(&Record, String)| {
-        format!("{}: {}, {} passes its run, and then {why}.", r.scene, r.solver, r.budget_text)
+        format!("{}: {}, {} passes its run, then {why}.", r.scene, r.solver, r.budget_text)
     };
     found.iter().map(line).collect()
 }
@@ -100,7 +95,7 @@ fn row(answer: &Answer, records: &[Record]) -> String {
     let behind = match (answer.best(), answer.runner_up()) {
         (None, _) => {
             let over = entry.worst().map_or("∞".into(), number);
-            format!("<td class=\"bad\">none is good enough: the nearest, {over} times over")
+            format!("<td class=\"bad\">none is good enough: the nearest exceeds a tolerance {over} times")
         }
         _ if !tied.is_empty() => format!("<td>tied with {}", escaped(&tied.join(", "))),
         (_, None) => "<td>no other solver".into(),

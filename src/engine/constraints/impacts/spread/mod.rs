@@ -25,7 +25,7 @@
 //! height. What stops touches from t = s/|v| on. One that is pushed again by a body that was hit at t′ is so at the later of both times.
 //! Solvers that find velocities from positions, or that are rivals, bounce at the beginning: not `timed`.
 //!
-//! When the two centres are displaced by D against each other at the time of the impulse, it adds D × λ to angular
+//! When the two centers are displaced by D against each other at the time of the impulse, it adds D × λ to angular
 //! momentum with the arms of the step's beginning. So arms end at a point of both bodies then, r_a + D/2 and r_b − D/2;
 //! round shapes have the frame of that moment (`touch.rs`). In the rows themselves and not beside them: what an
 //! impulse does that its row does not know of may add energy, and has shot bodies out of piles.
@@ -84,7 +84,7 @@ const VISITS: [usize; 2] = [256, 8];
 /// Spreads impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Spread {
-    /// Lanes that are hit, of the coloured batches and of the serial ones, then of both by island.
+    /// Lanes that are hit, of the colored batches and of the serial ones, then of both by island.
     found: [Vec<u32>; 2],
     hit: Vec<(u32, u32)>,
     /// `[rows]`

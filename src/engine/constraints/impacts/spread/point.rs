@@ -100,7 +100,7 @@ pub(super) struct Point {
 /// What [`super::Spread::run`] works on.
 pub(crate) struct On<'a> {
     pub rows: &'a mut [BodyRow],
-    /// Coloured batches, serial ones.
+    /// Colored batches, serial ones.
     pub batches: [&'a mut Batches; 2],
     pub contacts: &'a mut [Contact],
     pub features: &'a Features,

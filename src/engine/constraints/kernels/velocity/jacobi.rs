@@ -1,5 +1,5 @@
 //! The Jacobi sweep: all contacts read the velocities from before the sweep, and what they add
-//! to a body is summed up and applied afterwards.
+//! to a body is summed up and applied afterward.
 //!
 //! Within a contact the rows are still solved one after the other (`catto2024solver2d`,
 //! `solve_jacobi`). Sums have an order: color by color, so that they have the same bits at every

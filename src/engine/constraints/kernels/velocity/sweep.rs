@@ -61,7 +61,7 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, Lanes, RowStore};
 
-/// How a normal row's state becomes its new accumulated impulse.
+/// The rule that gives the new accumulated impulse of a normal row.
 ///
 /// `against_static` tells that body a is static or kinematic.
 pub trait NormalRule: Copy + Send + Sync + 'static {

@@ -1,7 +1,8 @@
-//! Which points bear, and what their loads of the last step do to the accelerations of bodies.
+//! Finds closed points, and applies their loads of the last step to the accelerations of bodies.
 //!
-//! A point is closed if its gap is a fraction of the slop and it moves along its normal no faster than what forces make of
-//! rest in a step, v ≤ dt (|a_a| + |a_b|). One that closes begins with the impulse of the last substep.
+//! A point is closed if its gap is below a fraction of the slop and its normal speed is below the speed that forces
+//! add from rest in one step, v ≤ dt (|a_a| + |a_b|). A point that just closed starts from the impulse of the last
+//! substep.
 
 use super::OPEN;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -85,7 +86,7 @@ fn close<L: Lanes>(
             loads[2 * p] = is_closed.select_positive(normal, open);
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
-            // What is left of impulses is what statics does not know.
+            // The rest of the impulse is the part that statics does not explain.
             let at = layout.at(p, layout.normal_impulse);
             record[at] = record[at] - impulse[0];
             if layout.has_friction {
@@ -111,7 +112,7 @@ pub(super) fn arms_of<L: Lanes>(record: &[L], layout: &Layout, p: usize) -> [[L;
     [arm(layout.arm_a, layout.has_arms[1]), arm(layout.arm_b, layout.has_arms[0])]
 }
 
-/// What impulses along n and t (N·s) do to a and b.
+/// Applies impulses along n and t (N·s) to a and b.
 #[inline(always)]
 pub(super) fn push<L: Lanes>([a, b]: [&mut [L; 8]; 2], [nx, ny]: [L; 2], arms: [[L; 2]; 2], [n, t]: [L; 2]) {
     let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));

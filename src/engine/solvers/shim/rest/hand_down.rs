@@ -1,12 +1,13 @@
-//! Loads that go down from body to body.
+//! Loads handed down from body to body.
 //!
-//! Sweeps spread a change of loads by a contact each, and a moment along a column of N bodies takes N⁴ of them. From the top of the
-//! contact graph downwards it takes one pass: each body stands on its closed points with the bodies below it, whose loads are found
-//! such that nothing is left that accelerates it ([`supports`]), and what these loads change acts on the bodies below. Bodies
-//! that are not accelerated are left as they are, so that a pile at rest costs one comparison a body.
+//! A sweep spreads a change of loads by one contact, and a moment along a column of N bodies takes N⁴ sweeps. One
+//! pass down the contact graph suffices: each body stands on its closed points with the bodies below it, whose loads
+//! are chosen so that nothing accelerates it ([`supports`]); the changes of these loads act on the bodies below.
+//! Bodies without acceleration are skipped, so a pile at rest costs one comparison per body.
 //!
-//! Below is what is nearer to the ground in the graph of contacts whose normals are within 60° of gravity; what these do not connect with
-//! the ground, as a row of boxes that is pressed to a wall, hangs on the graph of all contacts.
+//! "Below" means nearer to the ground in the graph of contacts whose normals are within 60° of gravity. Bodies that
+//! these do not connect with the ground, such as a row of boxes pressed against a wall, use the graph of all
+//! contacts.
 
 use super::{OPEN, PER_CONTACT};
 use crate::engine::bodies::{Bodies, BodyKind};
@@ -16,14 +17,14 @@ use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, held};
 use glam::{DVec2, Vec2};
 
-/// Least cosine between gravity and the normals of contacts that hand it down.
+/// Smallest cosine between gravity and the normals of contacts that hand loads down.
 const BEARING: f32 = 0.5;
 
-/// Acceleration that is left alone, over that of free flight (1): of what stands on one body, whose lean grows if its loads are not those
-/// of its place, and of what stands on several.
+/// Acceleration that is ignored, over that of free flight (1): of bodies that stand on one body, whose lean grows
+/// unless their loads fit their position, and of bodies that stand on several.
 const STILL: [f32; 2] = [1e-5, 1e-3];
 
-/// Least cosine between the normals of what does not lean (1).
+/// Smallest cosine between the normals of a body that does not lean (1).
 const ALIKE: f32 = 0.99;
 
 /// Hands loads down; keeps its memory from call to call.
@@ -34,8 +35,8 @@ pub(in super::super) struct HandDown {
     bearing: Vec<u32>,
     /// Of all contacts; empty if `upright` has all bodies that have some.
     all: Graph,
-    /// Bodies from the top downwards, and the part of their free acceleration that is left alone; infinite for what leans, on a body
-    /// of its own level or on several in different directions: only sweeps find its thrust.
+    /// Bodies from the top downward, with the share of their free acceleration that is ignored; infinite for bodies
+    /// that lean, on a body of their own level or on several in different directions: only sweeps find their thrust.
     downwards: Vec<(u32, f32)>,
     /// Of one body.
     supports: Vec<Support>,
@@ -56,7 +57,7 @@ pub(in super::super) struct On<'a> {
 }
 
 impl HandDown {
-    /// Builds the graphs, where contacts have come or gone.
+    /// Builds the graphs when contacts have appeared or disappeared.
     pub fn build(&mut self, bodies: &Bodies, contacts: &[Contact], gravity: Vec2) {
         let up = (-gravity).try_normalize().unwrap_or(Vec2::Y);
         let is_dynamic = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic;
@@ -86,7 +87,7 @@ impl HandDown {
         self.downwards.extend(standing.map(|&body| (body, still(&self.upright, body, bearing))));
     }
 
-    /// Hands down what accelerates bodies; whether something bears for the first time.
+    /// Hands down the forces that accelerate bodies; returns whether a contact carries load for the first time.
     pub fn run(&mut self, on: &mut On<'_>) -> bool {
         let mut begins = false;
         for i in 0..self.downwards.len() {
@@ -97,7 +98,7 @@ impl HandDown {
             let turning = if inv_inertia > 0.0 { turn * turn * inv_mass / inv_inertia } else { 0.0 };
             let free = free_x.mul_add(free_x, free_y * free_y);
             let moves = x.mul_add(x, y.mul_add(y, turning));
-            // What nothing bears is accelerated as in flight.
+            // A body without supports accelerates as in free flight.
             if moves <= free * (still * still).min(0.25) {
                 continue;
             }
@@ -111,7 +112,7 @@ impl HandDown {
         begins
     }
 
-    /// Lists the closed points of `body` with what is below it, with their loads.
+    /// Lists the closed points of `body` with the bodies below it, and their loads.
     fn find_supports(&mut self, on: &On<'_>, body: u32) {
         self.supports.clear();
         let level = self.upright.levels()[body as usize];
@@ -148,7 +149,7 @@ impl HandDown {
         }
     }
 
-    /// Finds the loads on which `body` stands.
+    /// Finds the loads that support `body`.
     fn stand(&mut self, on: &mut On<'_>, body: u32) {
         let BodyRow { velocity: [x, y, turn, inv_mass], delta: [.., inv_inertia] } = on.fields[body as usize];
         let h = f64::from(on.h);

@@ -1,6 +1,6 @@
 //! One projected Gauss–Seidel sweep over the loads of closed points; see [`super`].
 //!
-//! With P = F h and the change of velocity per substep w = h a in the place of accelerations,
+//! With P = F h and the change of velocity per substep w = h a instead of accelerations,
 //!
 //! ```text
 //! P_n ← max(0, P_n − m_n J_n w)      P_t ← P_t − m_t J_t w within ±µ P_n

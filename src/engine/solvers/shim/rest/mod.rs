@@ -1,9 +1,9 @@
-//! Rest: what contacts bear in statics, and springs that are shortened by what they give way under it.
+//! Rest: the loads of contacts in statics, and springs shortened by their sag under these loads.
 //!
 //! # The problem
 //!
-//! A spring bears a load by giving way: at rest a soft row of impulse λ per substep has, with the terms of
-//! [`crate::engine::constraints::kernels::velocity::rules::Soft`], γ_i λ = −m γ_m β s, and so sags by
+//! A spring carries a load by deflecting. At rest a soft row of impulse λ per substep has, with the terms of
+//! [`crate::engine::constraints::kernels::velocity::rules::Soft`], γ_i λ = −m γ_m β s, so it sags by
 //!
 //! ```text
 //! sag(λ) = γ_i λ / (γ_m β m)
@@ -11,23 +11,25 @@
 //!
 //! # The law
 //!
-//! The loads F that closed contacts bear at rest solve the contact problem on accelerations, with those of free flight a₀:
+//! The loads F of closed contacts at rest solve the contact problem on accelerations, where a₀ is the acceleration in
+//! free flight:
 //!
 //! ```text
 //! a = a₀ + M⁻¹ Jᵀ F,    F_n ≥ 0,  J_n a ≥ 0,  F_n J_n a = 0,    |F_t| ≤ µ F_n,  J_t a = 0 or |F_t| = µ F_n
 //! ```
 //!
-//! Each contact keeps its loads. Every step they are the start of `load_sweeps` projected Gauss–Seidel sweeps ([`loads`]),
-//! and each point is shortened by the sag of its load ([`shorten`]): it sees s − sag(F h) instead of s, and rests at s = 0.
+//! Each contact keeps its loads. In every step `load_sweeps` projected Gauss–Seidel sweeps start from them
+//! ([`loads`]), and each point is shortened by the sag of its load ([`shorten`]): its row sees s − sag(F h) instead
+//! of s and rests at s = 0.
 //!
-//! Loads are fed forward. They follow from weights and from which contacts are closed ([`closed`]), and not from impulses of the
-//! springs that they shorten, so that there is no loop to tune, to wait for, or to rock a column; and loads that the law does not ask for
-//! do not grow.
+//! Loads are fed forward: they follow from weights and from which contacts are closed ([`closed`]), not from the
+//! impulses of the springs that they shorten. So there is no feedback loop that must be tuned, delays loads or rocks
+//! a column.
 //!
 //! # New bodies
 //!
-//! Sweeps from nothing need as many steps as a pile is high. What bears a body for the first time begins with what it bears if
-//! loads go down from body to body ([`hand_down`]).
+//! Sweeps from zero need as many steps as a pile is high. New contacts start from the loads that a pass down the
+//! pile, body by body, gives them ([`hand_down`]).
 
 pub(super) mod closed;
 pub(super) mod hand_down;
@@ -56,15 +58,15 @@ pub(super) const HELD: usize = 6;
 /// See [`PER_CONTACT`].
 pub(super) const LEAD: usize = 7;
 
-/// How often as many sweeps are made in a step in which something bears for the first time: thrust, as of an arch, is found by
-/// sweeps alone.
+/// Factor on the sweeps of a step in which a contact carries load for the first time: only sweeps find thrust, such
+/// as that of an arch.
 const AT_FIRST: u32 = 64;
 
 /// N of a point that is open.
 const OPEN: f32 = -1.0;
 
 impl Shim {
-    /// Finds the loads of closed contacts, and shortens `springs` by their sag.
+    /// Finds the loads of closed contacts and shortens `springs` by their sag.
     pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
         let (h, dt) = (passes.h(), passes.dt());
         let fields = &mut self.fields;

@@ -2,22 +2,22 @@
 //!
 //! # What is left
 //!
-//! Points at rest shall stay points that touch: of each sag (1 − φ) is left, 20 µm at most.
+//! Points at rest have to stay in contact, so a share (1 − φ) of each sag remains, at most 20 µm.
 //!
-//! What is found in the first step of one of its bodies begins with all of its sag taken away, and leaves that overlap within a second: piles
-//! that begin at rest would else sink by it within a step, and rebound.
+//! Contacts found in the first step of one of their bodies start with their whole sag removed and approach that
+//! overlap within a second: otherwise piles that start at rest would sink by it within a step and rebound.
 //!
 //! # Contacts that roll
 //!
-//! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
-//! swells and settles without an end. So a contact of one point keeps what it was shortened by while that is at least half of what its
-//! load calls for, and no more than that and a tenth.
+//! Shortening a spring pushes bodies apart, and on one point they roll: in a pile of discs some contact slips, loads
+//! change, and the pile swells and settles endlessly. So a contact of one point keeps its shortening as long as that
+//! is between 0.5 and 1.1 times the one that its load calls for.
 //!
 //! # Overlap that was placed
 //!
-//! Bodies may be put into a world where they overlap. No load has made that overlap, and springs that see it throw bodies apart
-//! in the first step: a house of cards 2 mm in each other loses its top. So a contact that is found in the first step of one of its
-//! bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
+//! Bodies may be placed so that they overlap. No load has caused that overlap, and springs that see it throw bodies
+//! apart in the first step: a house of cards 2 mm in each other loses its top. So a contact that is found in the
+//! first step of one of its bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
 //!
 //! ```text
 //! d₀ ← min(max(d₀, s) τ/(τ + dt) + 20 µm, 0)
@@ -25,15 +25,16 @@
 //!
 //! # How deep springs see it
 //!
-//! Springs bear a load however deep its contact is ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap that no load has made is
-//! pushed out at the push speed alone: at the beginning of a step springs see a contact no deeper than
+//! Springs carry their load at any depth ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap
+//! that no load has made is pushed out at the push speed alone: at the beginning of a step springs see a contact no
+//! deeper than
 //!
 //! ```text
 //! u/(γ_m β) + 20 sag
 //! ```
 //!
-//! the depth from which the push speed u is all they give, and more as they bear a load. So what is
-//! thrown into another body is not thrown back.
+//! the depth at which they reach the push speed u, plus a depth that grows with their load. So a body thrown into
+//! another is not thrown back.
 
 use super::{HELD, LESS, PLACED};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -54,16 +55,16 @@ pub(in super::super) struct Shorten {
     pub dt: f32,
 }
 
-/// φ: part of a sag that is taken away (1).
+/// φ: share of a sag that is removed (1).
 const SHARE: f32 = 0.95;
 
-/// Most overlap that is left of a sag (m): 1/250 of the slop, and far more than a separation is rounded to.
+/// Largest overlap that remains of a sag (m): 1/250 of the slop, and far more than the rounding of a separation.
 pub(in super::super) const LEFT: f32 = 2e-5;
 
 /// Time in which that comes where a contact began without it (s).
 const GIVING: f32 = 1.0;
 
-/// Largest sag that is taken away (m).
+/// Largest sag that is removed (m).
 const LARGEST: f32 = 5.0 * SPECULATIVE_DISTANCE;
 
 /// Least and most that a contact of one point keeps of what its load calls for (1).
@@ -79,7 +80,7 @@ const EARNED: f32 = 20.0;
 /// second; shorter, it is thrown over at 240.
 const PLACED_TIME: f32 = 0.1;
 
-/// Batches between asking for contacts and reading them.
+/// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
 
 impl Pass for Shorten {

@@ -1,4 +1,4 @@
-//! Rigid contacts with Baumgarte stabilisation.
+//! Rigid contacts with Baumgarte stabilization.
 
 use super::{Relaxed, Rule};
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
