@@ -7,9 +7,10 @@ use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::Limits;
-use crate::lab::advise::{Advice, Plan, Setting, Trial, advise};
+use crate::lab::advise::{Advice, Plan, Setting, Time, Trial, advise};
 use crate::lab::error::Error;
 use crate::lab::overrides;
+use crate::lab::profile::waiting;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::{error_list, finish, table};
 use crate::lab::report::units::{self, digits, quantity, ratio, si, si_short};
@@ -38,7 +39,7 @@ Examples:
   simpulse advise incline_slip --max-reference 1mm --solvers soft_step,pgs --lanes 8 --json > advice.json")]
 pub struct AdviseArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Largest penetration allowed, such as 1mm: of 99 % of all contact points, and of every point in the last second
     /// where the scene has to rest
@@ -218,6 +219,8 @@ fn text(plan: &Plan, advice: &Advice) -> String {
         (None, None) => text += "nothing was tried: the time limit was reached\n",
     }
     text += &format!("\n{}", finalists(plan, advice));
+    let waited = advice.finalists.iter().filter_map(|t| Some(t.sample.as_ref()?.waited)).fold(0.0, f64::max);
+    text += &waiting::note(Some(waited));
     text += &format!(
         "\ntried {} settings; skipped {} that cannot be cheaper{}\n",
         advice.trials.len(),
@@ -253,12 +256,13 @@ fn sentence(plan: &Plan, best: &Trial) -> String {
 
 /// What is faster and was not taken, with the reason.
 fn rejected(plan: &Plan, advice: &Advice) -> String {
-    let mut rows = table(&["  rejected although faster", "µs/step", "why"]);
+    let mut rows = table(&["  rejected although faster", "µs/step", "longest", "why"]);
     let rejected = advice.rejected();
     for trial in &rejected {
-        let time = trial.time.map_or("–".into(), |t| digits(1e-3 * t.median_ns));
+        let [median, longest] = [|t: Time| t.median_ns, |t: Time| t.worst_ns]
+            .map(|of| trial.time.map_or("–".into(), |t| digits(1e-3 * of(t))));
         let why = trial.fails(&plan.limits).unwrap_or_default();
-        rows.add_row([format!("  {}", trial.setting.text()), time, why]);
+        rows.add_row([format!("  {}", trial.setting.text()), median, longest, why]);
     }
     if rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
 }
@@ -278,7 +282,7 @@ fn lanes(trial: &Trial) -> String {
 /// How far a setting is behind the best one.
 fn loses(next: &Trial, best: &Trial) -> String {
     let Some((next_time, best_time)) = next.time.zip(best.time) else { return String::new() };
-    let percent = 100.0 * (next_time.median_ns / best_time.median_ns - 1.0);
+    let percent = 100.0 * (next_time.mean_ns / best_time.mean_ns - 1.0);
     if next.ties(best) {
         format!("tied: {percent:.1} % slower, within the noise")
     } else {
@@ -315,6 +319,8 @@ fn finalists(plan: &Plan, advice: &Advice) -> String {
         "compared",
         "lanes",
         "µs/step",
+        "median",
+        "longest",
         "±",
         "slower",
         "penetration",
@@ -324,10 +330,8 @@ fn finalists(plan: &Plan, advice: &Advice) -> String {
     ]);
     let first = advice.finalists.first();
     for trial in &advice.finalists {
-        let time = |of: fn(crate::lab::advise::Time) -> f64| {
-            trial.time.map_or("failed".to_string(), |t| digits(1e-3 * of(t)))
-        };
-        let slower = |f: &Trial| Some((f.ties(trial), trial.time?.median_ns / f.time?.median_ns - 1.0));
+        let time = |of: fn(Time) -> f64| trial.time.map_or("failed".to_string(), |t| digits(1e-3 * of(t)));
+        let slower = |f: &Trial| Some((f.ties(trial), trial.time?.mean_ns / f.time?.mean_ns - 1.0));
         let slower = first.filter(|f| !std::ptr::eq(*f, trial)).and_then(slower);
         let error = |of: &dyn Fn(&crate::lab::metrics::Errors) -> String| {
             trial.errors.as_ref().map_or("–".to_string(), of)
@@ -335,7 +339,9 @@ fn finalists(plan: &Plan, advice: &Advice) -> String {
         rows.add_row([
             trial.setting.text(),
             lanes(trial),
+            time(|t| t.mean_ns),
             time(|t| t.median_ns),
+            time(|t| t.worst_ns),
             time(|t| t.spread_ns),
             slower.map_or("–".to_string(), |(tied, by)| match tied {
                 true => "tie".to_string(),
@@ -367,9 +373,10 @@ fn json(plan: &Plan, advice: &Advice) -> Value {
             "setting": setting(&t.setting),
             "time": t.time,
             "errors": t.errors,
-            "truth": t.truth,
+            "reference": t.truth,
             "failure": t.failure,
-            "broken": t.broken,
+            "holds": t.broken.map_or("yes", |b| b.mark.word()),
+            "failed_step": t.broken.map(|b| b.step),
             "later": t.later,
             "why_not": t.fails(&plan.limits),
             "in_limits": Some(t.excess).filter(|e| e.is_finite()),

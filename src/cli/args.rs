@@ -107,7 +107,7 @@ pub struct CompletionArgs {
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = values::scene_help(), required_unless_present = "schema")]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = values::scene_help(), required_unless_present = "schema")]
     pub name: Option<String>,
     /// Print the JSON schema of scene files
     #[arg(long, exclusive = true)]

@@ -2,7 +2,7 @@
 
 use super::output::{print_beside, print_json, value};
 use super::progress::Bar;
-use super::values::{SettingArgs, scene_help};
+use super::values::{self, SettingArgs, scene_help};
 use crate::engine::world::World;
 use crate::lab::capture::capture;
 use crate::lab::error::Error;
@@ -31,7 +31,7 @@ Examples:
       The same, but with the steps before it solved more accurately.")]
 pub struct CaptureArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Step whose problem to freeze, from 1; the steps before it are run
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]

@@ -9,8 +9,10 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::reference::frozen::Frozen;
+use crate::lab::report::axes::with_dark;
+use crate::lab::report::style::Style;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Count the iterations every solver needs on one frozen problem
@@ -40,7 +42,7 @@ Examples:
       No timing, so that the output is the same on every run.")]
 pub struct ConvergeArgs {
     /// Frozen problem (a file, not ending in .json), or a scene as for `simpulse capture`
-    #[arg(value_name = "FILE|SCENE")]
+    #[arg(value_name = "FILE|SCENE", value_parser = values::scene())]
     pub problem: String,
     /// Step to freeze if a scene is given, counted from 1
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
@@ -90,10 +92,10 @@ impl ConvergeArgs {
 /// Runs the command.
 pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let options = args.options()?;
-    let path = Path::new(&args.problem);
+    let path = files::path_of(&args.problem);
     let is_frozen = args.problem.ends_with(".frozen") || path.is_file() && !args.problem.ends_with(".json");
     let frozen = if is_frozen {
-        Frozen::read(path)?
+        Frozen::read(&path)?
     } else {
         let (frozen, why_not) = freeze(&args.problem, args.step, &SettingArgs::standard()?)?;
         if let Some(why) = why_not {
@@ -111,7 +113,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let files = [
         ("converge.csv", table::csv(&report)?),
         ("converge.json", json.clone()),
-        ("converge.svg", plot::svg(&report)?),
+        ("converge.svg", with_dark(&plot::svg(&report, &|solver| Style::of(solver).rgb())?)),
     ];
     for (name, text) in &files {
         files::write(&args.out.join(name), text.as_bytes())?;

@@ -3,7 +3,7 @@
 use super::output::{note, print, print_json};
 use super::progress::Bar;
 use super::settled;
-use super::values::{Lanes, SettingArgs};
+use super::values::{self, Lanes, SettingArgs};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::estimate::{self, Estimate, free_memory};
@@ -40,8 +40,8 @@ Examples:
       Copies of a pyramid of 55 boxes: as many contacts, in small islands.
   simpulse growth --scene circle_pile --solver pgs --lanes 16 --out results/growth")]
 pub struct GrowthArgs {
-    /// A scene of `simpulse scenes`: without a size it is built larger, with one it is copied
-    #[arg(long, default_value = "pyramid", value_name = "SCENE")]
+    /// A scene of `simpulse scenes`: without a size it is grown, with one it is copied
+    #[arg(long, default_value = "pyramid", value_name = "SCENE", value_parser = values::scene())]
     pub scene: String,
     /// Numbers of contacts to aim at
     #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "1e3,3e3,1e4,3e4,1e5,3e5,1e6")]
@@ -231,7 +231,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         out += &format!("wrote {}\n", path.display());
     }
     match args.json {
-        true => print_json(&growth_json(&rows, &verdicts)),
+        true => print_json(&growth_json(&rows, &verdicts, waiting)),
         false => print(&out),
     }
 }

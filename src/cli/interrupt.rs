@@ -2,10 +2,15 @@
 
 use crate::lab::files;
 use std::process::exit;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
 /// Exit code of an interrupted command.
 const INTERRUPTED: i32 = 130;
+
+/// How long an interrupted command may go on writing results: so many moments.
+const PATIENCE: u32 = 100;
+const MOMENT: Duration = Duration::from_millis(100);
 
 type Rescue = Box<dyn FnOnce() + Send>;
 
@@ -19,8 +24,15 @@ pub fn install() {
         if let Some(rescue) = take() {
             rescue();
         }
-        // A thread that writes files that belong together finishes first and then ends the process.
-        let _writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+        // Whoever writes files that belong together ends that first, and the process with it; but not for ever.
+        let mut writing = WRITING.try_lock();
+        for _ in 0..PATIENCE {
+            if !matches!(writing, Err(TryLockError::WouldBlock)) {
+                break;
+            }
+            std::thread::sleep(MOMENT);
+            writing = WRITING.try_lock();
+        }
         files::remove_temporaries();
         exit(INTERRUPTED);
     });

@@ -119,7 +119,7 @@ fn empty(error: &clap::Error) -> Option<String> {
     };
     let argument = text(ContextKind::InvalidArg).filter(|_| text(ContextKind::InvalidValue) == Some(""))?;
     let (name, value) = argument.split_once(' ').unwrap_or((argument, ""));
-    let given: Vec<_> = std::env::args().collect();
+    let given: Vec<_> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let all =
         given.contains(&format!("{name}=")) || given.windows(2).any(|w| w[0] == name && w[1].is_empty());
     Some(match (value.contains('…'), all) {

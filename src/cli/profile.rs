@@ -2,7 +2,7 @@
 
 use super::output::{note, print, print_json};
 use super::settled;
-use super::values::{Lanes, SettingArgs, scene_help};
+use super::values::{self, Lanes, SettingArgs, scene_help};
 use crate::engine::clock::Phase;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
@@ -45,7 +45,7 @@ With perf, which then sees the phase and nothing else; build with frame pointers
 The steps that settle the scene are in it too: --settle 5 and a long --seconds make them small.")]
 pub struct ProfileArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// The phase to repeat, or `all` in turn
     #[arg(long, default_value = "all", value_name = "PHASE", value_parser = phase())]

@@ -40,7 +40,7 @@ Examples:
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
 pub struct RunArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Solver, budget and parameters
     #[command(flatten)]
@@ -346,8 +346,8 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
         "phase_ns": phases,
         "errors": value(&found.errors)?,
         "reference": value(&found.truth)?,
-        "holds": found.broken.map_or("yes".to_string(), |b| b.to_string()),
-        "broken": value(&found.broken)?,
+        "holds": found.broken.map_or("yes", |b| b.mark.word()),
+        "failed_step": found.broken.map(|b| b.step),
         "not_checked": found.unchecked,
     }))
 }

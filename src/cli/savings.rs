@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
-use super::values::{ImpactArgs, Lanes, solver};
+use super::values::{self, ImpactArgs, Lanes, solver};
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
@@ -11,7 +11,6 @@ use crate::lab::report::savings::savings_table;
 use crate::lab::study::StudyPlan;
 use crate::lab::study::savings::savings;
 use clap::Args;
-use clap::builder::NonEmptyStringValueParser;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -32,7 +31,7 @@ pub struct SavingsArgs {
         long,
         value_delimiter = ',',
         value_name = "SCENE,…",
-        value_parser = NonEmptyStringValueParser::new(),
+        value_parser = values::scene(),
         default_value = "card_house,pyramid:40,circle_pile:500"
     )]
     pub scenes: Vec<String>,

@@ -12,7 +12,7 @@ use crate::lab::picture::draw::{WIDTHS, draw};
 use crate::lab::picture::frame::{Frame, Stage};
 use crate::lab::picture::{Picture, png, raster, svg};
 use crate::lab::study::{budget, open_scene};
-use crate::lab::units::{lanes, si};
+use crate::lab::units::{lanes, quantity, si};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -28,7 +28,7 @@ Examples:
   simpulse snapshot arch --step 60 --solver pgs --velocity-iterations 4 -o arch.png --width 1600")]
 pub struct SnapshotArgs {
     /// Scene
-    #[arg(value_name = "SCENE", help = scene_help())]
+    #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
     /// Step after which the frame is taken; 0 is the start
     #[arg(long, value_name = "N", default_value_t = 60)]
@@ -39,6 +39,9 @@ pub struct SnapshotArgs {
     /// Width of the picture in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
     pub width: u32,
+    /// Penetration that has the darkest color; the same in every picture, so that they compare
+    #[arg(long, value_name = "LENGTH", default_value = "10mm")]
+    pub scale: String,
     /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
@@ -75,6 +78,10 @@ pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
         let [least, most] = WIDTHS;
         return Err(Error::invalid("width", format!("{} is not from {least} to {most}", args.width)));
     }
+    let darkest = quantity("scale", &args.scale, "m")?;
+    if !(darkest > 0.0 && darkest.is_finite()) {
+        return Err(Error::invalid("--scale", format!("{} is no positive length", args.scale)));
+    }
     let settings = settings(&args.setting, args.order, args.lanes)?;
     let loaded = open_scene(&args.scene, args.seed, None, args.dt)?;
     let mut world = loaded.scene.build(settings)?;
@@ -99,7 +106,7 @@ pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
         s.solver.name,
         si(frame.deepest(), "m")
     );
-    let picture = draw(&stage, &frame, &title, &subtitle, args.width);
+    let picture = draw(&stage, &frame, &title, &subtitle, args.width, darkest);
     files::write(&args.output, &encode(&picture))?;
     let text = format!("{title}: {subtitle}\nwrote {}\n", args.output.display());
     print_beside([args.output.as_path()], &text)

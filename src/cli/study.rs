@@ -45,7 +45,7 @@ Examples:
 #[derive(Args, Debug)]
 pub struct StudyArgs {
     /// Scenes
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = NonEmptyStringValueParser::new(), help = values::scenes_help())]
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = values::scene(), help = values::scenes_help())]
     pub scenes: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -89,7 +89,7 @@ pub struct StudyArgs {
     /// Steps of the runs that measure errors [default: those of each scene]
     #[arg(long)]
     pub steps: Option<u32>,
-    /// Timing runs per setting; the fastest of each scene get twice as many more [default: 3]
+    /// Rounds of timing, common to all settings of a scene [default: 3]
     #[arg(long)]
     pub repeats: Option<u32>,
     /// Random seed: of scenes that have one, and of the order of timing runs

@@ -6,11 +6,14 @@ use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
+use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
 use clap::Args;
-use clap::builder::{NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{
+    NonEmptyStringValueParser, OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser,
+};
 
 /// A member of `--solvers`.
 #[derive(Clone, Debug)]
@@ -62,6 +65,14 @@ pub fn left_out(ran: &[&'static Variant]) -> String {
         [] => String::new(),
         names => format!("not run (--solvers all runs every solver): {}\n", names.join(", ")),
     }
+}
+
+/// The parser of scenes: a name, or the path of a file, which need not be text.
+pub fn scene() -> impl TypedValueParser<Value = String> {
+    OsStringValueParser::new().try_map(|given| match given.is_empty() {
+        true => Err("a name or a file is required"),
+        false => Ok(files::text_of(given)),
+    })
 }
 
 /// Help for one scene.

@@ -8,6 +8,7 @@
 //! ([`remove_temporaries`]).
 
 use crate::lab::error::Error;
+use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -268,6 +269,31 @@ impl Drop for Lock {
     }
 }
 
+/// Paths that are no text, with the text that stands for each.
+static PATHS: Mutex<Vec<(String, PathBuf)>> = Mutex::new(Vec::new());
+
+/// The text of a path: names of scenes are text, and a system's paths need not be. [`path_of`] knows the path again.
+pub fn text_of(path: OsString) -> String {
+    let path = match path.into_string() {
+        Ok(text) => return text,
+        Err(path) => PathBuf::from(path),
+    };
+    let mut paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut text = path.to_string_lossy().into_owned();
+    // Another path may look the same.
+    while paths.iter().any(|(known, other)| *known == text && *other != path) {
+        text.insert(0, char::REPLACEMENT_CHARACTER);
+    }
+    paths.push((text.clone(), path));
+    text
+}
+
+/// The path that a text stands for.
+pub fn path_of(text: &str) -> PathBuf {
+    let paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
+    paths.iter().find(|(known, _)| known == text).map_or_else(|| text.into(), |(_, path)| path.clone())
+}
+
 /// Writes a whole file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut file = Pending::new(path)?;
@@ -312,6 +338,17 @@ mod tests {
         write(&path, b"").unwrap();
         assert!(prepare_folder(&path).unwrap_err().to_string().contains("taken"));
         assert!(Pending::new(folder.path()).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn paths_that_are_no_text_are_known_again() {
+        use std::os::unix::ffi::OsStringExt;
+        let paths = [b"a\xff.json".to_vec(), b"a\xfe.json".to_vec()].map(OsString::from_vec);
+        let texts = paths.clone().map(text_of);
+        assert!(texts[0] != texts[1] && texts.iter().all(|text| text.ends_with(".json")), "{texts:?}");
+        assert_eq!(texts.map(|text| path_of(&text)), paths.map(PathBuf::from));
+        assert_eq!((text_of("b.json".into()), path_of("b.json")), ("b.json".into(), "b.json".into()));
     }
 
     #[cfg(unix)]

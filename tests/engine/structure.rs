@@ -232,3 +232,42 @@ fn every_path_in_the_list_of_sources_exists() {
     }
     assert!(paths > 40, "{paths} paths found");
 }
+
+/// Times of steps that are compared with each other come from one function, whoever shows them: `run`, `study`, `advise`
+/// and `savings` cannot tell different times of one setting. All other clocks are of something else.
+#[test]
+fn steps_are_timed_in_one_place() {
+    let source = root().join("src");
+    let clocks: BTreeSet<String> = files(&source)
+        .into_iter()
+        .filter(|(_, text)| code(text).contains("Instant::now"))
+        .map(|(path, _)| path.strip_prefix(&source).unwrap().display().to_string())
+        .collect();
+    let known = [
+        // Times of steps.
+        "lab/study/interleave.rs",
+        // Phases of a step, inside it.
+        "engine/clock.rs",
+        // Steps and phases on a state that is held still, and what the machine can do.
+        "lab/profile/ceilings.rs",
+        "lab/profile/growth.rs",
+        "lab/profile/mod.rs",
+        // Iterations of a frozen problem.
+        "lab/converge/replay.rs",
+        // How long a command has taken.
+        "cli/times.rs",
+        "lab/advise/search.rs",
+        "lab/torture/mod.rs",
+    ];
+    assert_eq!(clocks, known.map(String::from).into_iter().collect());
+    for user in [
+        "cli/times.rs",
+        "lab/study/mod.rs",
+        "lab/study/savings.rs",
+        "lab/advise/mod.rs",
+        "lab/advise/search.rs",
+    ] {
+        let text = code(&std::fs::read_to_string(source.join(user)).unwrap());
+        assert!(text.contains("time_in_turns(") || text.contains("Interleaved::new("), "{user}");
+    }
+}

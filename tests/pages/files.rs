@@ -20,6 +20,17 @@ fn a_snapshot_is_svg_or_png_by_its_name() {
     refused(path, &["snapshot", "stack:4", "-o", "b.png", "--width", "9"], &["width", "9", "400"]);
     refused(path, &["snapshot", "staack", "-o", "b.svg"], &["'staack'", "'stack'"]);
     refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--lanes", "3"], &["lanes", "3"]);
+    refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--scale", "0mm"], &["--scale", "0mm"]);
+    // One scale for all pictures: micrometres look like nothing, unless a scale of micrometres is asked for.
+    let colors = |options: &[&str]| {
+        succeeds(path, &[&["snapshot", "stack:4", "-o", "c.svg"], options].concat());
+        let text = std::fs::read_to_string(path.join("c.svg")).unwrap();
+        let bodies = text.lines().filter(|line| line.contains("<title>body"));
+        let fill = |line: &str| Some(line.split_once("fill=\"")?.1[..7].to_string());
+        bodies.filter_map(fill).collect::<Vec<String>>()
+    };
+    let (coarse, fine) = (colors(&[]), colors(&["--scale", "5um"]));
+    assert!(coarse[1..].iter().all(|color| *color == coarse[1]) && fine[1..] != coarse[1..], "{fine:?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod browser;
 mod documents;
 mod files;
+mod kept;
 mod replay;
 mod report;
 

@@ -3,8 +3,8 @@
 //!
 //! One thread, no sleeping, no continuous collision; every engine at its defaults and at other
 //! settings, its errors read from body poses by one [`check`], and its time told only if the
-//! check passed. A block of steps of one engine is followed by one of the next, and every ratio
-//! is between blocks of the same round.
+//! check passed. A block of steps of one engine is followed by one of the next; ratios are of whole
+//! runs, from the first step to the last, with the longest step beside them.
 //!
 //! What differs by design. All three look 0.02 m ahead, but Box2D gives almost every pair of
 //! polygons two points, where rapier and simpulse leave out a point that is farther away: in
@@ -51,11 +51,11 @@ struct Args {
     /// Scenes, separated by commas; all where none is given
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
-    /// Steps of each scene, at least 90; the last 60 are not timed
+    /// Steps of each scene, at least 90; the last 60 of the first repeat are not timed
     #[arg(long, value_parser = clap::value_parser!(u32).range(90..))]
     steps: Option<u32>,
-    /// How often every scene is run
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    /// How often every scene is run: a step's time is the median over the repeats
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
     /// Default settings only, 180 steps
     #[arg(long)]
@@ -100,6 +100,13 @@ fn run(args: &Args) -> Result<(), String> {
         let outcomes = race::race(name, args.seed, steps, args.repeats, stands, &contenders)?;
         println!("\n{name}: {} bodies, {steps} steps", outcomes[0].counts.0);
         println!("{}", table::comparison(&outcomes));
+        let waited = outcomes.iter().map(|o| o.waited).fold(0.0, f64::max);
+        if waited > 0.01 {
+            println!(
+                "the thread waited for a processor {:.0} % of the time, which is left out",
+                100.0 * waited
+            );
+        }
         println!("ms per step by stage, four substeps, clocks on");
         println!("{}", table::stages(&outcomes));
         println!("fastest with errors no larger than those of Box2D at its defaults:");

@@ -8,7 +8,7 @@ use crate::race::Outcome;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use simpulse::lab::report::axes::{
-    Area, Drawn, Edges, INK, Scale, color, marker, wrapped, write, write_upwards,
+    Area, Drawn, Edges, INK, Scale, color, marker, with_dark, wrapped, write, write_upwards,
 };
 use simpulse::lab::report::units::si_short;
 
@@ -43,7 +43,7 @@ fn engine(contender: &Contender) -> Option<usize> {
 pub fn svg(scenes: &[(String, Vec<Outcome>)]) -> Result<String, String> {
     let mut text = String::new();
     draw(scenes, &mut text).map_err(|e| format!("peers.svg: {e}"))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
@@ -83,7 +83,7 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     let all = outcomes.iter().filter_map(|o| engine(&o.contender).map(|k| (k, o)));
     let shown: Vec<(usize, &Outcome, f64, f64)> = all
         .clone()
-        .filter_map(|(k, o)| Some((k, o, o.step?.median, o.errors.as_ref()?.penetration_mean)))
+        .filter_map(|(k, o)| Some((k, o, o.step?.mean, o.errors.as_ref()?.penetration_mean)))
         .filter(|&(.., overlap)| overlap > 0.0)
         .collect();
     let (left, right) = (corner.0 + LEFT, corner.0 + PANEL.0 - RIGHT);
@@ -95,7 +95,7 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
         [&|overlap| si_short(overlap, "m"), &|ms| si_short(1e-3 * ms, "s")];
     Edges { left, right, top, bottom }.grid(area, [&overlaps, &times], 12, labels)?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write_upwards(area, "time of a step", (corner.0 + 14, (top + bottom) / 2), 12)?;
+    write_upwards(area, "time of a step, mean", (corner.0 + 14, (top + bottom) / 2), 12)?;
     write(area, "mean overlap", ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
     for &(k, outcome, time, overlap) in &shown {
         let (x, y) = (overlaps.pixel(overlap, left, right), times.pixel(time, bottom, top));

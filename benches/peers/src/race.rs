@@ -1,17 +1,21 @@
 //! The race: all contenders in one process, block by block, in rotated order.
 //!
 //! A block is [`BLOCK`] steps of one contender; its first step meets cold caches and is not
-//! counted. Contenders take turns, so that a machine that slows down slows all of them, and each
-//! ratio is between blocks of the same round. The last second of every run is not timed: it
-//! belongs to the check.
+//! counted, but for the first step of a run, which is as cold in any program. Contenders take turns, so
+//! that a machine that slows down slows all of them. Blocks begin elsewhere in every repeat, so that a step
+//! that one leaves out is timed by another; the time of a step is the median over the repeats, and a ratio is
+//! of whole runs: the sum over the steps that both were timed in. A spike is in it, and the longest step stands
+//! beside it. The last second of the first run is not timed: it belongs to the check.
 
 use crate::box2d::Box2d;
 use crate::check::{Checker, Errors, WINDOW};
 use crate::engine::{Contender, Engine, Maker, Stage};
 use crate::ours::Simpulse;
 use crate::rapier::Rapier;
+use simpulse::engine::clock::waited;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::lab::scenes::{self, Scene};
+use std::ops::Range;
 use std::time::Instant;
 
 /// The scene in the contender's engine. Errors: what the engine cannot hold.
@@ -27,8 +31,51 @@ pub fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, St
 /// Steps of a block.
 const BLOCK: u32 = 10;
 
+/// The blocks of a repeat begin so many steps before those of the last one.
+const SHIFT: u32 = 3;
+
 /// In every fourth round the clocks inside the steps run, and whole steps are not counted.
 const CLOCKED_ROUND: u32 = 4;
+
+/// A block is left out if the thread waited for a processor for more than this share of it (1).
+const WAITED: f64 = 0.01;
+
+/// Times of the steps of a run (ms).
+#[derive(Clone, Copy, Debug)]
+pub struct Steps {
+    /// Mean.
+    pub mean: f64,
+    /// Quartiles.
+    pub quartiles: Quartiles,
+    /// The longest.
+    pub longest: f64,
+}
+
+impl Steps {
+    /// Of each step; not a number where one was not timed.
+    fn of(steps: &[f64]) -> Option<Self> {
+        let timed: Vec<f64> = steps.iter().copied().filter(|ms| ms.is_finite()).collect();
+        let (mean, longest) =
+            (timed.iter().sum::<f64>() / timed.len() as f64, timed.iter().copied().fold(0.0, f64::max));
+        Some(Steps { mean, quartiles: Quartiles::of(timed)?, longest })
+    }
+}
+
+/// One whole run in times another, by the steps that both were timed in.
+fn whole(one: &[f64], other: &[f64]) -> Option<f64> {
+    let both = one.iter().zip(other).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let [a, b] = both.fold([0.0; 2], |[x, y], (a, b)| [x + a, y + b]);
+    (b > 0.0).then(|| a / b)
+}
+
+/// The steps of a repeat in blocks.
+fn blocks(steps: u32, repeat: u32) -> impl Iterator<Item = Range<u32>> {
+    let first = BLOCK - repeat * SHIFT % BLOCK;
+    let starts = std::iter::once(0).chain((0..).map(move |i| first + i * BLOCK));
+    starts
+        .take_while(move |&start| start < steps)
+        .map(move |start| start..if start < first { first } else { start + BLOCK }.min(steps))
+}
 
 /// Quartiles of a sample.
 #[derive(Clone, Copy, Debug)]
@@ -64,12 +111,14 @@ pub struct Outcome {
     /// What failed, if the check did. Then there are no times.
     pub failed: Option<String>,
     /// ms per step.
-    pub step: Option<Quartiles>,
+    pub step: Option<Steps>,
+    /// Share of the time in which the thread waited for a processor (1); left out of all times.
+    pub waited: f64,
     /// ms per step and stage with the clocks on, and of the whole step.
     pub stages: Option<Breakdown>,
-    /// Time of a step against simpulse's widest lanes at as many substeps.
-    pub ratio: Option<Quartiles>,
-    /// The same of warm start, solve, relax and integrate alone.
+    /// Time of the whole run against simpulse's widest lanes at as many substeps.
+    pub ratio: Option<f64>,
+    /// Block by block the same of warm start, solve, relax and integrate alone.
     pub stages_ratio: Option<Quartiles>,
 }
 
@@ -104,8 +153,10 @@ struct Runner {
     contender: Contender,
     engine: Box<dyn Engine>,
     failed: Option<String>,
-    /// ms per step, the median of each block; all repeats.
-    blocks: Vec<f64>,
+    /// ms, `[repeat][step]`; not a number where a step was not timed.
+    steps: Vec<Vec<f64>>,
+    /// Time in which the thread waited, and in which blocks ran (ms).
+    waited_and_ran: [f64; 2],
     /// Of each clocked block.
     clocked: Vec<Breakdown>,
 }
@@ -130,7 +181,14 @@ pub fn race(
     let mut runners = Vec::new();
     for &contender in contenders {
         let engine = build(&contender, &scene).map_err(|e| format!("{}: {e}", contender.name()))?;
-        runners.push(Runner { contender, engine, failed: None, blocks: Vec::new(), clocked: Vec::new() });
+        runners.push(Runner {
+            contender,
+            engine,
+            failed: None,
+            steps: Vec::new(),
+            waited_and_ran: [0.0; 2],
+            clocked: Vec::new(),
+        });
     }
     let mut errors = Vec::new();
     let mut counts = Vec::new();
@@ -140,10 +198,14 @@ pub fn race(
                 runner.engine = build(&runner.contender, &scene)?;
             }
         }
-        for round in 0..rounds {
+        for runner in &mut runners {
+            runner.steps.push(vec![f64::NAN; steps as usize]);
+        }
+        let timed = if repeat == 0 { rounds * BLOCK } else { steps };
+        for (round, block) in (0..).zip(blocks(timed, repeat)) {
             for turn in 0..runners.len() {
                 let place = (turn + (round + repeat) as usize) % runners.len();
-                runners[place].block(round);
+                runners[place].block(block.clone(), round + repeat);
             }
         }
         // Runs repeat to the bit, so one check is enough; it comes before any time is looked at.
@@ -163,16 +225,19 @@ pub fn race(
             if rival.failed.is_some() || !timed {
                 return None;
             }
-            Quartiles::of(of(runner).iter().zip(of(rival)).map(|(a, b)| a / b).collect())
+            Some([of(runner), of(rival)])
         };
+        let by_block = |[a, b]: [Vec<f64>; 2]| Quartiles::of(a.iter().zip(b).map(|(a, b)| a / b).collect());
+        let [waits, ran] = runner.waited_and_ran;
         let stages = |r: &Runner| r.clocked.iter().filter_map(|b| b.stages[Stage::Stages as usize]).collect();
         Outcome {
             contender: runner.contender,
             counts,
-            step: Quartiles::of(runner.blocks.clone()).filter(|_| timed),
+            step: Steps::of(&runner.medians()).filter(|_| timed),
+            waited: waits / (waits + ran).max(1e-9),
             stages: Breakdown::mean(&runner.clocked).filter(|_| timed),
-            ratio: against(|r| r.blocks.clone()),
-            stages_ratio: against(stages),
+            ratio: against(Runner::medians).and_then(|[a, b]| whole(&a, &b)),
+            stages_ratio: against(stages).and_then(by_block),
             errors,
             failed: runner.failed.clone(),
         }
@@ -187,15 +252,25 @@ fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
 }
 
 impl Runner {
-    fn block(&mut self, round: u32) {
+    /// Of each step, the median over the repeats; not a number where none timed it.
+    fn medians(&self) -> Vec<f64> {
+        let count = self.steps.first().map_or(0, Vec::len);
+        let repeats =
+            |step: usize| self.steps.iter().map(|run| run[step]).filter(|ms| ms.is_finite()).collect();
+        (0..count).map(|step| Quartiles::of(repeats(step)).map_or(f64::NAN, |q| q.median)).collect()
+    }
+
+    /// The steps of a block of the last repeat.
+    fn block(&mut self, steps: Range<u32>, round: u32) {
         if self.failed.is_some() {
             return;
         }
+        let before = waited();
         let clocked = round % CLOCKED_ROUND == CLOCKED_ROUND - 1;
         self.engine.set_timed(clocked);
-        let mut times = Vec::with_capacity(BLOCK as usize);
+        let mut times = Vec::with_capacity(steps.len());
         let mut clocked_steps = Vec::new();
-        for _ in 0..BLOCK {
+        for _ in steps.clone() {
             let start = Instant::now();
             let result = self.engine.step();
             times.push(start.elapsed().as_secs_f64() * 1e3);
@@ -208,13 +283,23 @@ impl Runner {
                     .extend(times.last().map(|&step| Breakdown { stages: self.engine.stages(), step }));
             }
         }
-        times.remove(0);
         if clocked {
             clocked_steps.remove(0);
             self.clocked.extend(Breakdown::of_block(clocked_steps));
-        } else if round > 0 {
-            // The first block begins with the step that finds all contacts.
-            self.blocks.extend(Quartiles::of(times).map(|q| q.median));
+            return;
+        }
+        let ran: f64 = times.iter().sum();
+        let waits = waited().zip(before).map_or(0.0, |(after, before)| 1e3 * (after - before).as_secs_f64());
+        self.waited_and_ran = [self.waited_and_ran[0] + waits, self.waited_and_ran[1] + ran];
+        if waits > WAITED * ran {
+            return;
+        }
+        // Another contender ran before: but for the first step of the run, this one met its caches.
+        if steps.start > 0 {
+            times[0] = f64::NAN;
+        }
+        if let Some(run) = self.steps.last_mut() {
+            run[steps.start as usize..][..times.len()].copy_from_slice(&times);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Tables for people, rows for programs.
 
 use crate::engine::{Maker, Stage};
-use crate::race::{Outcome, Quartiles};
+use crate::race::{Outcome, Quartiles, Steps};
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
 use serde::Serialize;
 
@@ -10,13 +10,16 @@ const NONE: &str = "–";
 /// A mean this much above Box2D's is still called no larger: chaotic scenes scatter so.
 const ALLOWED: f64 = 1.1;
 
-/// Times and errors, one row per contender. `lost` pairs overlap past the middle of a body.
+/// Times and errors, one row per contender. `ms/step` is the mean over the run and `× simpulse` of whole runs;
+/// `stages ×` is of blocks, with quartiles. `lost` pairs overlap past the middle of a body.
 pub fn comparison(outcomes: &[Outcome]) -> Table {
     let mut table = head(&[
         "engine",
         "setting",
         "ms/step",
+        "median",
         "spread",
+        "longest",
         "× simpulse",
         "stages ×",
         "pen. mean mm",
@@ -32,9 +35,13 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
         let mut row = vec![
             o.contender.name(),
             o.contender.setting(),
-            o.step.map_or(NONE.into(), |q| significant(q.median)),
-            o.step.map_or(NONE.into(), |q| format!("{}–{}", significant(q.low), significant(q.high))),
-            factor(&o.ratio),
+            ms(o, |s| s.mean),
+            ms(o, |s| s.quartiles.median),
+            o.step.map_or(NONE.into(), |s| {
+                format!("{}–{}", significant(s.quartiles.low), significant(s.quartiles.high))
+            }),
+            ms(o, |s| s.longest),
+            o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}")),
             factor(&o.stages_ratio),
         ];
         if let Some(e) = &o.errors {
@@ -100,7 +107,7 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
                         && (!stands || e.rms_velocity <= ALLOWED * bound.rms_velocity)
                 })
         };
-        let time = |o: &&Outcome| o.step.map_or(f64::INFINITY, |q| q.median);
+        let time = |o: &&Outcome| o.step.map_or(f64::INFINITY, |s| s.mean);
         let best = outcomes.iter().filter(fits).min_by(|a, b| time(a).total_cmp(&time(b)));
         lines.push(match best {
             Some(o) => {
@@ -113,7 +120,7 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
 }
 
 /// One scene in the summary of all, in Markdown: defaults (n = 4) of all three engines, ours at
-/// its widest; ratios to our step of the same round, with their quartiles; errors of the last second.
+/// its widest; ratios of whole runs, longest steps, and errors of the last second.
 pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
     let of = |family: &str| {
         outcomes.iter().find(|o| {
@@ -133,10 +140,11 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
     };
     let cells = [
         scene.to_string(),
-        cell(ours, |o| o.step.map_or(NONE.into(), |q| significant(q.median))),
-        cell(box2d, |o| factor(&o.ratio)),
+        cell(ours, |o| ms(o, |s| s.mean)),
+        cell(box2d, |o| o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}"))),
         cell(box2d, |o| factor(&o.stages_ratio)),
-        cell(rapier, |o| factor(&o.ratio)),
+        cell(rapier, |o| o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}"))),
+        engines.map(|o| cell(o, |o| ms(o, |s| s.longest))).join(" / "),
         errors(|e| e.penetration_mean),
         errors(|e| e.penetration_max),
         errors(|e| e.rms_velocity),
@@ -146,8 +154,8 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
 
 /// Head of the summary.
 pub const SUMMARY: &str = "\
-| scene | simpulse ms | Box2D × | its stages × | rapier × | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r |
-|---|---|---|---|---|---|---|---|";
+| scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r |
+|---|---|---|---|---|---|---|---|---|";
 
 /// A row of `peers.csv`.
 #[derive(Serialize)]
@@ -158,12 +166,13 @@ pub struct Row {
     contact_hertz: f32,
     recycling: bool,
     failed: String,
-    step_ms: Option<f64>,
-    step_ms_low: Option<f64>,
-    step_ms_high: Option<f64>,
-    ratio: Option<f64>,
-    ratio_low: Option<f64>,
-    ratio_high: Option<f64>,
+    mean_step_ms: Option<f64>,
+    median_step_ms: Option<f64>,
+    quartile_1_ms: Option<f64>,
+    quartile_3_ms: Option<f64>,
+    longest_step_ms: Option<f64>,
+    waited_share: f64,
+    whole_run_ratio: Option<f64>,
     stages_ratio: Option<f64>,
     clocked_step_ms: Option<f64>,
     pairs_ms: Option<f64>,
@@ -182,10 +191,11 @@ pub struct Row {
     penetration_mean_m: Option<f64>,
     penetration_max_m: Option<f64>,
     lost_pairs: Option<f64>,
-    rms_velocity: Option<f64>,
+    rms_velocity_m_s: Option<f64>,
     top_m: Option<f64>,
-    truth: &'static str,
-    truth_error: Option<f64>,
+    reference: &'static str,
+    reference_unit: &'static str,
+    reference_error: Option<f64>,
 }
 
 impl Row {
@@ -202,12 +212,13 @@ impl Row {
             contact_hertz: o.contender.hertz,
             recycling: o.contender.recycling,
             failed: o.failed.clone().unwrap_or_default(),
-            step_ms: o.step.map(|q| q.median),
-            step_ms_low: o.step.map(|q| q.low),
-            step_ms_high: o.step.map(|q| q.high),
-            ratio: o.ratio.map(|q| q.median),
-            ratio_low: o.ratio.map(|q| q.low),
-            ratio_high: o.ratio.map(|q| q.high),
+            mean_step_ms: o.step.map(|s| s.mean),
+            median_step_ms: o.step.map(|s| s.quartiles.median),
+            quartile_1_ms: o.step.map(|s| s.quartiles.low),
+            quartile_3_ms: o.step.map(|s| s.quartiles.high),
+            longest_step_ms: o.step.map(|s| s.longest),
+            waited_share: o.waited,
+            whole_run_ratio: o.ratio,
             stages_ratio: o.stages_ratio.map(|q| q.median),
             clocked_step_ms: o.stages.map(|b| b.step),
             pairs_ms: pairs,
@@ -226,10 +237,11 @@ impl Row {
             penetration_mean_m: e.map(|e| e.penetration_mean),
             penetration_max_m: e.map(|e| e.penetration_max),
             lost_pairs: e.map(|e| e.lost),
-            rms_velocity: e.map(|e| e.rms_velocity),
+            rms_velocity_m_s: e.map(|e| e.rms_velocity),
             top_m: e.map(|e| e.top),
-            truth: truth.map_or("", |t| t.0),
-            truth_error: truth.map(|t| t.2),
+            reference: truth.map_or("", |t| t.0),
+            reference_unit: truth.map_or("", |t| t.1),
+            reference_error: truth.map(|t| t.2),
         }
     }
 }
@@ -238,6 +250,11 @@ fn head(names: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED).set_header(names.to_vec());
     table
+}
+
+/// A time of a step (ms).
+fn ms(o: &Outcome, of: fn(&Steps) -> f64) -> String {
+    o.step.as_ref().map_or(NONE.into(), |steps| significant(of(steps)))
 }
 
 /// Three digits.

@@ -7,14 +7,17 @@ use crate::lab::study::TruthError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Limits {
     /// Penetration (m), see [`Errors::penetration`].
+    #[serde(rename = "penetration_m")]
     pub penetration: Option<f64>,
     /// Time of a step (ns).
     pub time_ns: Option<f64>,
     /// Distance to the reference value, in its unit.
+    #[serde(rename = "reference")]
     pub truth: Option<f64>,
     /// Contact-law residual, root mean square in weights of the lighter body (1).
     pub residual: Option<f64>,
     /// Speed over the last second, where the scene has to rest (m/s).
+    #[serde(rename = "rest_speed_m_s")]
     pub rest: Option<f64>,
 }
 

@@ -110,10 +110,13 @@ pub struct Time {
     /// Lanes per instruction.
     pub lanes: usize,
     /// Mean time of a step over the run (ns).
+    #[serde(rename = "mean_step_ns")]
     pub mean_ns: f64,
     /// Median time of a step (ns).
+    #[serde(rename = "median_step_ns")]
     pub median_ns: f64,
     /// The longest step (ns).
+    #[serde(rename = "longest_step_ns")]
     pub worst_ns: f64,
     /// Its spread (ns), see [`Sample::spread_ns`].
     pub spread_ns: f64,

@@ -47,11 +47,17 @@ pub struct Pair {
     /// Work per step, for tables.
     pub budget: String,
     /// What happened where it did not hold, before and after.
+    #[serde(rename = "holds", serialize_with = "words")]
     pub marks: [Option<Mark>; 2],
     /// Errors that both have, by axis.
     pub errors: Vec<ErrorChange>,
     /// Time after ÷ time before; none if one of them has no time.
     pub time: Option<TimeChange>,
+}
+
+/// `yes`, or what happened.
+fn words<S: serde::Serializer>(marks: &[Option<Mark>; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    marks.map(|mark| mark.map_or("yes", Mark::word)).serialize(serializer)
 }
 
 /// An error before and after.
@@ -70,8 +76,10 @@ pub struct ErrorChange {
 /// A time before and after.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeChange {
-    /// Median time of a step (ns), before and after.
-    pub median_ns: [f64; 2],
+    /// [`Sample::cost_ns`], before and after.
+    pub cost_ns: [f64; 2],
+    /// Longest step (ns), before and after.
+    pub longest_step_ns: [f64; 2],
     /// Ratio over paired blocks, divided by the common one where times are relative.
     pub ratio: f64,
     /// Its interval, with the [`Noise`] between two runs.
@@ -275,7 +283,8 @@ fn pair(one: &Record, other: &Record) -> Pair {
     let time = || {
         let samples = [one.sample.as_ref()?, other.sample.as_ref()?];
         let Ratio { median, interval, .. } = Ratio::of(samples[1], samples[0])?;
-        Some(TimeChange { median_ns: samples.map(|s| s.median_ns), ratio: median, interval })
+        let (cost_ns, longest_step_ns) = (samples.map(Sample::cost_ns), samples.map(|s| s.worst_ns));
+        Some(TimeChange { cost_ns, longest_step_ns, ratio: median, interval })
     };
     Pair {
         scene: one.scene.clone(),

@@ -28,7 +28,8 @@ pub fn text(found: &Comparison, all: bool) -> String {
     }
     let threshold = 100.0 * found.threshold;
     text += &format!(
-        "worse, better: by more than {} % and beyond the noise; errors below 1 % of a scene's tolerance count as none\n",
+        "worse, better: by more than {} % and beyond the noise; errors below 1 % of a scene's tolerance count as none;\n\
+         step: mean over the run, or the median of studies with fewer than three rounds\n",
         digits(threshold)
     );
     let n = found.noise;
@@ -119,7 +120,7 @@ fn errors(pair: &Pair, threshold: f64) -> Vec<Line> {
 
 fn times(pair: &Pair, threshold: f64) -> Option<Line> {
     let time = pair.time?;
-    let [before, after] = time.median_ns.map(|ns| si(1e-9 * ns, "s"));
+    let [before, after] = time.cost_ns.map(|ns| si(1e-9 * ns, "s"));
     Some(Line {
         cells: cells(pair, "step", before, after),
         growth: time.ratio,

@@ -26,7 +26,7 @@ mod setup;
 #[doc(hidden)]
 pub mod summary;
 pub mod table;
-mod timing;
+pub mod timing;
 pub mod warm;
 
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -43,6 +43,7 @@ use replay::{Outcome, Replay, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use timing::IterationTime;
 use warm::{WarmStart, Warmed};
 
 /// Residuals whose first iteration is reported (1).
@@ -129,8 +130,8 @@ pub struct Curve {
     pub own: Reached,
     /// Whether the two laws were the same all along.
     pub own_is_rigid: bool,
-    /// Median time of an iteration (ns), set-up excluded; none if not measured.
-    pub ns_per_iteration: Option<f64>,
+    /// Time of an iteration; none if not measured.
+    pub iteration: Option<IterationTime>,
 }
 
 /// All curves of one problem.
@@ -256,8 +257,8 @@ pub fn converge_watched(
         tell(parts - 2, parts, "times");
         let mut cases: Vec<_> = timers.iter_mut().map(|(schedule, replay, _)| (*schedule, replay)).collect();
         let times = timing::time(&mut cases, options.rounds);
-        for (ns, (_, _, range)) in times.into_iter().zip(&timers) {
-            curves[range.clone()].iter_mut().for_each(|curve| curve.ns_per_iteration = Some(ns));
+        for (time, (_, _, range)) in times.into_iter().zip(&timers) {
+            curves[range.clone()].iter_mut().for_each(|curve| curve.iteration = Some(time));
         }
     }
     let has_warm = |name: &str| curves.iter().any(|c: &Curve| c.solver == name && c.start == Start::Warm);
@@ -381,7 +382,7 @@ fn curve(
         rigid,
         own,
         own_is_rigid,
-        ns_per_iteration: None,
+        iteration: None,
     }
 }
 

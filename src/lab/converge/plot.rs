@@ -9,6 +9,8 @@ use super::warm::WarmStart;
 use super::{Curve, CurvePoint, Reached, Report};
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
+use crate::lab::picture;
+use crate::lab::units::si_short;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
@@ -23,20 +25,9 @@ const HEADING: i32 = 30;
 /// Space for labels left of and below a panel, and to its right.
 const LEFT: i32 = 64;
 const BOTTOM: i32 = 44;
-const RIGHT: i32 = 16;
+const RIGHT: i32 = 28;
 const INK: RGBColor = RGBColor(40, 40, 40);
-const GRID: RGBColor = RGBColor(225, 225, 225);
-/// Distinct with any color vision (Okabe and Ito), and a gray.
-const COLORS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(0, 0, 0),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(140, 140, 140),
-];
+const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Decades of residuals that are shown; what is outside is drawn at the edge.
 const DECADES: (i32, i32) = (-8, 1);
 
@@ -50,14 +41,17 @@ struct Row {
     reached: fn(&Curve) -> &Reached,
 }
 
+/// The color of a solver by its name.
+pub type Colors<'a> = &'a dyn Fn(&str) -> picture::Color;
+
 /// The picture as SVG text.
-pub fn svg(report: &Report) -> Result<String, Error> {
+pub fn svg(report: &Report, colors: Colors) -> Result<String, Error> {
     let mut text = String::new();
-    draw(report, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
+    draw(report, colors, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
     Ok(text)
 }
 
-fn draw(report: &Report, text: &mut String) -> Drawn {
+fn draw(report: &Report, colors: Colors, text: &mut String) -> Drawn {
     let mut solvers: Vec<(&str, &str)> = Vec::new();
     for curve in &report.curves {
         if !solvers.contains(&(&curve.solver, curve.arithmetic)) {
@@ -71,15 +65,20 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
     let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
     write(&root, &format!("{}: residual against work", report.problem), (8, 18), 18, HPos::Left)?;
-    legend(&root, &solvers, report)?;
+    legend(&root, &solvers, report, colors)?;
     for (i, row) in rows.iter().enumerate() {
         let y = top + (HEADING + PANEL.1) * i as i32;
         write(&root, &row.title, (8, y + 16), 16, HPos::Left)?;
-        panel(&root, (0, y + HEADING), report, &solvers, row, "constraint sweeps", |_, p| {
+        let alike = coinciding(report, row);
+        if !alike.is_empty() {
+            let text = format!("curves that coincide: {}", alike.join("; "));
+            write(&root, &text, (size.0 - 16, y + 16), 12, HPos::Right)?;
+        }
+        panel(&root, (0, y + HEADING), report, colors, row, "constraint sweeps", |_, p| {
             (p.sweeps > 0).then_some(p.sweeps as f64)
         })?;
-        panel(&root, (PANEL.0, y + HEADING), report, &solvers, row, "time (s), set-up excluded", |c, p| {
-            Some(1e-9 * c.ns_per_iteration? * f64::from(p.iterations)).filter(|&t| t > 0.0)
+        panel(&root, (PANEL.0, y + HEADING), report, colors, row, "time, set-up excluded", |c, p| {
+            Some(1e-9 * c.iteration?.median_ns * f64::from(p.iterations)).filter(|&t| t > 0.0)
         })?;
     }
     root.present()?;
@@ -108,16 +107,42 @@ fn rows(report: &Report) -> Vec<Row> {
     rows
 }
 
+/// The color of a curve: its solver's, whatever stage of it is drawn.
+fn color(solver: &str, colors: Colors) -> RGBColor {
+    let picture::Color(r, g, b, _) = colors(solver.split(' ').next().unwrap_or(solver));
+    RGBColor(r, g, b)
+}
+
 fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
     let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
     area.draw(&Text::new(text.to_string(), at, style))?;
     Ok(())
 }
 
-fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report) -> Drawn {
+/// Solvers whose curves cover each other in a row, `a = b`.
+fn coinciding(report: &Report, row: &Row) -> Vec<String> {
+    let curves: Vec<&Curve> = report.curves.iter().filter(|c| c.start == row.start).collect();
+    let values = |c: &Curve| c.points.iter().map(|p| (p.sweeps, (row.residual)(p))).collect::<Vec<_>>();
+    let mut groups: Vec<(&Curve, Vec<&str>)> = Vec::new();
+    for &curve in curves.iter().filter(|c| c.points.iter().any(|p| (row.residual)(p).is_some())) {
+        let known =
+            groups.iter_mut().find(|(first, _)| first.order == curve.order && values(first) == values(curve));
+        match known {
+            Some((_, names)) => names.push(&curve.solver),
+            None => groups.push((curve, vec![&curve.solver])),
+        }
+    }
+    let mut found: Vec<String> =
+        groups.into_iter().filter(|(_, names)| names.len() > 1).map(|(_, names)| names.join(" = ")).collect();
+    found.sort();
+    found.dedup();
+    found
+}
+
+fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report, colors: Colors) -> Drawn {
     for (i, (solver, arithmetic)) in solvers.iter().enumerate() {
         let at = (12 + 275 * (i % 4) as i32, HEADING + 10 + LEGEND_LINE * (i / 4) as i32);
-        let style = COLORS[i % COLORS.len()].stroke_width(width(arithmetic));
+        let style = color(solver, colors).stroke_width(width(arithmetic));
         area.draw(&PathElement::new(vec![at, (at.0 + 26, at.1)], style))?;
         let name = if *arithmetic == "f32" { solver.to_string() } else { format!("{solver} ({arithmetic})") };
         write(area, &name, (at.0 + 32, at.1), 14, HPos::Left)?;
@@ -165,7 +190,7 @@ fn panel(
     area: &Area,
     corner: (i32, i32),
     report: &Report,
-    solvers: &[(&str, &str)],
+    colors: Colors,
     row: &Row,
     title: &str,
     across: Across,
@@ -193,7 +218,11 @@ fn panel(
     for exponent in range.0..=range.1 {
         let x = along(10f64.powi(exponent), range, left, right);
         area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;
-        write(area, &decade(exponent), (x, bottom + 12), 12, HPos::Center)?;
+        let label = match title.starts_with("time") {
+            true => si_short(10f64.powi(exponent), "s"),
+            false => decade(exponent),
+        };
+        write(area, &label, (x, bottom + 12), 12, HPos::Center)?;
     }
     for exponent in DECADES.0..=DECADES.1 {
         let y = along(10f64.powi(exponent), DECADES, bottom, top);
@@ -203,8 +232,7 @@ fn panel(
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write(area, title, ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     for curve in curves {
-        let id = (curve.solver.as_str(), curve.arithmetic);
-        let color = COLORS[solvers.iter().position(|s| *s == id).unwrap_or(0) % COLORS.len()];
+        let color = color(&curve.solver, colors);
         let at = |p: &CurvePoint| {
             let residual = (row.residual)(p).filter(|r| r.is_finite())?;
             let x = along(across(curve, p)?, range, left, right);

@@ -67,7 +67,7 @@ pub(super) fn curves(
                 rigid,
                 own,
                 own_is_rigid: true,
-                ns_per_iteration: None,
+                iteration: None,
             });
         }
     }

@@ -34,15 +34,17 @@ pub fn text(report: &Report) -> String {
     }
     align(&mut table);
     out += &format!("{table}\n");
-    if report.curves.iter().any(|c| c.ns_per_iteration.is_some()) {
-        out += "\nTime to a residual, set-up excluded:\n";
-        let mut table = self::table(&["per iteration"]);
+    if report.curves.iter().any(|c| c.iteration.is_some()) {
+        out +=
+            "\nTime to a residual, set-up excluded; an iteration: median over the rounds, and quartiles:\n";
+        let mut table = self::table(&["per iteration", "quartiles"]);
         for (curve, law, reached) in each() {
-            let Some(ns) = curve.ns_per_iteration else { continue };
+            let Some(each) = curve.iteration else { continue };
             let mut row = head(curve, law);
-            let time = |i: usize| duration(ns * f64::from(curve.points[i].iterations));
+            let time = |i: usize| duration(each.median_ns * f64::from(curve.points[i].iterations));
             row.extend(reached.first.map(|i| i.map_or(NEVER.into(), time)));
-            row.push(duration(ns));
+            let [low, high] = each.quartiles_ns.map(duration);
+            row.extend([duration(each.median_ns), format!("{low} to {high}")]);
             table.add_row(row);
         }
         align(&mut table);
@@ -184,7 +186,7 @@ pub fn csv(report: &Report) -> Result<String, Error> {
                 start: curve.start.to_string(),
                 iterations: p.iterations,
                 sweeps: p.sweeps,
-                time_ns: curve.ns_per_iteration.map(|ns| ns * f64::from(p.iterations)),
+                time_ns: curve.iteration.map(|each| each.median_ns * f64::from(p.iterations)),
                 rigid_residual: p.rigid,
                 own_residual: p.own,
                 velocity_error: p.velocity_error,

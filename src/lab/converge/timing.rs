@@ -6,7 +6,16 @@ use super::replay::{Replay, Start};
 /// Shortest difference of two runs that is timed (ns), far above the clock's resolution.
 const TIMED_NS: f64 = 50_000.0;
 
-/// Median time of an iteration of each case (ns).
+/// Time of an iteration (ns), set-up excluded; of rounds that are all alike.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct IterationTime {
+    /// Median over the rounds.
+    pub median_ns: f64,
+    /// Quartiles over them: each round is a difference of two runs, so that a mean would be of what interrupted them.
+    pub quartiles_ns: [f64; 2],
+}
+
+/// Time of an iteration of each case.
 ///
 /// The difference between two steps of few and many iterations, over the difference of their
 /// numbers, so that set-up is not counted. Every round times every case once, so that a disturbance
@@ -14,7 +23,7 @@ const TIMED_NS: f64 = 50_000.0;
 ///
 /// A solver that has found its answer may have nothing left to do, and iterations beyond it cost nothing. So where
 /// more iterations change no bit, those up to the answer are timed, again and again.
-pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<f64> {
+pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<IterationTime> {
     let ranges: Vec<Range> = cases.iter_mut().map(|(schedule, replay)| Range::of(schedule, replay)).collect();
     let mut samples = vec![Vec::new(); cases.len()];
     for _ in 0..rounds {
@@ -26,7 +35,7 @@ pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<f
         .into_iter()
         .map(|mut s| {
             s.sort_by(f64::total_cmp);
-            s[s.len() / 2]
+            IterationTime { median_ns: s[s.len() / 2], quartiles_ns: [s[s.len() / 4], s[3 * s.len() / 4]] }
         })
         .collect()
 }

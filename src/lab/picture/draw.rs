@@ -97,8 +97,12 @@ fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>]) -> [[f64; 2]; 2] {
     [low.map(|x| x - room), high.map(|x| x + room)]
 }
 
-/// The picture of a frame, `width` pixels wide, under a title and a line below it.
-pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u32) -> Picture {
+/// Penetration of the darkest color where nothing else is asked for (m): what begins to be seen at a metre.
+pub const DARKEST: f64 = 0.01;
+
+/// The picture of a frame, `width` pixels wide, under a title and a line below it. What overlaps by `darkest` (m) or
+/// more has the darkest color, so that pictures of one scale compare.
+pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u32, darkest: f64) -> Picture {
     let outlines: Vec<Vec<[f64; 2]>> = stage
         .shapes
         .iter()
@@ -117,7 +121,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     };
     let size = [width, (HEADER + height + LEGEND).round() as u32];
     let mut picture = Picture::new(size, Color::rgb(0xffffff));
-    let deepest = round_up(frame.deepest());
+    let deepest = if frame.deepest() > 0.0 { darkest } else { 0.0 };
     let depth_of = depths(stage, frame);
     for (points, (body, shape)) in outlines.iter().zip(&stage.shapes) {
         let points: Vec<[f64; 2]> = points.iter().map(|&p| view.at(p)).collect();
@@ -148,7 +152,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     picture.rectangle([0.0, top], [f64::from(width), LEGEND], Color::rgb(0xffffff));
     picture.text([MARGIN, 30.0], 21.0, Anchor::Start, INK, title);
     picture.text([MARGIN, 52.0], 14.0, Anchor::Start, FAINT, subtitle);
-    legend(&mut picture, top, &view, deepest, arrow, stage.dt);
+    legend(&mut picture, top, &view, [deepest, frame.deepest()], arrow, stage.dt);
     picture
 }
 
@@ -232,7 +236,15 @@ fn arrow(picture: &mut Picture, from: [f64; 2], to: [f64; 2], width: f64) {
 /// Width of a color bar with room for a label in the middle (pixels).
 const THREE_LABELS: f64 = 140.0;
 
-fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: (f64, f64), dt: f64) {
+/// `darkest`: the penetration of the darkest color, and the deepest there is (m).
+fn legend(
+    picture: &mut Picture,
+    top: f64,
+    view: &View,
+    [darkest, deepest]: [f64; 2],
+    arrow_at: (f64, f64),
+    dt: f64,
+) {
     let (bar_y, text_y, quarter) =
         (top + 34.0, top + 58.0, (f64::from(picture.size[0]) - 2.0 * MARGIN) / 4.0);
     let column = |k: usize| MARGIN + quarter * k as f64;
@@ -258,9 +270,10 @@ fn legend(picture: &mut Picture, top: f64, view: &View, deepest: f64, arrow_at: 
         }
         text(picture, x, text_y, Anchor::Start, "0".into());
         if wide > THREE_LABELS {
-            text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * deepest, "m"));
+            text(picture, x + 0.5 * wide, text_y, Anchor::Middle, si_short(0.5 * darkest, "m"));
         }
-        text(picture, x + wide, text_y, Anchor::End, si_short(deepest, "m"));
+        let more = if deepest > darkest { "≥ " } else { "" };
+        text(picture, x + wide, text_y, Anchor::End, format!("{more}{}", si_short(darkest, "m")));
         text(picture, x, bar_y - 14.0, Anchor::Start, "penetration".into());
     } else {
         text(picture, x, bar_y + 4.0, Anchor::Start, "nothing overlaps".into());
@@ -306,7 +319,7 @@ mod tests {
             world.step().unwrap();
         }
         let stage = Stage::of(&world);
-        draw(&stage, &Frame::of(&world, &stage, Some(&mut Overlaps::default())), name, "below", 600)
+        draw(&stage, &Frame::of(&world, &stage, Some(&mut Overlaps::default())), name, "below", 600, DARKEST)
     }
 
     #[test]

@@ -53,7 +53,9 @@ pub fn svg(picture: &Picture) -> String {
     let [w, h] = picture.size;
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" \
-         font-family=\"system-ui, sans-serif\">\n<rect width=\"{w}\" height=\"{h}\" fill=\"{}\"/>\n",
+         font-family=\"system-ui, sans-serif\">\n<style>@media (prefers-color-scheme: dark) {{ \
+         [fill='#ffffff'] {{ fill: #14181d }} text {{ fill: #e4e7eb }} [stroke='#1f2933'] {{ stroke: #e4e7eb }} \
+         }}</style>\n<rect width=\"{w}\" height=\"{h}\" fill=\"{}\"/>\n",
         color(picture.background)
     );
     for item in &picture.items {

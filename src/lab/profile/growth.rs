@@ -23,12 +23,16 @@ pub struct Entry {
     pub errors: Option<Errors>,
 }
 
-/// Median and median deviation (ns).
+/// Of repeated steps (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Time {
     /// Median.
     pub ns: f64,
-    /// Median distance from it.
+    /// Mean.
+    pub mean_ns: f64,
+    /// The longest.
+    pub longest_ns: f64,
+    /// Median distance from the median.
     pub spread_ns: f64,
 }
 
@@ -36,7 +40,9 @@ impl Time {
     fn of(samples: &[f64]) -> Time {
         let ns = median(samples);
         let deviations: Vec<f64> = samples.iter().map(|t| (t - ns).abs()).collect();
-        Time { ns, spread_ns: median(&deviations) }
+        let mean_ns = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+        let longest_ns = samples.iter().copied().fold(0.0, f64::max);
+        Time { ns, mean_ns, longest_ns, spread_ns: median(&deviations) }
     }
 }
 

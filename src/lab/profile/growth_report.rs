@@ -3,7 +3,7 @@
 use super::growth::{Change, Row, Verdict};
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, write, write_upwards};
+use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, with_dark, write, write_upwards};
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, ratio, si};
 use plotters::element::DashedPathElement;
@@ -19,14 +19,14 @@ fn phases(rows: &[Row]) -> Vec<Phase> {
 /// Times and memory per contact, and what that means.
 pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
     let phases = phases(rows);
-    let mut header = vec!["scene", "bodies", "contacts", "step", "±"];
+    let mut header = vec!["scene", "bodies", "contacts", "step", "mean", "longest", "±"];
     header.extend(phases.iter().map(|p| p.name()));
     header.extend(["penetration", "residual, scene", "residual, body"]);
     let mut times = table(&header);
     for row in rows {
         let mut cells = vec![row.scene.clone(), row.bodies.to_string(), row.counts.contacts.to_string()];
-        cells.push(digits(row.per_contact(row.step)));
-        cells.push(digits(row.step.spread_ns / row.counts.contacts.max(1) as f64));
+        let each = [row.step.ns, row.step.mean_ns, row.step.longest_ns, row.step.spread_ns];
+        cells.extend(each.map(|ns| digits(ns / row.counts.contacts.max(1) as f64)));
         cells.extend(phases.iter().map(|&p| digits(row.per_contact(row.phases[p as usize]))));
         cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max, "m")));
         cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms)));
@@ -35,7 +35,8 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
     }
     let mut text = format!(
         "Time per contact (ns), of a step and of its phases; a step searches all pairs and recomputes colors; pauses in\n\
-         which the thread waited for a processor are left out.  ±: median deviation of a step.  penetration: greatest.\n\
+         which the thread waited for a processor are left out.  step: median of the repeats, beside it their mean and the
+         longest, ± median deviation; phases: medians.  penetration: greatest.\n\
          residual: rms of the contact law in weights of the scene, and of a body, × step\n{}\n",
         finish(times, 1)
     );
@@ -121,10 +122,19 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid("growth.csv", e.to_string());
     let mut writer = csv::Writer::from_writer(Vec::new());
     let phases = phases(rows);
-    let mut header: Vec<String> =
-        ["scene", "bodies", "pairs", "contacts", "points", "step_ns", "step_spread_ns"]
-            .map(String::from)
-            .into();
+    let mut header: Vec<String> = [
+        "scene",
+        "bodies",
+        "pairs",
+        "contacts",
+        "points",
+        "median_step_ns",
+        "mean_step_ns",
+        "longest_step_ns",
+        "spread_step_ns",
+    ]
+    .map(String::from)
+    .into();
     for phase in &phases {
         let name = phase.name().replace(' ', "_");
         header.extend([format!("{name}_ns"), format!("{name}_spread_ns")]);
@@ -133,13 +143,16 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
         let name = component.name.replace(' ', "_");
         header.extend([format!("{name}_held_bytes"), format!("{name}_used_bytes")]);
     }
-    header.extend(["penetration_max", "law_rms", "law_rms_body"].map(String::from));
+    header.extend(
+        ["penetration_max_m", "residual_rms_scene_weights", "residual_rms_body_weights"].map(String::from),
+    );
     writer.write_record(&header).map_err(failed)?;
     for row in rows {
         let c = &row.counts;
         let mut record = vec![row.scene.clone()];
         record.extend([row.bodies, c.pairs, c.contacts, c.points].map(|n| n.to_string()));
-        record.extend([row.step.ns, row.step.spread_ns].map(|t| t.to_string()));
+        let step = row.step;
+        record.extend([step.ns, step.mean_ns, step.longest_ns, step.spread_ns].map(|t| t.to_string()));
         for &phase in &phases {
             let time = row.phases[phase as usize];
             record.extend([time.ns, time.spread_ns].map(|t| t.to_string()));
@@ -171,7 +184,7 @@ type Curve = (String, Vec<f64>);
 pub fn svg(rows: &[Row], title: &str) -> Result<String, Error> {
     let mut text = String::new();
     draw(rows, title, &mut text).map_err(|e| Error::invalid("growth.svg", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(rows: &[Row], title: &str, text: &mut String) -> Drawn {

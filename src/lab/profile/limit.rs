@@ -90,6 +90,8 @@ mod tests {
             // 100 ns at 10 GB/s.
             traffic: Traffic { read: 1000.0, written: 0.0, working_set: 1000.0 },
             pass_ns,
+            mean_ns: pass_ns,
+            longest_ns: pass_ns,
             spread_ns: 0.0,
             passes: 1,
             bandwidth: Some(Bandwidth { read: 10.0, update: 10.0 }),

@@ -71,7 +71,11 @@ pub struct PhaseReport {
     pub traffic: Traffic,
     /// Median time of a pass (ns).
     pub pass_ns: f64,
-    /// Median deviation from it (ns).
+    /// Mean (ns).
+    pub mean_ns: f64,
+    /// The longest, of pieces that were timed as a whole (ns).
+    pub longest_ns: f64,
+    /// Median deviation from the median (ns).
     pub spread_ns: f64,
     /// Passes that were timed.
     pub passes: u64,
@@ -260,6 +264,8 @@ impl Entrant {
             probe,
             traffic: self.traffic,
             pass_ns,
+            mean_ns: self.pass_ns.iter().sum::<f64>() / self.pass_ns.len().max(1) as f64,
+            longest_ns: self.pass_ns.iter().copied().fold(0.0, f64::max),
             spread_ns: median(&deviations),
             passes: self.passes,
             bandwidth: (bandwidth.read > 0.0).then_some(bandwidth),

@@ -16,8 +16,10 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
             "phase": p.probe.phase.name(),
             "passes_per_step": p.probe.passes,
             "rows": p.probe.rows,
-            "pass_ns": p.pass_ns,
-            "spread_ns": p.spread_ns,
+            "median_pass_ns": p.pass_ns,
+            "mean_pass_ns": p.mean_ns,
+            "longest_pass_ns": p.longest_ns,
+            "spread_pass_ns": p.spread_ns,
             "timed_passes": p.passes,
             "bytes_read": p.traffic.read,
             "bytes_written": p.traffic.written,
@@ -46,12 +48,12 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
         "levels": report.levels.iter().map(level).collect::<Vec<_>>(),
         "peak_gflop_per_s": report.multiply_adds,
         "reset_share": report.reset_share,
-        "waiting_share": report.waiting,
+        "waited_share": report.waiting,
     })
 }
 
 /// Everything that `simpulse growth` measured.
-pub fn growth_json(rows: &[Row], verdicts: &[Verdict]) -> Value {
+pub fn growth_json(rows: &[Row], verdicts: &[Verdict], waited: Option<f64>) -> Value {
     let row = |row: &Row| {
         let phases: serde_json::Map<String, Value> = Phase::ALL
             .into_iter()
@@ -70,8 +72,10 @@ pub fn growth_json(rows: &[Row], verdicts: &[Verdict]) -> Value {
             "pairs": row.counts.pairs,
             "contacts": row.counts.contacts,
             "points": row.counts.points,
-            "step_ns": row.step.ns,
-            "step_spread_ns": row.step.spread_ns,
+            "median_step_ns": row.step.ns,
+            "mean_step_ns": row.step.mean_ns,
+            "longest_step_ns": row.step.longest_ns,
+            "spread_step_ns": row.step.spread_ns,
             "phase_ns": phases,
             "memory": memory,
             "errors": row.errors,
@@ -87,6 +91,7 @@ pub fn growth_json(rows: &[Row], verdicts: &[Verdict]) -> Value {
     };
     json!({
         "environment": Environment::current(),
+        "waited_share": waited,
         "sizes": rows.iter().map(row).collect::<Vec<_>>(),
         "verdicts": verdicts.iter().map(verdict).collect::<Vec<_>>(),
     })

@@ -3,7 +3,7 @@
 use super::text::bytes;
 use super::{Bandwidth, PhaseReport, Report};
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, write};
+use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, with_dark, write};
 use crate::lab::report::units::digits;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -20,7 +20,7 @@ const LINE: i32 = 17;
 pub fn svg(report: &Report) -> Result<String, Error> {
     let mut text = String::new();
     draw(report, &mut text).map_err(|e| Error::invalid("roofline", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 /// A point: intensity and rate.

@@ -61,11 +61,13 @@ fn per(total: f64, count: usize) -> String {
 fn single(report: &Report, phase: &PhaseReport) -> String {
     let probe = &phase.probe;
     let mut text = format!(
-        "{}: {} µs a pass, ± {}; {} in a step; median of {} timed passes; {:.1} % of the time was spent \
+        "{}: {} µs a pass, ± {} (mean {}, longest {}); {} in a step; median of {} timed passes; {:.1} % of the time was spent \
          restoring the state\n",
         probe.phase.name(),
         digits(1e-3 * phase.pass_ns),
         digits(1e-3 * phase.spread_ns),
+        digits(1e-3 * phase.mean_ns),
+        digits(1e-3 * phase.longest_ns),
         probe.passes,
         phase.passes,
         100.0 * report.reset_share,
@@ -112,10 +114,11 @@ fn at_least(phase: Phase, number: &str) -> String {
 }
 
 const LEGEND: &str = "\
-passes: per step.  ±: median deviation of a pass.  working set: bytes that a pass touches.  GB/s: bytes that
+passes: per step.  µs/pass: median, beside it mean and longest of the pieces that were timed, ± median deviation.
+working set: bytes that a pass touches.  GB/s: bytes that
 the source names over time; % of peak: of what memory that holds the working set, or multiply-adds at this
 width, reached in the same run.  limit: bandwidth- or compute-bound from half of the lower ceiling on, else
-latency-bound (dependent operations, gathers, branches).  – not counted or not measured.
+latency-bound (dependent operations, gathers, branches); where noise decides, cannot tell.  – not counted or not measured.
 ";
 
 fn several(report: &Report, phases: &[PhaseReport]) -> String {
@@ -123,6 +126,8 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
         "phase",
         "passes",
         "µs/pass",
+        "mean",
+        "longest",
         "±",
         "µs/step",
         "ns/row",
@@ -149,6 +154,8 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
             probe.phase.name().to_string(),
             probe.passes.to_string(),
             digits(1e-3 * ns),
+            digits(1e-3 * phase.mean_ns),
+            digits(1e-3 * phase.longest_ns),
             digits(1e-3 * phase.spread_ns),
             digits(1e-3 * ns * f64::from(probe.passes)),
             per(ns, probe.rows),

@@ -56,7 +56,8 @@ pub fn page(panels: &[Panel]) -> String {
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n\
          <link rel=\"icon\" href=\"data:,\">\n\
          <style>body {{ margin: 1rem; font: 15px/1.45 system-ui, sans-serif; color: #1f2933; }}\n\
-         h1 {{ font-size: 1.3rem; margin: 0 0 .5rem; }}\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{}\
+         h1 {{ font-size: 1.3rem; margin: 0 0 .5rem; }}\n\
+         @media (prefers-color-scheme: dark) {{ body {{ color: #e4e7eb; background: #14181d; }} }}\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{}\
          <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
         fragment(panels, 0.0)
     )

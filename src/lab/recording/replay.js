@@ -156,14 +156,16 @@
       return [context, w, h];
     }
 
-    const scaleOf = (w, h) => 0.86 * state.zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), h / Math.max(box[3] - box[1], 1e-9));
+    // Below the scene, for the bar of a round length.
+    const strip = 30;
+    const scaleOf = (w, h) => 0.86 * state.zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), (h - strip) / Math.max(box[3] - box[1], 1e-9));
 
     function drawScene({ recording, scene }) {
       const [c, w, h] = fit(scene);
       if (!(w > 0)) return;
       const scale = scaleOf(w, h);
       const cx = 0.5 * (box[0] + box[2]) + state.x, cy = 0.5 * (box[1] + box[3]) + state.y;
-      const px = (x) => 0.5 * w + scale * (x - cx), py = (y) => 0.5 * h - scale * (y - cy);
+      const px = (x) => 0.5 * w + scale * (x - cx), py = (y) => 0.5 * (h - strip) - scale * (y - cy);
       const { poses, points } = recording.frames[frameOf(recording)];
       const depth = new Float64Array(recording.kinds.length);
       for (const p of points) {
@@ -233,8 +235,8 @@
       // A bar of a round length.
       const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
       const meters = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
-      c.fillStyle = "rgba(255,255,255,.8)";
-      c.fillRect(6, h - 30, meters * scale + 12, 26);
+      c.fillStyle = "#fff";
+      c.fillRect(0, h - strip, w, strip);
       c.strokeStyle = c.fillStyle = "#1f2933";
       c.lineWidth = 1.5;
       c.beginPath();
@@ -363,7 +365,7 @@
       scene.addEventListener("wheel", (e) => {
         e.preventDefault();
         const [w, h] = [scene.clientWidth, scene.clientHeight];
-        const [x, y] = [e.offsetX - 0.5 * w, 0.5 * h - e.offsetY];
+        const [x, y] = [e.offsetX - 0.5 * w, 0.5 * (h - strip) - e.offsetY];
         const old = scaleOf(w, h);
         state.zoom = Math.min(Math.max(state.zoom * Math.exp(-0.0015 * e.deltaY), 0.02), 1e5);
         // What is under the pointer stays there.

@@ -134,6 +134,16 @@ pub fn write_upwards(area: &Area, text: &str, at: (i32, i32), size: i32) -> Draw
     Ok(())
 }
 
+/// A picture of the chart library that is dark where its reader's pages are: its paper, ink, grid and the
+/// black of a solver have other colors there.
+pub fn with_dark(svg: &str) -> String {
+    const STYLE: &str = "<style>@media (prefers-color-scheme: dark) {\
+        [fill='#FFFFFF'] { fill: #14181d } [fill='#282828'] { fill: #e4e7eb } [stroke='#282828'] { stroke: #cbd2d9 } \
+        [stroke='#DEDEDE'] { stroke: #323f4b } [fill='#222222'], [fill='#000000'] { fill: #cbd2d9 } \
+        [stroke='#222222'], [stroke='#000000'] { stroke: #cbd2d9 } }</style>\n";
+    svg.find('\n').map_or(svg.to_string(), |end| format!("{}{STYLE}{}", &svg[..=end], &svg[end + 1..]))
+}
+
 /// A name and a stroke per solver, from `x` on; returns where the next thing may stand.
 pub fn solver_legend(
     area: &Area,

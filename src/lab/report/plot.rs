@@ -6,7 +6,8 @@
 //! and between them there is nothing.
 
 use super::axes::{
-    Area, Drawn, Edges, INK, Scale, marker, solver_color, solver_legend, wrapped, write, write_upwards,
+    Area, Drawn, Edges, INK, Scale, marker, solver_color, solver_legend, with_dark, wrapped, write,
+    write_upwards,
 };
 use super::units::si_short;
 use crate::engine::world::Order;
@@ -31,7 +32,7 @@ const TITLE_LENGTH: usize = 44;
 pub fn svg(records: &[Record]) -> Result<String, Error> {
     let mut text = String::new();
     draw(records, &mut text).map_err(|e| Error::invalid("speed_vs_error.svg", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(records: &[Record], text: &mut String) -> Drawn {

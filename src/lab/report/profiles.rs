@@ -1,6 +1,8 @@
 //! `profiles.svg` and the slices: solvers compared over all scenes.
 
-use super::axes::{Area, Drawn, GRID, INK, Scale, solver_color, solver_legend, write, write_upwards};
+use super::axes::{
+    Area, Drawn, GRID, INK, Scale, solver_color, solver_legend, with_dark, write, write_upwards,
+};
 use super::table::{finish, table};
 use super::units::{digits, si};
 use crate::lab::error::Error;
@@ -35,14 +37,14 @@ fn tolerance(axis: ErrorAxis) -> String {
 pub fn svg(records: &[Record]) -> Result<String, Error> {
     let mut text = String::new();
     draw(records, &mut text).map_err(|e| Error::invalid("profiles.svg", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(records: &[Record], text: &mut String) -> Drawn {
     let size = (3 * PANEL_WIDTH as u32, HEIGHT as u32);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
-    let heading = "Share of scenes solved within a factor of the fastest solver: upper left is better";
+    let heading = "Share of scenes solved within a factor of the fastest solver: upper left is better; what coincides is drawn side by side";
     write(&root, heading, (8, 18), 18, HPos::Left)?;
     solver_legend(&root, &solvers_of(records), 12, 44)?;
     for (i, profile) in profiles(records).iter().enumerate() {
@@ -58,7 +60,9 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
     let most = all().fold(2.0, f64::max);
     let mut scale = Scale::of([1.0, most].into_iter(), 5);
     scale.limits[0] = 1.0;
-    let y = |share: f64| bottom - (share * (bottom - top) as f64).round() as i32;
+    // Room for steps beside each other at both ends.
+    let room = profile.ratios.len() as i32 + 2;
+    let y = |share: f64| bottom - room - (share * (bottom - top - 2 * room) as f64).round() as i32;
     for &tick in &scale.ticks {
         let x = scale.pixel(tick, left, right);
         area.draw(&PathElement::new(vec![(x, top), (x, bottom)], GRID))?;

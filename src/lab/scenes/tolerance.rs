@@ -91,8 +91,10 @@ pub struct GivenTolerances {
     /// See [`Tolerances::residual`].
     pub residual: Option<f64>,
     /// In the unit of each scene's truth.
+    #[serde(rename = "reference")]
     pub truth: Option<f64>,
     /// m/s
+    #[serde(rename = "rest_speed")]
     pub rest: Option<f64>,
 }
 

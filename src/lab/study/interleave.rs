@@ -17,7 +17,8 @@
 //! longest step of the run are taken of these.
 //!
 //! Where the thread waited for a processor, the wait is subtracted from a long step, and a block of short ones is
-//! left out.
+//! left out. A setting that waited in every block keeps its steps without the waits, but has no block to be compared
+//! by: it ties with everything.
 
 use crate::engine::clock::{Phase, waited};
 use crate::engine::world::{Divergence, Settings, StepCounts, World};
@@ -233,6 +234,8 @@ pub struct Interleaved<'a> {
 struct Timing {
     /// `[pass][step]` (ns); not a number where a step was not timed.
     steps: Vec<Vec<f64>>,
+    /// Steps of blocks that were left out (ns), the wait taken from the longest of each.
+    spare: Vec<f64>,
     /// `[pass][block]` (ns per step)
     blocks: Vec<Vec<f64>>,
     /// Passes that it took part in.
@@ -346,6 +349,12 @@ impl Timing {
         self.waited_and_ran = [self.waited_and_ran[0] + waits, self.waited_and_ran[1] + ran];
         // What was not taken from a step is somewhere in the block.
         if waits - taken > WAITED * ran {
+            let mut kept: Vec<f64> = times.into_iter().filter(|t| t.is_finite()).collect();
+            if let Some(longest) = kept.iter_mut().max_by(|a, b| a.total_cmp(b)) {
+                *longest = (*longest - (waits - taken)).max(0.0);
+            }
+            // Where the wait was in a step that is not among them, nothing is left of the longest.
+            self.spare.extend(kept.into_iter().filter(|t| *t > 0.0));
             return;
         }
         let timed: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();
@@ -393,7 +402,10 @@ impl Timing {
         let repeats = |step: usize| -> Vec<f64> {
             self.steps.iter().map(|pass| pass[step]).filter(|t| !t.is_nan()).collect()
         };
-        let times: Vec<Vec<f64>> = (0..count).map(repeats).filter(|t| !t.is_empty()).collect();
+        let mut times: Vec<Vec<f64>> = (0..count).map(repeats).filter(|t| !t.is_empty()).collect();
+        if times.is_empty() {
+            times = self.spare.iter().map(|&t| vec![t]).collect();
+        }
         let medians: Vec<f64> = times.iter().map(|t| median(t)).collect();
         let middle = median(&medians);
         let repeated = times.iter().any(|t| t.len() > 1);
@@ -525,6 +537,19 @@ pub(crate) mod tests {
         let mut once = vec![10.0; 20];
         once[3] = 900.0;
         assert_eq!(sample(vec![once]).spikes(), 1.0);
+    }
+
+    #[test]
+    fn a_setting_that_always_waited_has_a_time_and_ties() {
+        let waited = Timing {
+            steps: vec![vec![f64::NAN; 4]],
+            blocks: vec![vec![f64::NAN; 2]],
+            spare: vec![10.0, 30.0, 20.0],
+            ..Timing::default()
+        };
+        let (waited, quiet) = (waited.sample().unwrap(), sample(vec![vec![1.0; 20]]));
+        assert_eq!((waited.median_ns, waited.mean_ns, waited.worst_ns), (20.0, 20.0, 30.0));
+        assert!(crate::lab::study::compare::compare(&waited, &quiet).is_eq());
     }
 
     #[test]

@@ -40,6 +40,7 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
 use crate::lab::error::Error;
+use crate::lab::files;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::holds::{Broken, Watch};
@@ -64,7 +65,7 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "friction_ramp",
     "arch",
     "card_house",
-    "pyramid:40",
+    "pyramid:30",
     "circle_pile:500",
 ];
 
@@ -241,7 +242,7 @@ pub fn open_scene(
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
     if is_path(name) {
-        let mut scene = Scene::from_file(name)?;
+        let mut scene = Scene::from_file(files::path_of(name))?;
         scene.steps = steps.unwrap_or(scene.steps);
         scene.dt = dt.unwrap_or(scene.dt);
         scene.validate()?;

@@ -45,7 +45,9 @@ fn slice<'a>(
     as_good: impl Fn(&Sample, &Sample) -> bool,
 ) -> Option<Slice<'a>> {
     let curves = curves(records, axis);
-    let ranges: Vec<[f64; 2]> = curves.iter().filter_map(|c| range(c, given)).collect();
+    // What has no logarithm has no place between round numbers.
+    let usable = |[a, b]: &[f64; 2]| *a > 0.0 && b.is_finite();
+    let ranges: Vec<[f64; 2]> = curves.iter().filter_map(|c| range(c, given)).filter(usable).collect();
     let at = common(&ranges)?;
     let values: Vec<_> = curves.iter().map(|c| (c.solver, of(c, at))).collect();
     let found = || values.iter().filter_map(|(solver, sample)| Some((*solver, sample.as_ref()?)));
@@ -125,6 +127,9 @@ mod tests {
         let values: Vec<_> = time.values.iter().map(at).collect();
         assert_eq!(values, [Some((10.0, 0.5)), Some((12.0, 0.25)), None]);
         assert_eq!(time.best, ["soft_step"]);
+        // A time that was not measured is no place for a cut.
+        let unmeasured = [records[0].clone(), record(8, 4, 0.0, 0.25), other(0.0, 0.125)];
+        assert!(equal_time(&unmeasured, ErrorAxis::Penetration).is_none_or(|slice| slice.at > 0.0));
         // To an error of 0.1 to 0.25, or less: a setting is as good as any larger error.
         let error = equal_error(&records[..3], ErrorAxis::Penetration).unwrap();
         let values: Vec<_> = error.values.iter().map(at).collect();

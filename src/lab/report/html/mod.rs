@@ -158,14 +158,17 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     section(
         "scenes",
         "Scene by scene",
-        "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow marks are in natural order. The label is its budget (substeps · sweeps) and its lanes. Bars are the quartiles of its blocks of steps. The gray line is the Pareto front. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the right. Point at a mark for its numbers.",
+        "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. \
+         Beside those of the front stand budget (substeps · sweeps) and lanes. Bars are the quartiles of its blocks of steps. \
+         The grey line is the front: settings that no other beats in time and error. The shaded side is within the \
+         scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
         by_scene,
     );
     let legend = || panel::legend(&solvers);
     section(
         "profiles",
         "Performance profiles",
-        "The share of scenes that a solver solves within a factor of the fastest. Upper left is better.",
+        "The share of scenes that a solver solves within a factor of the fastest. Upper left is better. Lines that coincide are drawn beside each other.",
         legend() + &sections::profiles(records),
     );
     section(
@@ -266,8 +269,8 @@ fn command(settings: &Value) -> String {
     let options = [
         ("penetration", "penetration", "m"),
         ("residual", "residual", ""),
-        ("truth", "reference", ""),
-        ("rest", "rest-speed", "m/s"),
+        ("reference", "reference", ""),
+        ("rest_speed", "rest-speed", "m/s"),
     ];
     let given = |(name, option, unit): &(&str, &str, &str)| {
         settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))

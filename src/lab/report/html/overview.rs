@@ -32,7 +32,8 @@ fn dots(records: &[Record]) -> Vec<Dot<'_>> {
             continue;
         }
         for solver in solvers_of(records) {
-            let own = entries.iter().filter(|e| e.solver == solver);
+            // One treatment of impacts, the first: others are runs of their own, and not on every scene.
+            let own = entries.iter().filter(|e| e.solver == solver && e.impacts == scene[0].impacts);
             for (budget, entry) in own.enumerate() {
                 dots.extend(entry.time().map(|time| Dot { entry, slower: time / least, budget }));
             }
@@ -121,8 +122,16 @@ pub fn overview(records: &[Record]) -> String {
         names.extend(line.pop().map(|(at, _, name, _)| (at, name)));
     }
     for (at, name) in names {
-        if let Some(place) = labels.place(at, 10.0, [7.4 * name.chars().count() as f64, 12.0], panel.sides())
+        let size = [7.4 * name.chars().count() as f64, 12.0];
+        // Farther away where it is crowded, with a line to its mark.
+        let near = [10.0, 40.0, 80.0, 130.0, 190.0];
+        if let Some((r, place)) =
+            near.into_iter().find_map(|r| Some((r, labels.place(at, r, size, panel.sides())?)))
         {
+            if r > near[0] {
+                let end = if place[0] > at[0] { place[0] - 2.0 } else { (place[0] + size[0]).min(at[0]) };
+                panel.line(&[at, [end, place[1] - 4.0]], "curve natural", "#9aa5b1");
+            }
             panel.write(place, "dot-name", &name);
         }
     }

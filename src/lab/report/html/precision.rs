@@ -3,6 +3,7 @@
 use super::panel::{Band, Frame, Labels, Panel};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest};
+use crate::engine::constraints::Impacts;
 use crate::lab::picture::svg::escaped;
 use crate::lab::report::style::Style;
 use crate::lab::study::Record;
@@ -67,20 +68,24 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
             solvers.push(entry.solver);
         }
     }
+    let kinds = [true, false].into_iter().flat_map(|natural| Impacts::ALL.map(|impacts| (natural, impacts)));
     for solver in &solvers {
-        for natural in [true, false] {
-            let own = held().filter(|e| e.solver == *solver && e.is_natural() == natural);
+        for (natural, impacts) in kinds.clone() {
+            let kind = |e: &Record| (e.is_natural(), e.impacts) == (natural, impacts);
+            let own = held().filter(|e| e.solver == *solver && kind(e));
             let at: Vec<_> = own.map(|e| panel.at(error(e), e.time().unwrap_or(0.0))).collect();
             panel.line(&at, if natural { "curve natural" } else { "curve" }, Style::of(solver).color);
         }
     }
+    // No label on a mark, and only the front has labels: all others are told where one points.
     let mut labels = Labels::default();
-    // Front first: its labels get their place before others.
-    let mut order: Vec<&&Record> = settings.iter().collect();
-    order.sort_by_key(|e| (!e.on_front(axis), e.is_natural()));
-    for entry in order {
+    for entry in held() {
+        labels.block(panel.at(error(entry), entry.time().unwrap_or(0.0)), 4.0);
+    }
+    let mut named = Vec::new();
+    for entry in settings {
         let Some(sample) = &entry.sample else { continue };
-        let (time, color) = (1e-9 * sample.median_ns, Style::of(entry.solver).color);
+        let (time, color) = (1e-9 * sample.cost_ns(), Style::of(entry.solver).color);
         let budgets: Vec<&&Record> =
             settings.iter().filter(|e| e.solver == entry.solver && e.order == entry.order).collect();
         let size = budgets.iter().position(|e| e.budget == entry.budget).unwrap_or(0).min(4);
@@ -95,10 +100,8 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
                 let title = format!("{what} ({bars}), {}", shown(value, unit));
                 let at = panel.at(error(entry), time);
                 panel.marker(at, 3.2 + 0.9 * size as f64, entry.solver, entry.is_natural(), false, &title);
-                if let Some(place) =
-                    labels.place(at, 4.0, [4.3 * entry.label().chars().count() as f64, 8.0], panel.sides())
-                {
-                    panel.write(place, "point", &entry.label());
+                if entry.on_front(axis) {
+                    named.push((at, entry.label()));
                 }
             }
             (broke, _) => {
@@ -109,13 +112,19 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
             }
         }
     }
+    for (at, label) in named {
+        let size = [5.2 * label.chars().count() as f64, 9.0];
+        if let Some(place) = labels.place(at, 5.0, size, panel.sides()) {
+            panel.write(place, "point", &label);
+        }
+    }
     panel.finish()
 }
 
 fn table(entries: &[Record], settings: &[&Record]) -> String {
     let mut text = String::from(
         "<details><summary>All settings of this scene</summary>\n<table class=\"numbers\"><thead><tr><th>solver\
-         <th>budget<th>order, lanes<th>time (µs)<th>speed-up<th>penetration<th>residual<th>to reference<th>verdict\
+         <th>budget<th>order, lanes<th>time, mean (µs)<th>median<th>longest<th>speed-up<th>penetration<th>residual<th>to reference<th>verdict\
          </tr></thead><tbody>\n",
     );
     let unit = entries.iter().find_map(|e| e.truth.as_ref()).map_or("", |t| t.unit);
@@ -132,7 +141,9 @@ fn table(entries: &[Record], settings: &[&Record]) -> String {
             "<tr><th>{}<td>{}<td>{order}<td>{}<td>{}<td>{}<td>{}<td>{}{verdict}</tr>\n",
             escaped(entry.solver),
             escaped(&entry.budget_text),
-            entry.time().map_or("–".into(), |t| digits(1e6 * t)),
+            entry.sample.as_ref().map_or("–<td>–<td>–".into(), |s| {
+                [s.mean_ns, s.median_ns, s.worst_ns].map(|ns| digits(1e-3 * ns)).join("<td>")
+            }),
             entry.speed_up.map_or("–".into(), |s| format!("{s:.2}×")),
             cell(Axis::Penetration, "m"),
             cell(Axis::Law, ""),

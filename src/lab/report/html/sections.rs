@@ -23,7 +23,10 @@ pub fn profiles(records: &[Record]) -> String {
         let mut x = Scale::log([1.0, most], "×");
         x.low = 0.95;
         x.ticks.retain(|t| t.0 >= 1.0);
-        let mut panel = Panel::new(&frame, x, Scale::linear(1.0, "%"));
+        let mut y = Scale::linear(1.0, "%");
+        // Room for lines beside each other at both ends.
+        (y.low, y.high) = (-0.05, 1.05);
+        let mut panel = Panel::new(&frame, x, y);
         for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
             let rho =
                 |f: f64| ratios.iter().filter(|&&r| r <= f).count() as f64 / profile.scenes.max(1) as f64;

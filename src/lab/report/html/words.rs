@@ -55,13 +55,22 @@ pub fn answer(records: &[Record], steps: Option<u64>) -> String {
 
 /// What to use, what speaks against it, and where nothing is good enough.
 fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: Option<u32>) -> String {
-    let mut text = escaped(&recommendation(ranking, answers.len(), steps)).replace('\n', "<br/>");
+    let said = recommendation(ranking, answers.len(), steps);
+    let mut text = said.lines().map(escaped).collect::<Vec<_>>().join("<br/>\n");
     let none: Vec<&str> = answers.iter().filter(|a| a.best().is_none()).map(|a| a.scene).collect();
     if !none.is_empty() {
-        text += &format!("No setting is good enough on {}.", escaped(&none.join(", ")));
+        text += &format!("<br/>\nNothing that ran is good enough on {}.", escaped(&none.join(", ")));
     }
-    for line in warnings(records, steps).lines().chain(later_lines(records).iter().map(String::as_str)) {
-        text += &format!("</p>\n<p class=\"bad\">{}", escaped(line));
+    // A line that begins with a small letter goes on with the one before.
+    let mut lines: Vec<String> = Vec::new();
+    for line in warnings(records, steps).lines() {
+        match lines.last_mut() {
+            Some(last) if line.starts_with(char::is_lowercase) => *last += &format!(" {line}"),
+            _ => lines.push(line.to_string()),
+        }
+    }
+    for line in lines.into_iter().chain(later_lines(records)) {
+        text += &format!("</p>\n<p class=\"bad\">{}", escaped(&line));
     }
     text
 }
@@ -101,7 +110,8 @@ fn row(answer: &Answer, records: &[Record]) -> String {
     let stricter = |accuracy: Accuracy| {
         let best = scene_records.and_then(|s| Answer::at(s, accuracy)?.best());
         best.map_or("none".into(), |r| {
-            format!("{}, {}, {}", escaped(r.solver), escaped(&r.words()), si(1e-9 * r.cost_ns(), "s"))
+            let (words, cost) = (escaped(&r.words()), si(1e-9 * r.cost_ns(), "s"));
+            format!("<span title=\"{words}\">{} {cost}</span>", escaped(r.solver))
         })
     };
     let time = |ns: fn(&Sample) -> f64| entry.sample.as_ref().map_or("–".into(), |s| si(1e-9 * ns(s), "s"));
