@@ -11,13 +11,11 @@
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
-//! The two normal rows of a contact are solved together, friction rows after them. Where contacts have come or
-//! gone, the first substep relaxes once more, since its impulses come from contacts as they were a step ago.
+//! The two normal rows of a contact are solved together, friction rows after them.
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
 //! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes,
-//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. 1 rigid sweep more in steps in which
-//! contacts appear or disappear. Sweeps of a step request 5736 B per contact.
+//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
 //! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.
@@ -40,7 +38,7 @@ use frames::Roll;
 use glam::Vec2;
 use jams::Jams;
 use rest::hand_down::HandDown;
-use rest::{BORNE, LEAD, PER_CONTACT, PLACED};
+use rest::{BORNE, CALM, LEAD, PER_CONTACT};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -84,20 +82,18 @@ mod part {
     pub const STATICS: usize = 0;
     pub const HAND_DOWN: usize = 1;
     pub const RISING: usize = 2;
-    pub const PLACED: usize = 3;
-    pub const DEPTH: usize = 4;
-    pub const BEARING: usize = 5;
-    pub const FRAMES: usize = 6;
-    pub const SETTLING: usize = 7;
-    pub const IMPACTS: usize = 8;
-    pub const MOMENT: usize = 9;
-    pub const RELEASE: usize = 10;
-    pub const JAMS: usize = 11;
-    pub const HELD: usize = 12;
+    pub const DEPTH: usize = 3;
+    pub const BEARING: usize = 4;
+    pub const FRAMES: usize = 5;
+    pub const IMPACTS: usize = 6;
+    pub const MOMENT: usize = 7;
+    pub const RELEASE: usize = 8;
+    pub const JAMS: usize = 9;
+    pub const HELD: usize = 10;
 }
 
 /// What a run can leave out, and what fails then.
-const MECHANISMS: [Mechanism; 13] = [
+const MECHANISMS: [Mechanism; 11] = [
     Mechanism {
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
@@ -119,12 +115,6 @@ const MECHANISMS: [Mechanism; 13] = [
         case: "",
         lines: 0,
     },
-    Mechanism {
-        name: "placed",
-        meaning: "overlap that bodies are placed with goes slowly",
-        case: "B3.pile",
-        lines: 0,
-    },
     Mechanism { name: "depth", meaning: "springs see no deeper than their load earns", case: "", lines: 0 },
     Mechanism {
         name: "bearing",
@@ -137,12 +127,6 @@ const MECHANISMS: [Mechanism; 13] = [
         meaning: "what rolls has the frame of the middle of the step",
         case: "A26.plank",
         lines: lines_of(include_str!("shim/frames.rs")),
-    },
-    Mechanism {
-        name: "settling",
-        meaning: "one relaxing sweep more where contacts have come or gone",
-        case: "",
-        lines: 0,
     },
     Mechanism {
         name: "impacts",
@@ -189,8 +173,6 @@ struct Shim {
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
     gravity: Vec2,
-    /// Contacts appeared or disappeared.
-    contacts_changed: bool,
     /// Number of bodies that have taken a step; they come first.
     stepped: usize,
     /// Some shape is round.
@@ -208,7 +190,6 @@ impl Solver for Shim {
         self.rolls = [Kind::Circles, Kind::HullCircle, Kind::CircleHull]
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
-        self.contacts_changed = scene.contacts_changed;
         if !scene.without.leaves_out(part::JAMS) {
             self.jams.release(scene.contacts);
         }
@@ -250,9 +231,7 @@ impl Solver for Shim {
                 passes.iteration_done();
             }
             passes.integrate_positions();
-            // Impulses of the step before meet contacts that came, or miss some that went: one sweep more.
-            let settling = u32::from(substep == 0 && self.contacts_changed && passes.has(part::SETTLING));
-            for _ in 0..budget.relax_iterations + settling {
+            for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, rigid);
             }
             passes.end_substep(substep);
@@ -270,7 +249,7 @@ impl Solver for Shim {
 }
 
 impl Shim {
-    /// Contacts found in the first step of one of their bodies start from the overlap that it was placed with.
+    /// Contacts found in the first step of one of their bodies bear all of their load at once.
     fn place(&self, scene: &mut Scene<'_>) {
         if self.stepped >= scene.bodies.len() {
             return;
@@ -278,10 +257,8 @@ impl Shim {
         let stepped = self.stepped as u32;
         for (i, contact) in scene.contacts.iter().enumerate() {
             if contact.body_a.max(contact.body_b) >= stepped {
-                let least = contact.manifold.points().iter().fold(0.0, |least, p| p.separation.min(least));
-                let is_placed = !scene.without.leaves_out(part::PLACED);
                 let kept = scene.kept.contact(i);
-                kept[PLACED] = if is_placed && least < 0.0 { least } else { 1.0 };
+                kept[CALM] = 1.0;
                 kept[BORNE..].fill(-1.0);
             }
         }

@@ -79,7 +79,7 @@ fn close<L: Lanes>(
         let [nx, ny] = [record[0], record[1]];
         let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [placed, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [calm, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut loads = [open, zero, open, zero];
         let mut fastest = zero;
         for p in 0..layout.points {
@@ -116,14 +116,13 @@ fn close<L: Lanes>(
             L::scatter_velocity(fields, row_a, [free_a[0], free_a[1], free_a[2], free_a[3]]);
         }
         store::<L, 0>(quads, index, segment.filled(batch, L::WIDTH), loads);
-        let calm = (placed.max(zero) + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
+        let calm = (calm + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
         let calm = (L::splat(CALM_SPEED) - fastest).select_positive(calm, zero);
         let at_once = calm - L::splat(CALM_TIME);
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let at_once = is_pair.select_positive(at_once, zero);
         let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
-        let placed = (-placed).select_positive(placed, calm);
-        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [placed, lead, borne[0], borne[1]]);
+        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, lead, borne[0], borne[1]]);
     }
 }
 

@@ -17,16 +17,6 @@
 //! swells and settles without an end. So a contact of one point keeps the load that it was shortened for while that is at least half of what it
 //! bears, and no more than that and a tenth.
 //!
-//! # Overlap that was placed
-//!
-//! Bodies may be placed so that they overlap. No load has caused that overlap, and springs that see it throw bodies
-//! apart in the first step: a house of cards 2 mm in each other loses its top. So a contact that is found in the
-//! first step of one of its bodies has springs that are longer by d₀ = s < 0, and shorter from then on:
-//!
-//! ```text
-//! d₀ ← min(max(d₀, s) τ/(τ + dt) + 20 µm, 0)
-//! ```
-//!
 //! # How deep springs see it
 //!
 //! Springs carry their load at any depth ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap
@@ -75,15 +65,8 @@ const RISE: f32 = 0.2;
 /// Depth that springs see beyond that of the push speed, per sag (1).
 const EARNED: f32 = 20.0;
 
-/// τ: time in which overlap goes that a contact was placed with (s). Longer, the card house falls at 30 steps a
-/// second; shorter, it is thrown over at 240.
-const PLACED_TIME: f32 = 0.1;
-
 /// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
-
-/// What goes of placed overlap in a step beyond that, so that it ends (m).
-const ENDS: f32 = 2e-5;
 
 impl Pass for Shorten {
     fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
@@ -116,7 +99,6 @@ fn shorten<L: Lanes>(
     // Depth at which springs reach the push speed (m).
     let deepest = L::splat(if caps { springs.push_speed / (mass_scale * bias_rate) } else { f32::MAX });
     let grows = L::splat(dt / (RISE + dt));
-    let keeps = L::splat(PLACED_TIME / (PLACED_TIME + dt));
     let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
@@ -127,14 +109,8 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [mut placed, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [calm, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut borne = [borne_0, borne_1];
-        if (-placed).any_positive() {
-            let lowest = (0..layout.points)
-                .fold(zero, |lowest, p| lowest.min(record[layout.at(p, layout.separation)]));
-            let goes = keeps.mul_add(placed.max(lowest), L::splat(ENDS)).min(zero);
-            placed = (-placed).select_positive(goes, placed);
-        }
         let is_single = if layout.points == 2 {
             record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
         } else {
@@ -163,7 +139,7 @@ fn shorten<L: Lanes>(
             record[at] = impulse;
             let depth = L::splat(EARNED).mul_add(per_impulse * impulse / mass, deepest);
             let at = layout.at(p, layout.separation);
-            record[at] = (record[at] - placed.min(zero)).max(-depth) - sag;
+            record[at] = record[at].max(-depth) - sag;
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
                 let part = load.select_positive(borne[p] / load, zero);
@@ -171,6 +147,6 @@ fn shorten<L: Lanes>(
             }
         }
         let filled = segment.filled(batch, L::WIDTH);
-        super::closed::store::<L, 1>(quads, index, filled, [placed, lead, borne[0], borne[1]]);
+        super::closed::store::<L, 1>(quads, index, filled, [calm, lead, borne[0], borne[1]]);
     }
 }
