@@ -103,7 +103,7 @@ pub struct Mechanism {
     pub name: &'static str,
     /// What it does, in one line.
     pub meaning: &'static str,
-    /// A case of `simpulse verify` that fails without it.
+    /// What fails without it: a case of `simpulse verify`, `torture`, a family and what more of its scenes fail by, or a test.
     pub case: &'static str,
     /// Lines of code in files of its own, see [`lines_of`].
     pub lines: u32,

@@ -1,5 +1,6 @@
 //! Laws of whole scenes and of the laboratory, a file each.
 
+mod ablation;
 mod advise;
 mod broadphase;
 mod common;

@@ -3,8 +3,9 @@
 use super::common::totals;
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::params::Without;
 use simpulse::engine::solvers::{DEFAULT, find};
-use simpulse::engine::world::World;
+use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 fn pair(
@@ -39,8 +40,11 @@ proptest! {
         let scene = pair(angles, offset, speed, spins, friction, density);
         let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
         let before = totals(&world);
+        let mut deepest = 0.0_f64;
         for _ in 0..60 {
             world.step().unwrap();
+            let points = world.contacts.iter().flat_map(|contact| contact.manifold.points());
+            deepest = points.map(|point| -f64::from(point.separation)).fold(deepest, f64::max);
         }
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
@@ -48,8 +52,12 @@ proptest! {
             // 60 · 14 substeps round each velocity four times, by 2⁻²⁴ of it: √3360 · 6e-8 = 3.5e-6, and six times that.
             prop_assert!((after[k] - before[k]).abs() < 2.1e-5 * scale, "{before:?} {after:?}");
         }
-        // A gap that closes within a step without having been foreseen is off by v dt (see `papers/shim.md`).
-        prop_assert!((after[2] - before[2]).abs() < 0.01 * scale, "{before:?} {after:?}");
+        // A gap that closes within a step without having been foreseen leaves an overlap q. Springs that push it out have
+        // other arms when they give their impulse back: by then one body has slid past the other, and μ q v_t is gained.
+        let reduced = 1.6 * density / (1.6 + density);
+        let passing = speed[0].hypot(speed[1]) + 0.95 * spins[0].abs() + 0.75 * spins[1].abs();
+        let gained = reduced * deepest * passing;
+        prop_assert!((after[2] - before[2]).abs() < 0.01 * scale + gained, "{before:?} {after:?}");
         prop_assert!(after[3] < 1.0001 * before[3], "{before:?} {after:?}");
     }
 }
@@ -104,8 +112,8 @@ fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
         let turning = f64::from(b.inv_mass[1]) / f64::from(b.inv_inertia[1]) * spin * spin;
         0.5 * (f64::from(b.velocity(1).length_squared()) + turning) + 10.0 * y
     };
-    for substeps in [14, 64] {
-        let mut settings = crate::common::settings(find(DEFAULT).unwrap());
+    let run = |substeps: u32, without: Without| {
+        let mut settings = Settings { without, ..crate::common::settings(find(DEFAULT).unwrap()) };
         settings.budget.substeps = substeps;
         let mut world = scene.build(settings).unwrap();
         let (before, mut most, mut was_caught) = (energy(&world), 0.0, false);
@@ -114,6 +122,13 @@ fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
             most = energy(&world).max(most);
             was_caught |= world.contacts.len() == 2;
         }
-        assert!(was_caught && most <= 1.01 * before, "{substeps} substeps: {before} to {most} J/kg");
+        assert!(was_caught);
+        most / before
+    };
+    for substeps in [14, 64] {
+        let most = run(substeps, Without::default());
+        assert!(most <= 1.01, "{substeps} substeps: {most} of the energy that it had");
     }
+    let without = Without::default().and(find(DEFAULT).unwrap().mechanism("jams").unwrap());
+    assert!(run(14, without) > 2.0);
 }

@@ -112,10 +112,15 @@ const MECHANISMS: [Mechanism; 11] = [
     Mechanism {
         name: "rising",
         meaning: "where something moves, springs are shortened for loads as these rise within 0.2 s",
-        case: "",
+        case: "torture ratios restless",
         lines: 0,
     },
-    Mechanism { name: "depth", meaning: "springs see no deeper than their load earns", case: "", lines: 0 },
+    Mechanism {
+        name: "depth",
+        meaning: "springs see no deeper than their load earns",
+        case: "torture driven energy",
+        lines: 0,
+    },
     Mechanism {
         name: "bearing",
         meaning: "springs bear a load however deep their contact is",
@@ -153,13 +158,13 @@ const MECHANISMS: [Mechanism; 11] = [
     Mechanism {
         name: "jams",
         meaning: "contacts of two bodies that push against each other begin without impulses",
-        case: "",
+        case: "plastic::a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends",
         lines: lines_of(include_str!("shim/jams.rs")),
     },
     Mechanism {
         name: "held",
         meaning: "contacts of one point keep what they are shortened by, within bounds",
-        case: "",
+        case: "rest::a_pile_of_discs_does_not_breathe",
         lines: 0,
     },
 ];
