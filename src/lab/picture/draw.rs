@@ -306,14 +306,14 @@ fn legend(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::solvers::{DEFAULT, find};
+    use crate::engine::solvers::find;
     use crate::engine::world::Settings;
     use crate::lab::metrics::overlaps::Overlaps;
     use crate::lab::picture::{raster, svg};
     use crate::lab::scenes;
 
     fn frame(name: &str, steps: u32) -> Picture {
-        let settings = Settings { record_impulses: true, ..Settings::new(find(DEFAULT).unwrap()) };
+        let settings = Settings { record_impulses: true, ..Settings::new(find("soft_step").unwrap()) };
         let mut world = scenes::load(name).unwrap().scene.build(settings).unwrap();
         for _ in 0..steps {
             world.step().unwrap();
