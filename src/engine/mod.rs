@@ -28,6 +28,7 @@ pub mod constraints;
 pub mod contacts;
 pub mod continuous;
 pub mod error;
+pub mod joints;
 pub mod lanes;
 #[doc(hidden)]
 pub mod narrowphase;

@@ -7,11 +7,13 @@
 //! | [`numerics`] | pure mathematics: matrices, complementarity problems, cones |
 //! | [`records`] | where each number of each constraint is stored; no arithmetic on bodies |
 //! | [`kernels`] | passes over bodies and contacts, compiled per width and features |
+//! | [`joints`] | joints as rows, stated once for all passes |
 //! | [`vectors`] | a step's problem as λ, v and J |
 //! | [`impacts`] | what happens when bodies hit each other |
 //! | [`step`] | [`Passes`]: all that a solver sees |
 
 pub mod impacts;
+pub mod joints;
 pub mod kernels;
 #[doc(hidden)]
 pub mod numerics;

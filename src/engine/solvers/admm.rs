@@ -60,6 +60,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[3.0, 6.0],
         },
     ],
+    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
         (Law::Rest, "20 iterations are too few for tall stacks"),

@@ -39,6 +39,7 @@ pub static SOLVER: Variant = Variant {
     summary: "accelerated projected gradients on the convex relaxation: lifts off while sliding",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
+    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::Converges, "to the convex relaxation, which is another law"),
         (Law::Rest, "gradients spread a load more slowly than sweeps"),

@@ -87,6 +87,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     kept: KeptSize { per_point: PER_POINT, per_body: PER_BODY, ..KeptSize::NONE },
+    holds_no_joints: Some("its bodies see rows of contacts alone"),
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),

@@ -80,6 +80,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
+    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::NoAllocation, "matrices are as large as the scene"),
         (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),

@@ -185,6 +185,8 @@ pub struct Variant {
     pub continuous: bool,
     /// Numbers that it keeps from step to step, in addition to impulses.
     pub kept: KeptSize,
+    /// Why it holds no joints, if it does not.
+    pub holds_no_joints: Option<&'static str>,
     /// Properties that it does not have, and why.
     pub breaks: &'static [(Law, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
@@ -213,6 +215,7 @@ impl Variant {
         impacts: ImpactLaw::Bias,
         continuous: false,
         kept: KeptSize::NONE,
+        holds_no_joints: None,
         breaks: &[],
         make: || Schedule::boxed(|_| {}),
     };

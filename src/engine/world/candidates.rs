@@ -44,6 +44,10 @@ impl World {
             let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
             // Two segments never touch.
             let Some(kind) = Kind::of(a, b) else { continue };
+            if self.joints.keeps_apart(candidate.bodies) {
+                kept -= usize::from(candidate.contact != NO_CONTACT);
+                continue;
+            }
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
         }

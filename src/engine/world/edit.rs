@@ -4,7 +4,7 @@ use super::{Surface, World};
 use crate::engine::bodies::def::{finite, finite_pair};
 use crate::engine::bodies::{BodyDef, BodyHandle, BodyKind};
 use crate::engine::broadphase::Proxy;
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
+use crate::engine::constraints::kernels::types::ConstraintType;
 use crate::engine::error::Error;
 use crate::engine::shapes::{Aabb, MassProperties, Shape};
 use glam::Vec2;
@@ -123,7 +123,7 @@ impl World {
         self.proxies[i] = Proxy { aabb, body: body as u32, group, dynamic };
     }
 
-    /// Removes a body and its contacts. Other handles stay valid, and so do indices of other bodies.
+    /// Removes a body, its contacts and its joints. Other handles stay valid, and so do indices of other bodies.
     ///
     /// Until its index is reused, it names a static body that nothing touches. `contacts` remain those of the last
     /// step until the next. Errors: the body was removed before; a constraint of another type is on it.
@@ -141,10 +141,11 @@ impl World {
     /// ```
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
         let i = self.index_of(body)?;
-        let mut ends = self.work.types.iter().flat_map(|joined| joined.kind.ends()).flatten();
-        if ends.any(|&end| end as usize == i) {
+        self.group_joints();
+        if self.own_types().iter().any(|joined| joined.kind.ends().iter().flatten().any(|&end| end as usize == i)) {
             return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
         }
+        self.remove_joints_of(body);
         let nothing = BodyDef::fixed([0.0; 2]);
         self.bodies.set(i, &nothing, &MassProperties::ZERO);
         let slots = &mut self.slots;
@@ -327,7 +328,7 @@ impl World {
 
     /// Adds constraints of another type than contacts. They take part in every pass of the solver.
     pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
-        self.work.types.push(Joined::new(kind));
+        self.add_type(kind);
         self.lanes_are_for = None;
     }
 }

@@ -21,6 +21,7 @@ use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
 use edit::{Slots, Standing};
 use events::Events;
+use joints::JointSlots;
 use std::fmt;
 use traits::Traits;
 
@@ -30,6 +31,7 @@ mod counts;
 mod edit;
 mod events;
 mod held;
+mod joints;
 mod lanes;
 mod memory;
 mod pairs;
@@ -132,6 +134,7 @@ pub struct World {
     /// What is to be as it was before the next step.
     applied: Vec<Standing>,
     events: Events,
+    joints: JointSlots,
 }
 
 impl fmt::Debug for World {
@@ -177,6 +180,7 @@ impl World {
             slots: Slots::default(),
             applied: Vec::new(),
             events: Events::default(),
+            joints: JointSlots::default(),
             settings,
         }
     }
@@ -251,6 +255,7 @@ impl World {
 
     /// A step up to the new velocities and displacements in the rows.
     fn solve(&mut self, clock: &mut Clock) {
+        self.group_joints();
         self.update_pairs();
         clock.lap(Phase::Pairs);
         self.update_contacts();
@@ -277,6 +282,8 @@ impl World {
             rotation: s.rotation,
         };
         self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
+        let h = self.settings.h();
+        self.work.types.iter_mut().for_each(|joined| joined.kind.begin(&self.bodies, h));
     }
 
     /// The solver's stages, on rows and lanes that are ready.

@@ -4,6 +4,7 @@
 //! is compiled once. [`Pass`] is the generic side, which kernels implement; [`AnyPass`] the side
 //! that schedules see. Which instance runs is decided once per pass, outside of all loops.
 
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::constraints::records::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
@@ -72,6 +73,17 @@ pub enum PassMode {
     },
     /// Inverse masses have changed: only effective masses are recomputed.
     Masses,
+    /// Bodies are moved until errors are gone.
+    Position {
+        /// Share of an error that is removed (1).
+        fraction: f32,
+        /// Largest correction (m).
+        max_correction: f32,
+        /// Displacements count as impulses of h; these begin at zero in the first sweep of a substep.
+        impulses: Option<bool>,
+    },
+    /// The solver does not start warm: only accumulated impulses are set to zero.
+    Forget,
 }
 
 /// Calls a function that is compiled per width alone, at the lanes of `$width`.
@@ -97,6 +109,11 @@ pub trait Pass {
     /// Participation of constraints of other types.
     fn mode(&self) -> PassMode {
         PassMode::InTurn
+    }
+
+    /// What it makes of errors of rows that are held both ways: constraints of other types follow it.
+    fn law(&self) -> Softness {
+        Softness::RIGID
     }
 
     /// Sums of velocity increments, a row each, of a Jacobi sweep.
@@ -125,6 +142,9 @@ pub trait AnyPass {
     /// [`Pass::mode`]
     fn mode_of(&self) -> PassMode;
 
+    /// [`Pass::law`]
+    fn law_of(&self) -> Softness;
+
     /// [`Pass::sums`]
     fn sums_of(&mut self) -> &mut [BodyRow];
 
@@ -139,6 +159,10 @@ impl<P: Pass> AnyPass for P {
 
     fn mode_of(&self) -> PassMode {
         self.mode()
+    }
+
+    fn law_of(&self) -> Softness {
+        self.law()
     }
 
     fn sums_of(&mut self) -> &mut [BodyRow] {

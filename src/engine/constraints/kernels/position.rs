@@ -25,7 +25,7 @@
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
 use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::engine::constraints::records::batches::{Batches, Segment};
 use crate::engine::constraints::records::features::{
@@ -50,6 +50,11 @@ impl Pass for PositionSweep {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         // Normal; arms, separation and mass of each point.
         PerLane::of_bodies(2 + layout.points * (layout.arms() + 2), 0, opposite)
+    }
+
+    fn mode(&self) -> PassMode {
+        let PositionSweep { fraction, max_correction, .. } = *self;
+        PassMode::Position { fraction, max_correction, impulses: None }
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {

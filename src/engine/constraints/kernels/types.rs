@@ -11,12 +11,15 @@
 //! (`solvers/avbd/descent.rs`), which would need positions, forces and penalties of a row. Under solvers that use vectors other
 //! types are as their sweeps leave them; under `avbd`, which has no sweeps, they do nothing.
 
+use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::pass::{PassMode, PassWidth};
 use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use std::any::Any;
 use std::fmt;
 
 /// A pass over the constraints of one type.
@@ -26,6 +29,8 @@ pub struct TypeInput<'a> {
     pub phase: Phase,
     /// Whether only effective masses are computed, and the factor on increments in a Jacobi sweep.
     pub mode: PassMode,
+    /// What the pass makes of errors: its rule, for rows that are held both ways.
+    pub law: Softness,
     /// Substep (s).
     pub h: f32,
     /// Lanes that the pass runs at.
@@ -49,8 +54,21 @@ impl<'a> TypeRows<'a> {
     pub(crate) fn new(rows: &'a mut [BodyRow], sums: &'a mut [BodyRow], mode: PassMode) -> Self {
         TypeRows(match mode {
             PassMode::Jacobi { .. } => Access::Summed(SummedRows { before: rows, sums }),
-            PassMode::InTurn | PassMode::Masses => Access::InPlace(rows),
+            PassMode::InTurn | PassMode::Masses | PassMode::Forget | PassMode::Position { .. } => Access::InPlace(rows),
         })
+    }
+
+    /// Writes back `[Δx, Δy, Δθ, I⁻¹]`, in lane order: how a position sweep moves bodies.
+    ///
+    /// A Jacobi sweep sums up velocities alone: in one, nothing is written.
+    ///
+    /// # Panics
+    /// If there are fewer rows than the bound of `index`.
+    #[inline(always)]
+    pub fn scatter_delta<L: Lanes>(&mut self, index: LaneIndex<L::Index>, delta: [L; 4]) {
+        if let Access::InPlace(rows) = &mut self.0 {
+            L::scatter_delta(rows, index, delta);
+        }
     }
 }
 
@@ -114,18 +132,37 @@ impl RowStore for TypeRows<'_> {
 /// assert!(world.remove_body(a).is_err());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait ConstraintType: fmt::Debug + Send {
+pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Bodies a and b of each constraint; b is dynamic.
     fn ends(&self) -> &[[u32; 2]];
 
     /// Lane vectors of a record.
     fn stride(&self) -> usize;
 
+    /// Called before the passes of a step, of substeps of `h` (s).
+    fn begin(&mut self, _bodies: &Bodies, _h: f32) {}
+
     /// Runs one pass. Every width is to give the same bits.
     ///
     /// In [`PassMode::Masses`] it recomputes the effective masses in its records from the rows, whatever the
-    /// phase; in [`PassMode::Jacobi`] it multiplies its increments by `relaxation`.
+    /// phase; in [`PassMode::Jacobi`] it multiplies its increments by `relaxation`; in [`PassMode::Forget`] it
+    /// sets its accumulated impulses to zero and does nothing else.
     fn run(&mut self, on: TypeInput<'_>);
+
+    /// Accumulated impulses of a constraint (N·s or N·m·s), for those who ask.
+    fn impulses(&self, _constraint: usize) -> &[f32] {
+        &[]
+    }
+
+    /// Angle of a constraint's bodies, counted on from turn to turn (rad).
+    fn angle(&self, _constraint: usize) -> f32 {
+        0.0
+    }
+
+    /// Bytes held, without batches.
+    fn held_bytes(&self) -> usize {
+        0
+    }
 
     /// A copy, with what it keeps from step to step: a world that is held still gets it back.
     fn boxed(&self) -> Box<dyn ConstraintType>;

@@ -30,7 +30,13 @@ impl Passes<'_> {
     /// Body pass: as [`Self::integrate_velocities`] and a warm start in one, valid from
     /// the second substep on (see [`Motion::extrapolate_velocities`]).
     pub fn integrate_and_warm_start(&mut self) {
-        self.over_bodies(Phase::Integrate, |rows, motion| motion.extrapolate_velocities(rows));
+        if self.work.types.is_empty() {
+            self.over_bodies(Phase::Integrate, |rows, motion| motion.extrapolate_velocities(rows));
+        } else {
+            // Arms of joints have turned.
+            self.integrate_velocities();
+            self.warm_start();
+        }
     }
 
     /// Body pass: x ← x + h v.

@@ -16,8 +16,9 @@ pub use workspace::{Observer, StepInput, Watch, WorkCount, Workspace};
 
 use crate::engine::clock::{Clock, Phase};
 use crate::engine::constraints::impacts::ImpactLaw;
-use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassWidth, PerLane};
+use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
 use crate::engine::constraints::kernels::prepare::{Prepare, Store};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
 use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::Layout;
@@ -235,14 +236,26 @@ impl<'a> Passes<'a> {
 
     /// Constraints of other types that come at this rank.
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
-        let (width, mode) = (self.width_of(part), pass.mode_of());
+        let (width, mode, law) = (self.width_of(part), pass.mode_of(), pass.law_of());
         let Workspace { rows, types, .. } = &mut *self.work;
         for Joined { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
                 let rows = TypeRows::new(rows, pass.sums_of(), mode);
-                kind.run(TypeInput { phase, mode, h: self.input.h, width, rows, batches });
+                kind.run(TypeInput { phase, mode, law, h: self.input.h, width, rows, batches });
+            }
+        }
+    }
+
+    /// Constraints of other types, without the contacts.
+    fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
+        for part in [Part::Lanes, Part::Serial] {
+            let width = self.width_of(part);
+            let Workspace { rows, types, .. } = &mut *self.work;
+            for Joined { kind, lanes, serial } in types {
+                let (rows, batches) = (TypeRows::new(rows, &mut [], mode), part.of(lanes, serial));
+                kind.run(TypeInput { phase, mode, law: Softness::RIGID, h: self.input.h, width, rows, batches });
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::{Passes, ROW};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::observe::ObservedRule;
+use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::kernels::position::PositionSweep;
 use crate::engine::constraints::kernels::velocity::block::BlockSweep;
 use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
@@ -21,6 +22,7 @@ impl Passes<'_> {
         let mut zero = self.vector();
         self.system().set_lane_impulses(&mut zero);
         self.give_back([zero]);
+        self.over_types_alone(Phase::Prepare, PassMode::Forget);
         self.clock.lap(Phase::Prepare);
     }
 

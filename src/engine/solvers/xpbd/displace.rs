@@ -29,7 +29,7 @@ use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, turned,
     with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
 use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{
@@ -104,6 +104,10 @@ impl Pass for Displace<'_> {
         let once = PerLane::of_sweep(layout, true, opposite);
         // Bodies as they are, and as they were before displacements.
         PerLane { rows: 2 * once.rows, ..once }
+    }
+
+    fn mode(&self) -> PassMode {
+        PassMode::Position { fraction: 1.0, max_correction: self.push_speed * self.h, impulses: Some(self.first) }
     }
 
     #[inline(never)]

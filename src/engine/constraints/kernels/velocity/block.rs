@@ -48,6 +48,7 @@ use crate::engine::constraints::kernels::frame::{
 };
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
 use crate::engine::constraints::records::batches::{Batches, Segment};
 use crate::engine::constraints::records::features::{
@@ -65,6 +66,10 @@ pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRST> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
+
+    fn law(&self) -> Softness {
+        self.0.of_errors()
     }
 
     #[inline(always)]

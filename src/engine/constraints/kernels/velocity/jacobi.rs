@@ -9,7 +9,7 @@
 use crate::engine::constraints::kernels::frame::{INV_MASS, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
 use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::kernels::velocity::rules::{Relaxed, Soft};
+use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Relaxed, Soft, Softness};
 use crate::engine::constraints::kernels::velocity::sweep::sweep_segment;
 use crate::engine::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind,
@@ -34,6 +34,10 @@ impl Pass for JacobiSweep<'_> {
 
     fn mode(&self) -> PassMode {
         PassMode::Jacobi { relaxation: self.relaxation }
+    }
+
+    fn law(&self) -> Softness {
+        self.rule.of_errors()
     }
 
     fn sums(&mut self) -> &mut [BodyRow] {

@@ -54,6 +54,7 @@ use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
 };
 use crate::engine::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
 use crate::engine::constraints::records::batches::{Batches, Segment};
 use crate::engine::constraints::records::features::{
@@ -71,6 +72,11 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     const SEPARATION: bool = true;
     /// Whether arms turn with their bodies within the step.
     const TURNED: bool = false;
+
+    /// What it makes of the errors of rows that are held both ways, such as those of joints.
+    fn of_errors(&self) -> Softness {
+        Softness::RIGID
+    }
 
     /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
     /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
@@ -108,6 +114,10 @@ pub struct Sweep<R>(pub R);
 impl<R: NormalRule> Pass for Sweep<R> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         PerLane::of_sweep(layout, R::FRICTION, opposite)
+    }
+
+    fn law(&self) -> Softness {
+        self.0.of_errors()
     }
 
     #[inline(always)]

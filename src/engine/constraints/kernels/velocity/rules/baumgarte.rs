@@ -1,6 +1,6 @@
 //! Rigid contacts with Baumgarte stabilization.
 
-use super::{Relaxed, Rule};
+use super::{Relaxed, Rule, Softness};
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
@@ -50,6 +50,10 @@ impl Baumgarte {
 
 impl NormalRule for Baumgarte {
     const FRICTION: bool = true;
+
+    fn of_errors(&self) -> Softness {
+        Softness { bias_rate: self.rate, ..Softness::RIGID }
+    }
 
     #[inline(always)]
     fn line<L: Lanes>(&self, _against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {

@@ -1,6 +1,6 @@
 //! Rules made of other rules.
 
-use super::NormalRule;
+use super::{NormalRule, Softness};
 use crate::engine::lanes::Lanes;
 
 /// Another rule without friction rows.
@@ -10,6 +10,10 @@ pub struct Frictionless<R>(pub R);
 impl<R: NormalRule> NormalRule for Frictionless<R> {
     const FRICTION: bool = false;
     const SEPARATION: bool = R::SEPARATION;
+
+    fn of_errors(&self) -> Softness {
+        self.0.of_errors()
+    }
 
     #[inline(always)]
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
@@ -25,6 +29,10 @@ impl<R: NormalRule> NormalRule for Turned<R> {
     const FRICTION: bool = R::FRICTION;
     const SEPARATION: bool = R::SEPARATION;
     const TURNED: bool = true;
+
+    fn of_errors(&self) -> Softness {
+        self.0.of_errors()
+    }
 
     #[inline(always)]
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
@@ -44,6 +52,10 @@ pub struct Relaxed<R> {
 impl<R: NormalRule> NormalRule for Relaxed<R> {
     const FRICTION: bool = R::FRICTION;
     const SEPARATION: bool = R::SEPARATION;
+
+    fn of_errors(&self) -> Softness {
+        self.rule.of_errors()
+    }
 
     #[inline(always)]
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {

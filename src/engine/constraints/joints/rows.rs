@@ -1,0 +1,446 @@
+//! Rows of joints: what a joint states once, and what each pass does with it.
+//!
+//! # Row
+//!
+//! A row has an error C (m or rad) and the Jacobian J of its rate,
+//!
+//! ```text
+//! Ċ = J v = d·(v_b − v_a) + s_b ω_b − s_a ω_a
+//! ```
+//!
+//! with an axis d and arms s: r × d at the anchors of a linear row, d = 0 and s = 1 of an angular one. An impulse λ
+//! changes v_b by m_b⁻¹ d λ, ω_b by I_b⁻¹ s_b λ, and body a the other way round.
+//!
+//! # Block
+//!
+//! N rows are solved together. With K = J M⁻¹ Jᵀ (N × N) every law is a line in the velocity,
+//!
+//! ```text
+//! λ ← α λ − K⁻¹ (p C + q (J v − u))      within its bounds
+//!
+//! rigid          α = 1 − γ_i    p = γ_m β   q = γ_m    β, γ of the solver's rule; 0, 1 without position feedback
+//! limit, C > 0   α = 1          p = 1/h     q = 1      λ ≥ 0; may close and no more
+//! limit, C ≤ 0   as rigid                              λ ≥ 0
+//! motor          α = 1          p = 0       q = 1      |λ| ≤ F h, u is the speed asked for
+//! spring         α = q = D/(1 + D)   p = S/(1 + D)     |λ| ≤ F h
+//! ```
+//!
+//! # Spring
+//!
+//! A spring of angular frequency ω and damping ratio ζ gives λ = −K⁻¹ (S x + D v⁺) at the velocity v⁺ after it. With
+//! K λ = v⁺ − v that is the line above, and one substep of h is
+//!
+//! ```text
+//! v⁺ = A (v − S x),   x⁺ = x + h v⁺,   A = 1/(1 + D):    z² − (1 + A − h S A) z + A = 0
+//! ```
+//!
+//! S = ω² h makes the deflection under a load exact. The roots of the true motion are z = e^(−ζωh ± iω_d h), so
+//! A = e^(−2ζωh) makes the decay exact, whatever ω h; the frequency is then off by ζωh/2 of it. From ζ = 1 on both roots are
+//! real, and A is such that the slow one is exact, z = e^(−sωh), s = ζ − √(ζ² − 1): A (1 − z + (ωh)² z) = z (1 − z). Where
+//! ω h is above 1/2, D grows by (ωh)² − 1/4, which damps what the substep does not resolve: like implicit Euler, stable at any ω.
+//!
+//! The error x is that at the beginning of the substep, also in relaxing sweeps, which come after bodies have moved.
+
+use crate::engine::constraints::kernels::frame::{
+    DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn,
+};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
+use crate::engine::lanes::Lanes;
+use std::f32::consts::TAU;
+
+/// How the error of a row changes with velocities; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub struct Jacobian<L> {
+    /// d (1)
+    pub axis: [L; 2],
+    /// s_a and s_b: r × d (m), or 1 for an angle.
+    pub arms: [L; 2],
+}
+
+impl<L: Lanes> Jacobian<L> {
+    /// The row of ω_b − ω_a.
+    #[inline(always)]
+    pub fn angle() -> Self {
+        Jacobian { axis: [L::zero(); 2], arms: [L::splat(1.0); 2] }
+    }
+
+    /// The row of the velocity of anchors along `axis`; `arms` are from the centers of mass of a and b (m).
+    #[inline(always)]
+    pub fn along(axis: [L; 2], arms: [[L; 2]; 2]) -> Self {
+        Jacobian { axis, arms: arms.map(|r| cross(r, axis)) }
+    }
+
+    /// The rows of the velocity of anchors along x and y.
+    #[inline(always)]
+    pub fn point(arms: [[L; 2]; 2]) -> [Self; 2] {
+        let (zero, one) = (L::zero(), L::splat(1.0));
+        [
+            Jacobian { axis: [one, zero], arms: arms.map(|r| -r[1]) },
+            Jacobian { axis: [zero, one], arms: arms.map(|r| r[0]) },
+        ]
+    }
+
+    /// The same row, the other way round: −C.
+    #[inline(always)]
+    pub fn reversed(self) -> Self {
+        Jacobian { axis: self.axis.map(|x| -x), arms: self.arms.map(|x| -x) }
+    }
+}
+
+/// The law of a block; see the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub enum RowLaw<L> {
+    /// C = 0.
+    Rigid,
+    /// C ≥ 0.
+    Limit,
+    /// J v = `speed` (m/s or rad/s), at `cap` (N·s or N·m·s) per substep at most.
+    Motor {
+        /// u
+        speed: L,
+        /// F h
+        cap: L,
+    },
+    /// A spring; behind the impulses of its rows stand as many errors.
+    Spring {
+        /// S (1/s)
+        stiffness: L,
+        /// D (1)
+        damping: L,
+        /// F h, if bounded.
+        cap: Option<L>,
+    },
+}
+
+/// S and D of a spring of `hertz` and `damping_ratio` in substeps of `h` (s).
+pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
+    let (y, zeta) = (TAU * hertz * h, damping_ratio);
+    if y == 0.0 {
+        return [0.0; 2];
+    }
+    let damping = if zeta < 1.0 {
+        (2.0 * zeta * y).exp_m1()
+    } else {
+        // ζ − √(ζ² − 1), without cancellation.
+        let s = 1.0 / (zeta + (zeta * zeta - 1.0).sqrt());
+        let (z, rest) = ((-s * y).exp(), -(-s * y).exp_m1());
+        (rest + y * y * z) / (z * rest) - 1.0
+    };
+    let unresolved = (y * y - 0.25).max(0.0);
+    [y * y / h, (damping + unresolved).min(1e9)]
+}
+
+/// What a pass does with blocks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Task {
+    /// Applies accumulated impulses.
+    WarmStart,
+    /// Solves velocities.
+    Velocity {
+        /// Of rigid rows.
+        law: Softness,
+        /// Whether bodies have moved since springs were read.
+        relaxing: bool,
+        /// Factor on increments of impulses (1).
+        relaxation: f32,
+        /// 1/h (1/s)
+        inv_h: f32,
+    },
+    /// Solves velocities that only move bodies; accumulates nothing.
+    Push {
+        /// Of rigid rows.
+        law: Softness,
+    },
+    /// Moves bodies until errors are gone.
+    Position {
+        /// Share of the error that is removed.
+        fraction: f32,
+        /// Largest correction (m or rad).
+        max_correction: f32,
+        /// 1/h, where displacements are impulses (1/s); else 0.
+        inv_h: f32,
+        /// Impulses begin at zero.
+        first: bool,
+    },
+}
+
+/// The two bodies of a batch of joints, and what the pass does with their rows.
+#[derive(Debug)]
+pub struct JointPass<L> {
+    /// Rows of a and b.
+    pub(crate) bodies: [[L; 8]; 2],
+    /// sin Δθ and 1 − cos Δθ of a and b.
+    turns: [(L, L); 2],
+    task: Task,
+}
+
+/// r × d
+#[inline(always)]
+pub fn cross<L: Lanes>(r: [L; 2], d: [L; 2]) -> L {
+    r[0].mul_add(d[1], -(r[1] * d[0]))
+}
+
+/// u·v
+#[inline(always)]
+pub fn dot<L: Lanes>(u: [L; 2], v: [L; 2]) -> L {
+    u[0].mul_add(v[0], u[1] * v[1])
+}
+
+/// u + v
+#[inline(always)]
+pub fn add<L: Lanes>(u: [L; 2], v: [L; 2]) -> [L; 2] {
+    [u[0] + v[0], u[1] + v[1]]
+}
+
+/// The solution of K x = r by LDLᵀ; what has no pivot is zero.
+#[inline(always)]
+fn solve<L: Lanes, const N: usize>(mut k: [[L; N]; N], mut x: [L; N]) -> [L; N] {
+    let mut inverse = [L::zero(); N];
+    for j in 0..N {
+        inverse[j] = k[j][j].select_positive(L::splat(1.0) / k[j][j], L::zero());
+        for i in j + 1..N {
+            let factor = k[i][j] * inverse[j];
+            for c in j + 1..=i {
+                k[i][c] = factor.neg_mul_add(k[c][j], k[i][c]);
+            }
+            x[i] = factor.neg_mul_add(x[j], x[i]);
+        }
+    }
+    for j in (0..N).rev() {
+        x[j] = x[j] * inverse[j];
+        for i in j + 1..N {
+            x[j] = (k[i][j] * inverse[j]).neg_mul_add(x[i], x[j]);
+        }
+    }
+    x
+}
+
+impl<L: Lanes> JointPass<L> {
+    #[inline(always)]
+    pub(crate) fn new(bodies: [[L; 8]; 2], task: Task) -> Self {
+        let turns = [turn(bodies[0][TURN]), turn(bodies[1][TURN])];
+        JointPass { bodies, turns, task }
+    }
+
+    /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
+    #[inline(always)]
+    pub fn turned(&self, side: usize, vector: [L; 2]) -> [L; 2] {
+        add(vector, self.turn_of(side, vector))
+    }
+
+    /// R(Δθ) r − r
+    #[inline(always)]
+    fn turn_of(&self, side: usize, r: [L; 2]) -> [L; 2] {
+        let (sine, versine) = self.turns[side];
+        [-(sine.mul_add(r[1], versine * r[0])), versine.neg_mul_add(r[1], sine * r[0])]
+    }
+
+    /// How far b has turned more than a since the start of the step (rad).
+    #[inline(always)]
+    pub fn turn(&self) -> L {
+        self.bodies[1][TURN] - self.bodies[0][TURN]
+    }
+
+    /// Arms of a and b as they are now, and the way from a's anchor to b's, from what they were at the start of the step:
+    /// `[r_a, r_b, way]` (m), six numbers of the record.
+    #[inline(always)]
+    pub fn anchors(&self, record: &[L]) -> ([[L; 2]; 2], [L; 2]) {
+        let start = [[record[0], record[1]], [record[2], record[3]]];
+        let moved = [0, 1].map(|side| self.turn_of(side, start[side]));
+        let [a, b] = &self.bodies;
+        let way = [
+            (record[4] + (b[DX] - a[DX])) + (moved[1][0] - moved[0][0]),
+            (record[5] + (b[DY] - a[DY])) + (moved[1][1] - moved[0][1]),
+        ];
+        ([add(start[0], moved[0]), add(start[1], moved[1])], way)
+    }
+
+    /// J x of rows of which `at` is the place of the first number: velocities, or displacements.
+    #[inline(always)]
+    fn rate(&self, j: &Jacobian<L>, [x, y, w]: [usize; 3]) -> L {
+        let [a, b] = &self.bodies;
+        let along = dot(j.axis, [b[x] - a[x], b[y] - a[y]]);
+        j.arms[1].mul_add(b[w], j.arms[0].neg_mul_add(a[w], along))
+    }
+
+    #[inline(always)]
+    fn apply(&mut self, j: &Jacobian<L>, impulse: L, [x, y, w]: [usize; 3]) {
+        let [a, b] = &mut self.bodies;
+        let (ma, mb) = (a[INV_MASS] * impulse, b[INV_MASS] * impulse);
+        a[x] = j.axis[0].neg_mul_add(ma, a[x]);
+        a[y] = j.axis[1].neg_mul_add(ma, a[y]);
+        a[w] = (a[INV_INERTIA] * j.arms[0]).neg_mul_add(impulse, a[w]);
+        b[x] = j.axis[0].mul_add(mb, b[x]);
+        b[y] = j.axis[1].mul_add(mb, b[y]);
+        b[w] = (b[INV_INERTIA] * j.arms[1]).mul_add(impulse, b[w]);
+    }
+
+    /// K⁻¹ x
+    #[inline(always)]
+    fn solved<const N: usize>(&self, j: &[Jacobian<L>; N], x: [L; N]) -> [L; N] {
+        let [a, b] = &self.bodies;
+        let (mass, ia, ib) = (a[INV_MASS] + b[INV_MASS], a[INV_INERTIA], b[INV_INERTIA]);
+        let mut k = [[L::zero(); N]; N];
+        for r in 0..N {
+            for c in 0..=r {
+                let by_turning = (ia * j[r].arms[0]).mul_add(j[c].arms[0], (ib * j[r].arms[1]) * j[c].arms[1]);
+                k[r][c] = mass.mul_add(dot(j[r].axis, j[c].axis), by_turning);
+            }
+        }
+        solve(k, x)
+    }
+
+    /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s).
+    #[inline(always)]
+    pub fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        const VELOCITY: [usize; 3] = [VX, VY, W];
+        let (impulse, held) = kept.split_at_mut(N);
+        match self.task {
+            Task::WarmStart => {
+                for (j, &impulse) in j.iter().zip(impulse.iter()) {
+                    self.apply(j, impulse, VELOCITY);
+                }
+            }
+            Task::Velocity { law: solver, relaxing, relaxation, inv_h } => {
+                let one = L::splat(1.0);
+                let mut error = error;
+                let mut speed = L::zero();
+                let mut cap = None;
+                let rigid = [
+                    L::splat(1.0 - solver.impulse_scale),
+                    L::splat(solver.mass_scale * solver.bias_rate),
+                    L::splat(solver.mass_scale),
+                ];
+                let [alpha, p, q] = match law {
+                    RowLaw::Rigid => rigid,
+                    RowLaw::Limit => {
+                        let open = [one, L::splat(inv_h), one];
+                        [0, 1, 2].map(|i| error[0].select_positive(open[i], rigid[i]))
+                    }
+                    RowLaw::Motor { speed: wanted, cap: bound } => {
+                        (speed, cap) = (wanted, Some(bound));
+                        [one, L::zero(), one]
+                    }
+                    RowLaw::Spring { stiffness, damping, cap: bound } => {
+                        cap = bound;
+                        if relaxing {
+                            error.copy_from_slice(&held[..N]);
+                        } else {
+                            held[..N].copy_from_slice(&error);
+                        }
+                        let scale = one / (one + damping);
+                        [damping * scale, stiffness * scale, damping * scale]
+                    }
+                };
+                let mut x = error;
+                for i in 0..N {
+                    x[i] = p.mul_add(error[i], q * (self.rate(&j[i], VELOCITY) - speed));
+                }
+                let x = self.solved(&j, x);
+                let mut new = x;
+                for i in 0..N {
+                    let line = alpha.mul_add(impulse[i], -x[i]);
+                    new[i] = L::splat(relaxation).mul_add(line - impulse[i], impulse[i]);
+                }
+                if matches!(law, RowLaw::Limit) {
+                    new[0] = new[0].max(L::zero());
+                }
+                if let Some(cap) = cap {
+                    let norm = new.iter().fold(L::zero(), |sum, &x| x.mul_add(x, sum)).sqrt();
+                    let scale = (norm - cap).select_positive(cap / norm, one);
+                    new = new.map(|x| x * scale);
+                }
+                for i in 0..N {
+                    self.apply(&j[i], new[i] - impulse[i], VELOCITY);
+                    impulse[i] = new[i];
+                }
+            }
+            Task::Push { law: solver } => {
+                let mut x = error;
+                let is_limit = match law {
+                    RowLaw::Rigid => false,
+                    RowLaw::Limit => true,
+                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
+                };
+                for i in 0..N {
+                    let bias = L::splat(solver.bias_rate) * error[i];
+                    x[i] = L::splat(-solver.mass_scale) * (self.rate(&j[i], VELOCITY) + bias);
+                }
+                let mut x = self.solved(&j, x);
+                if is_limit {
+                    x[0] = error[0].select_positive(L::zero(), x[0].max(L::zero()));
+                }
+                for i in 0..N {
+                    self.apply(&j[i], x[i], VELOCITY);
+                }
+            }
+            Task::Position { fraction, max_correction, inv_h, first } => {
+                if first {
+                    impulse.fill(L::zero());
+                }
+                let mut x = error;
+                match law {
+                    RowLaw::Rigid => {}
+                    RowLaw::Limit => x[0] = x[0].min(L::zero()),
+                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
+                }
+                let bound = L::splat(max_correction);
+                let x = self.solved(&j, x.map(|x| -(L::splat(fraction) * x).min(bound).max(-bound)));
+                for i in 0..N {
+                    self.apply(&j[i], x[i], [DX, DY, TURN]);
+                    impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);
+                }
+            }
+        }
+    }
+
+    /// One row of a rigid or limited error, a motor or a spring; see [`Self::block`].
+    #[inline(always)]
+    pub fn row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L]) {
+        self.block([j], [error], law, kept);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symmetric_systems_are_solved_and_what_cannot_move_stays() {
+        let k = [[4.0f32, 0.0, 0.0], [1.0, 3.0, 0.0], [0.5, -1.0, 2.0]];
+        let x = solve(k, [1.0, 2.0, 3.0]);
+        let full = [[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 2.0]];
+        for (row, expected) in full.iter().zip([1.0, 2.0, 3.0]) {
+            let sum: f32 = row.iter().zip(x).map(|(k, x)| k * x).sum();
+            assert!((sum - expected).abs() < 1e-5, "{x:?}");
+        }
+        assert_eq!(solve([[0.0f32; 2]; 2], [1.0, 1.0]), [0.0, 0.0]);
+    }
+
+    /// A mass on a spring, alone, over 20 periods or time constants.
+    #[test]
+    fn springs_decay_as_their_law_says_at_any_step_and_hold_their_load() {
+        for (zeta, y) in [(0.0, 0.3f64), (0.01, 0.02), (0.1, 0.2), (0.5, 0.4), (1.0, 0.1), (3.0, 0.1), (20.0, 0.4)] {
+            let h = 1.0 / 840.0;
+            let omega = y / h;
+            let [s, d] = spring_coefficients((omega / std::f64::consts::TAU) as f32, zeta as f32, h as f32);
+            let (s, d) = (f64::from(s), f64::from(d));
+            let a = 1.0 / (1.0 + d);
+            let trace = 1.0 + a - h * s * a;
+            // Size of the slowest root of z² − trace z + a.
+            let root = trace * trace / 4.0 - a;
+            let size = if root > 0.0 { trace / 2.0 + root.sqrt() } else { a.sqrt() };
+            let slow = if zeta < 1.0 { zeta } else { zeta - (zeta * zeta - 1.0).sqrt() };
+            let expected = slow * y;
+            assert!((-size.ln() - expected).abs() < 0.01 * expected + 1e-6, "{zeta} {y}: {} for {expected}", -size.ln());
+            // At rest S x = h g.
+            assert!((s - omega * omega * h).abs() < 1e-5 * s, "{zeta} {y}");
+        }
+        // What a substep does not resolve is stable.
+        for y in [0.6f32, 1.0, 3.0, 100.0] {
+            let [s, d] = spring_coefficients(y / TAU, 0.0, 1.0);
+            let a = 1.0 / (1.0 + d);
+            assert!((1.0 + a - s * a).abs() <= 1.0 + a && a <= 1.0, "{y}");
+        }
+    }
+}

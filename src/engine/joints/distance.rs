@@ -1,0 +1,116 @@
+//! A rod, a rope or a spring between two points.
+
+use super::axial::{Axial, Motor, Spring};
+use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative, excess};
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw, dot};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+
+/// Two points at a distance: rigid if there is neither spring nor motor nor limits.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Distance {
+    /// In the frame of a (m).
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Length of the rod, or of the spring at rest (m).
+    pub length: f64,
+    /// Along the line between the points.
+    pub spring: Option<Spring>,
+    /// Along the line between the points; a positive speed lengthens.
+    pub motor: Option<Motor>,
+    /// Least and greatest distance (m): a rope is `[0, length]`.
+    pub limits: Option<[f64; 2]>,
+}
+
+impl Distance {
+    fn axial(&self) -> Axial {
+        Axial { spring: self.spring, motor: self.motor, limits: self.limits }
+    }
+}
+
+/// Numbers: `[r_a, r_b, way, length]`, then what works along the line.
+const FRAME: usize = 7;
+
+/// Points that are nearer than this have no line between them (m).
+const NO_LINE: f32 = 1e-9;
+
+impl JointType for Distance {
+    type Form = Form;
+
+    fn numbers(form: Form) -> usize {
+        FRAME + Axial::numbers(form)
+    }
+
+    fn kept(form: Form) -> usize {
+        match Axial::kept(form) {
+            0 => 1,
+            count => count,
+        }
+    }
+
+    fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        numbers[6] = self.length as f32;
+        // A spring is at rest at the length, limits are of the distance.
+        let limits = self.limits.map(|limits| limits.map(|x| x - self.length));
+        Axial { limits, ..self.axial() }.place(at.h, &mut numbers[FRAME..]);
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let (arms, way) = on.anchors(numbers);
+        let distance = dot(way, way).sqrt();
+        let scale = (distance - L::splat(NO_LINE)).select_positive(L::splat(1.0) / distance, L::zero());
+        let j = Jacobian::along(way.map(|x| x * scale), arms);
+        let error = distance - numbers[6];
+        if Axial::kept(form) == 0 {
+            on.row(j, error, RowLaw::Rigid, kept);
+        } else {
+            Axial::rows(form, j, error, &numbers[FRAME..], kept, on);
+        }
+    }
+}
+
+impl Definition for Distance {
+    fn form(&self) -> Form {
+        self.axial().form()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        check_not_negative("length", self.length)?;
+        if let Some([least, _]) = self.limits {
+            check_not_negative("limits[0]", least)?;
+        }
+        self.axial().check()
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn refer(&mut self, _angle: f64, length: f64) {
+        self.length = length;
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        let translation = at.way.length();
+        let rigid = self.form() == Form::default();
+        JointState {
+            gap: if rigid { (translation - self.length).abs() } else { 0.0 },
+            angle: at.angle,
+            translation,
+            excess: excess(self.limits, translation),
+            ..JointState::default()
+        }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        let form = self.form();
+        let along = if form == Form::default() { f64::from(kept[0]) } else { Axial::impulse(form, kept) };
+        [along.abs(), 0.0]
+    }
+}

@@ -1,0 +1,101 @@
+//! A drive to a pose: springs of bounded force and torque.
+
+use super::axial::Spring;
+use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative};
+use crate::engine::bodies::def::finite;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+
+/// A drive of b to a pose against a.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct MotorJoint {
+    /// In the frame of a (m): where b's anchor is to go.
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Angle of b against a to go to (rad).
+    pub angle: f64,
+    /// How it goes there.
+    pub spring: Spring,
+    /// Greatest force (N).
+    pub max_force: f64,
+    /// Greatest torque (N·m).
+    pub max_torque: f64,
+}
+
+impl Default for MotorJoint {
+    fn default() -> Self {
+        MotorJoint {
+            anchor_a: [0.0; 2],
+            anchor_b: [0.0; 2],
+            angle: 0.0,
+            spring: Spring { hertz: 5.0, damping_ratio: 1.0, rest: 0.0 },
+            max_force: 1.0,
+            max_torque: 1.0,
+        }
+    }
+}
+
+/// Numbers: `[r_a, r_b, way, angle, S, D, F h, M h]`.
+const NUMBERS: usize = 11;
+
+impl JointType for MotorJoint {
+    type Form = Form;
+
+    fn numbers(_form: Form) -> usize {
+        NUMBERS
+    }
+
+    fn kept(_form: Form) -> usize {
+        6
+    }
+
+    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        numbers[6] = at.angle(self.angle);
+        numbers[7..9].copy_from_slice(&self.spring.coefficients(at.h));
+        (numbers[9], numbers[10]) = (self.max_force as f32 * at.h, self.max_torque as f32 * at.h);
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let law = |cap: L| RowLaw::Spring { stiffness: numbers[7], damping: numbers[8], cap: Some(cap) };
+        let (of_points, of_angle) = kept.split_at_mut(4);
+        on.row(Jacobian::angle(), numbers[6] + on.turn(), law(numbers[10]), of_angle);
+        let (arms, way) = on.anchors(numbers);
+        on.block(Jacobian::point(arms), way, law(numbers[9]), of_points);
+    }
+}
+
+impl Definition for MotorJoint {
+    fn form(&self) -> Form {
+        Form::default()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        finite("angle", self.angle)?;
+        self.spring.check().map_err(|e| e.within("spring"))?;
+        check_not_negative("max_force", self.max_force)?;
+        check_not_negative("max_torque", self.max_torque)
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn refer(&mut self, angle: f64, _length: f64) {
+        self.angle = angle;
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        JointState { angle: at.angle, translation: at.way.length(), ..JointState::default() }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        [f64::from(kept[0].hypot(kept[1])), f64::from(kept[4].abs())]
+    }
+}

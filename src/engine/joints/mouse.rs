@@ -1,0 +1,83 @@
+//! A spring of bounded force to a point of the world.
+
+use super::axial::Spring;
+use super::{Definition, Form, JointState, Measured, check_not_negative};
+use crate::engine::bodies::def::finite_pair;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+
+/// Pulls a point of b to a target, which may be changed between steps. Body a does not move.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Mouse {
+    /// The target, in the frame of a (m).
+    pub target: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// How it pulls.
+    pub spring: Spring,
+    /// Greatest force (N).
+    pub max_force: f64,
+}
+
+impl Default for Mouse {
+    fn default() -> Self {
+        let spring = Spring { hertz: 5.0, damping_ratio: 0.7, rest: 0.0 };
+        Mouse { target: [0.0; 2], anchor_b: [0.0; 2], spring, max_force: 1.0 }
+    }
+}
+
+/// Numbers: `[r_a, r_b, way, S, D, F h]`.
+const NUMBERS: usize = 9;
+
+impl JointType for Mouse {
+    type Form = Form;
+
+    fn numbers(_form: Form) -> usize {
+        NUMBERS
+    }
+
+    fn kept(_form: Form) -> usize {
+        4
+    }
+
+    fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.target, self.anchor_b));
+        numbers[6..8].copy_from_slice(&self.spring.coefficients(at.h));
+        numbers[8] = self.max_force as f32 * at.h;
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let law = RowLaw::Spring { stiffness: numbers[6], damping: numbers[7], cap: Some(numbers[8]) };
+        let (arms, way) = on.anchors(numbers);
+        on.block(Jacobian::point(arms), way, law, kept);
+    }
+}
+
+impl Definition for Mouse {
+    fn form(&self) -> Form {
+        Form::default()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        finite_pair("target", self.target)?;
+        finite_pair("anchor_b", self.anchor_b)?;
+        self.spring.check().map_err(|e| e.within("spring"))?;
+        check_not_negative("max_force", self.max_force)
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.target, &mut self.anchor_b])
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        JointState { angle: at.angle, translation: at.way.length(), ..JointState::default() }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        [f64::from(kept[0].hypot(kept[1])), 0.0]
+    }
+}

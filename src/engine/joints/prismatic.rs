@@ -1,0 +1,133 @@
+//! A slider: b moves along an axis of a and does not turn against it.
+
+use super::axial::{Axial, Motor, Spring};
+use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
+use crate::engine::bodies::def::finite;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw, add, dot};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+use glam::DVec2;
+
+/// A slider with spring, motor and limits along its axis.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Prismatic {
+    /// In the frame of a (m).
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Direction in the frame of a; any length.
+    pub axis: [f64; 2],
+    /// Angle of b against a (rad).
+    pub reference_angle: f64,
+    /// Along the axis.
+    pub spring: Option<Spring>,
+    /// Along the axis.
+    pub motor: Option<Motor>,
+    /// Of the way along the axis (m).
+    pub limits: Option<[f64; 2]>,
+}
+
+impl Default for Prismatic {
+    fn default() -> Self {
+        Prismatic {
+            anchor_a: [0.0; 2],
+            anchor_b: [0.0; 2],
+            axis: [1.0, 0.0],
+            reference_angle: 0.0,
+            spring: None,
+            motor: None,
+            limits: None,
+        }
+    }
+}
+
+impl Prismatic {
+    fn axial(&self) -> Axial {
+        Axial { spring: self.spring, motor: self.motor, limits: self.limits }
+    }
+}
+
+/// Numbers: `[r_a, r_b, way, axis, angle]`, then what works along the axis.
+const FRAME: usize = 9;
+
+/// The rows along `axis` and along t = (−axis_y, axis_x), the way in both directions, and the direction t.
+///
+/// The axis turns with a, so that a's arm goes on to the anchor of b: (r_a + way) × d.
+#[inline(always)]
+pub(super) fn along_and_across<L: Lanes>(
+    numbers: &[L],
+    on: &JointPass<L>,
+) -> ([Jacobian<L>; 2], [L; 2]) {
+    let ([ra, rb], way) = on.anchors(numbers);
+    let axis = on.turned(0, [numbers[6], numbers[7]]);
+    let across = [-axis[1], axis[0]];
+    let arms = [add(ra, way), rb];
+    ([Jacobian::along(axis, arms), Jacobian::along(across, arms)], [dot(axis, way), dot(across, way)])
+}
+
+impl JointType for Prismatic {
+    type Form = Form;
+
+    fn numbers(form: Form) -> usize {
+        FRAME + Axial::numbers(form)
+    }
+
+    fn kept(form: Form) -> usize {
+        2 + Axial::kept(form)
+    }
+
+    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        numbers[6..8].copy_from_slice(&at.direction(unit(self.axis)).to_array());
+        numbers[8] = at.angle(self.reference_angle);
+        self.axial().place(at.h, &mut numbers[FRAME..]);
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let ([along, across], [way, off]) = along_and_across(numbers, on);
+        let (rigid, kept) = kept.split_at_mut(2);
+        Axial::rows(form, along, way, &numbers[FRAME..], kept, on);
+        on.block([across, Jacobian::angle()], [off, numbers[8] + on.turn()], RowLaw::Rigid, rigid);
+    }
+}
+
+impl Definition for Prismatic {
+    fn form(&self) -> Form {
+        self.axial().form()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        check_axis(self.axis)?;
+        finite("reference_angle", self.reference_angle)?;
+        self.axial().check()
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn refer(&mut self, angle: f64, _length: f64) {
+        self.reference_angle = angle;
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
+        let translation = axis.dot(at.way);
+        JointState {
+            gap: axis.perp_dot(at.way).abs(),
+            lean: at.angle.abs(),
+            angle: at.angle,
+            translation,
+            excess: excess(self.limits, translation),
+            ..JointState::default()
+        }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        [f64::from(kept[0]).hypot(Axial::impulse(self.form(), &kept[2..])), f64::from(kept[1].abs())]
+    }
+}

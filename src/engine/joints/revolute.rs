@@ -1,0 +1,97 @@
+//! A hinge: two points stay together.
+
+use super::axial::{Axial, Motor, Spring};
+use super::{Definition, Form, JointState, Measured, check_anchors, excess};
+use crate::engine::bodies::def::finite;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+
+/// A hinge with spring, motor and limits of the angle.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Revolute {
+    /// In the frame of a (m).
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Angle of b against a that counts as zero (rad).
+    pub reference_angle: f64,
+    /// Of the angle.
+    pub spring: Option<Spring>,
+    /// Of the angle.
+    pub motor: Option<Motor>,
+    /// Of the angle (rad).
+    pub limits: Option<[f64; 2]>,
+}
+
+impl Revolute {
+    fn axial(&self) -> Axial {
+        Axial { spring: self.spring, motor: self.motor, limits: self.limits }
+    }
+}
+
+/// Numbers: `[r_a, r_b, way]`, then the angle and what works along it.
+const POINT: usize = 6;
+
+impl JointType for Revolute {
+    type Form = Form;
+
+    fn numbers(form: Form) -> usize {
+        let axial = Axial::numbers(form);
+        POINT + axial + usize::from(axial > 0)
+    }
+
+    fn kept(form: Form) -> usize {
+        2 + Axial::kept(form)
+    }
+
+    fn place(&self, form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..POINT].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        if Axial::numbers(form) > 0 {
+            numbers[POINT] = at.angle(self.reference_angle);
+            self.axial().place(at.h, &mut numbers[POINT + 1..]);
+        }
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let (point, kept) = kept.split_at_mut(2);
+        if Axial::numbers(form) > 0 {
+            let angle = numbers[POINT] + on.turn();
+            Axial::rows(form, Jacobian::angle(), angle, &numbers[POINT + 1..], kept, on);
+        }
+        let (arms, way) = on.anchors(numbers);
+        on.block(Jacobian::point(arms), way, RowLaw::Rigid, point);
+    }
+}
+
+impl Definition for Revolute {
+    fn form(&self) -> Form {
+        self.axial().form()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        finite("reference_angle", self.reference_angle)?;
+        self.axial().check()
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn refer(&mut self, angle: f64, _length: f64) {
+        self.reference_angle = angle;
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        let angle = at.angle;
+        JointState { gap: at.way.length(), angle, excess: excess(self.limits, angle), ..JointState::default() }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        [f64::from(kept[0].hypot(kept[1])), Axial::impulse(self.form(), &kept[2..]).abs()]
+    }
+}

@@ -1,0 +1,105 @@
+//! A weld: b does not move against a, or only as springs let it.
+
+use super::axial::Spring;
+use super::{Definition, Form, JointState, Measured, check_anchors};
+use crate::engine::bodies::def::finite;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+
+/// A weld, rigid or soft, in places and in the angle apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Weld {
+    /// In the frame of a (m).
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Angle of b against a (rad).
+    pub reference_angle: f64,
+    /// Between the anchors; rigid without.
+    pub linear: Option<Spring>,
+    /// Of the angle; rigid without.
+    pub angular: Option<Spring>,
+}
+
+/// Numbers: `[r_a, r_b, way, angle]`, then `[S, D]` of each spring.
+const FRAME: usize = 7;
+
+impl JointType for Weld {
+    type Form = Form;
+
+    fn numbers(form: Form) -> usize {
+        FRAME + 2 * usize::from(form.spring) + 2 * usize::from(form.motor)
+    }
+
+    fn kept(form: Form) -> usize {
+        3 + 2 * usize::from(form.spring) + usize::from(form.motor)
+    }
+
+    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        numbers[6] = at.angle(self.reference_angle);
+        let springs = [self.linear, self.angular].into_iter().flatten().map(|spring| spring.coefficients(at.h));
+        for (number, value) in numbers[FRAME..].iter_mut().zip(springs.flatten()) {
+            *number = value;
+        }
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let spring = |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
+        let (linear, angular) = (form.spring, form.motor);
+        if !linear && !angular {
+            let (arms, way) = on.anchors(numbers);
+            let [x, y] = Jacobian::point(arms);
+            let error = [way[0], way[1], numbers[6] + on.turn()];
+            return on.block([x, y, Jacobian::angle()], error, RowLaw::Rigid, kept);
+        }
+        let (of_points, of_angle) = kept.split_at_mut(if linear { 4 } else { 2 });
+        let law = if angular { spring(if linear { FRAME + 2 } else { FRAME }) } else { RowLaw::Rigid };
+        on.row(Jacobian::angle(), numbers[6] + on.turn(), law, of_angle);
+        let (arms, way) = on.anchors(numbers);
+        let law = if linear { spring(FRAME) } else { RowLaw::Rigid };
+        on.block(Jacobian::point(arms), way, law, of_points);
+    }
+}
+
+impl Definition for Weld {
+    fn form(&self) -> Form {
+        Form { spring: self.linear.is_some(), motor: self.angular.is_some(), limits: false }
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        finite("reference_angle", self.reference_angle)?;
+        for (name, spring) in [("linear", self.linear), ("angular", self.angular)] {
+            spring.map_or(Ok(()), |spring| spring.check().map_err(|e| e.within(name)))?;
+        }
+        Ok(())
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn refer(&mut self, angle: f64, _length: f64) {
+        self.reference_angle = angle;
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        JointState {
+            gap: if self.linear.is_some() { 0.0 } else { at.way.length() },
+            lean: if self.angular.is_some() { 0.0 } else { at.angle.abs() },
+            angle: at.angle,
+            translation: at.way.length(),
+            ..JointState::default()
+        }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        let angle = if self.linear.is_some() { 4 } else { 2 };
+        [f64::from(kept[0].hypot(kept[1])), f64::from(kept[angle].abs())]
+    }
+}

@@ -1,0 +1,122 @@
+//! A wheel: b turns and moves along an axis of a.
+
+use super::axial::{Axial, Motor, Spring};
+use super::prismatic::along_and_across;
+use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Placing};
+use crate::engine::error::Error;
+use crate::engine::lanes::Lanes;
+use glam::DVec2;
+
+/// A wheel with a suspension along its axis and a motor.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Wheel {
+    /// In the frame of a (m).
+    pub anchor_a: [f64; 2],
+    /// In the frame of b (m).
+    pub anchor_b: [f64; 2],
+    /// Direction of the suspension in the frame of a; any length.
+    pub axis: [f64; 2],
+    /// The suspension.
+    pub spring: Option<Spring>,
+    /// Of the angle.
+    pub motor: Option<Motor>,
+    /// Of the way along the axis (m).
+    pub limits: Option<[f64; 2]>,
+}
+
+impl Default for Wheel {
+    fn default() -> Self {
+        let (zero, axis) = ([0.0; 2], [0.0, 1.0]);
+        Wheel { anchor_a: zero, anchor_b: zero, axis, spring: None, motor: None, limits: None }
+    }
+}
+
+impl Wheel {
+    fn suspension(&self) -> Axial {
+        Axial { spring: self.spring, motor: None, limits: self.limits }
+    }
+
+    fn drive(&self) -> Axial {
+        Axial { spring: None, motor: self.motor, limits: None }
+    }
+}
+
+/// The parts of a form along the axis, and of the angle.
+const fn split(form: Form) -> [Form; 2] {
+    let Form { spring, motor, limits } = form;
+    [Form { spring, motor: false, limits }, Form { spring: false, motor, limits: false }]
+}
+
+/// Numbers: `[r_a, r_b, way, axis]`, then the suspension, then the motor.
+const FRAME: usize = 8;
+
+impl JointType for Wheel {
+    type Form = Form;
+
+    fn numbers(form: Form) -> usize {
+        FRAME + Axial::numbers(form)
+    }
+
+    fn kept(form: Form) -> usize {
+        1 + Axial::kept(form)
+    }
+
+    fn place(&self, form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
+        numbers[6..8].copy_from_slice(&at.direction(unit(self.axis)).to_array());
+        let (suspension, drive) = numbers[FRAME..].split_at_mut(Axial::numbers(split(form)[0]));
+        self.suspension().place(at.h, suspension);
+        self.drive().place(at.h, drive);
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+        let [suspension, drive] = split(form);
+        let ([along, across], [way, off]) = along_and_across(numbers, on);
+        let (rigid, kept) = kept.split_at_mut(1);
+        let (of_suspension, of_drive) = kept.split_at_mut(Axial::kept(suspension));
+        let (first, second) = numbers[FRAME..].split_at(Axial::numbers(suspension));
+        Axial::rows(suspension, along, way, first, of_suspension, on);
+        Axial::rows(drive, Jacobian::angle(), L::zero(), second, of_drive, on);
+        on.row(across, off, RowLaw::Rigid, rigid);
+    }
+}
+
+impl Definition for Wheel {
+    fn form(&self) -> Form {
+        Form { motor: self.motor.is_some(), ..self.suspension().form() }
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check_anchors(self.anchor_a, self.anchor_b)?;
+        check_axis(self.axis)?;
+        self.suspension().check()?;
+        self.drive().check()
+    }
+
+    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
+        Some([&mut self.anchor_a, &mut self.anchor_b])
+    }
+
+    fn measure(&self, at: &Measured) -> JointState {
+        let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
+        let translation = axis.dot(at.way);
+        JointState {
+            gap: axis.perp_dot(at.way).abs(),
+            angle: at.angle,
+            translation,
+            excess: excess(self.limits, translation),
+            ..JointState::default()
+        }
+    }
+
+    fn load(&self, kept: &[f32]) -> [f64; 2] {
+        let [suspension, drive] = split(self.form());
+        let (first, second) = kept[1..].split_at(Axial::kept(suspension));
+        let along = Axial::impulse(suspension, first);
+        [f64::from(kept[0]).hypot(along), Axial::impulse(drive, second).abs()]
+    }
+}

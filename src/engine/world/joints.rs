@@ -1,0 +1,225 @@
+//! Adding, changing, removing and reading joints.
+
+use super::World;
+use crate::engine::bodies::BodyHandle;
+use crate::engine::constraints::joints::Joints;
+use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
+use crate::engine::error::Error;
+use crate::engine::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
+use std::any::Any;
+use std::collections::BTreeSet;
+
+/// Which joints there are, and where they are solved.
+#[derive(Clone, Debug, Default)]
+pub(super) struct JointSlots {
+    /// `[joints]`
+    joints: Vec<Option<Joint>>,
+    generation: Vec<u32>,
+    /// Place among the types of the workspace, and among the joints of that type; `[joints]`.
+    places: Vec<Option<[u32; 2]>>,
+    /// Types of the workspace that are groups of joints; they come last.
+    groups: usize,
+    /// Joints came, changed or went since they were grouped.
+    stale: bool,
+    /// Pairs of bodies that do not collide, the smaller index first.
+    apart: BTreeSet<[u32; 2]>,
+}
+
+impl JointSlots {
+    /// Whether two bodies do not collide.
+    pub fn keeps_apart(&self, [a, b]: [u32; 2]) -> bool {
+        !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
+    }
+
+    fn add(&mut self, joint: Joint) -> JointHandle {
+        let free = self.joints.iter().position(Option::is_none).filter(|_| self.joints.len() > 64);
+        let index = free.unwrap_or(self.joints.len());
+        if index == self.joints.len() {
+            (self.joints.push(None), self.generation.push(0), self.places.push(None));
+        }
+        self.joints[index] = Some(joint);
+        JointHandle { index: index as u32, generation: self.generation[index] }
+    }
+}
+
+impl World {
+    /// Adds a joint; the handle stays valid until it is removed.
+    ///
+    /// Errors: a value out of its range, a handle of a body that was removed, a joint of a body to itself or between two that
+    /// cannot move, a solver that cannot hold joints.
+    pub fn add_joint(&mut self, joint: &Joint) -> Result<JointHandle, Error> {
+        self.check_joint(joint)?;
+        let joint = joint.placed(&self.bodies);
+        joint.kind.check()?;
+        for body in [joint.a.index(), joint.b.index()] {
+            // Arms turn with round bodies, too.
+            self.bodies.round[body] = false;
+        }
+        self.traits.spins();
+        self.features = self.traits.features();
+        self.joints_changed();
+        Ok(self.joints.add(joint))
+    }
+
+    /// Changes a joint: its bodies, its frames, its values. Impulses stay where the rows do.
+    ///
+    /// Errors: as [`Self::add_joint`]; a handle of a joint that was removed.
+    pub fn set_joint(&mut self, handle: JointHandle, joint: &Joint) -> Result<(), Error> {
+        self.joint(handle)?;
+        self.check_joint(joint)?;
+        let joint = joint.placed(&self.bodies);
+        joint.kind.check()?;
+        self.joints.joints[handle.index()] = Some(joint);
+        self.joints_changed();
+        Ok(())
+    }
+
+    /// Removes a joint. Errors: it was removed before.
+    pub fn remove_joint(&mut self, handle: JointHandle) -> Result<(), Error> {
+        self.joint(handle)?;
+        self.joints.joints[handle.index()] = None;
+        self.joints.generation[handle.index()] += 1;
+        self.joints_changed();
+        Ok(())
+    }
+
+    /// A joint, with its frames. Errors: it was removed.
+    pub fn joint(&self, handle: JointHandle) -> Result<&Joint, Error> {
+        let index = handle.index();
+        let is_same = self.joints.generation.get(index) == Some(&handle.generation);
+        let joint = self.joints.joints.get(index).and_then(Option::as_ref).filter(|_| is_same);
+        joint.ok_or_else(|| Error::invalid(format!("joint {index}"), "was removed"))
+    }
+
+    /// All joints.
+    pub fn joints(&self) -> impl Iterator<Item = (JointHandle, &Joint)> {
+        self.joints.joints.iter().zip(&self.joints.generation).enumerate().filter_map(|(i, (joint, &generation))| {
+            joint.as_ref().map(|joint| (JointHandle { index: i as u32, generation }, joint))
+        })
+    }
+
+    /// Errors and load of a joint after the last step. Errors: it was removed.
+    pub fn joint_state(&self, handle: JointHandle) -> Result<JointState, Error> {
+        let joint = self.joint(handle)?;
+        let ends = [joint.a.index(), joint.b.index()];
+        let (kept, last) = match self.joints.places[handle.index()] {
+            Some([group, place]) => {
+                let kind = &self.work.types[group as usize].kind;
+                (kind.impulses(place as usize), f64::from(kind.angle(place as usize)))
+            }
+            None => (&[][..], 0.0),
+        };
+        let angle = f64::from(self.bodies.angle(ends[1])) - f64::from(self.bodies.angle(ends[0]));
+        let angle = angle - reference(&joint.kind);
+        let turns = ((last - angle) / std::f64::consts::TAU).round();
+        let angle = angle + turns * std::f64::consts::TAU;
+        let mut state = joint.kind.measure(&measured(&self.bodies, ends, joint.kind.anchors(), angle));
+        if !kept.is_empty() {
+            state.load = joint.kind.load(kept).map(|impulse| impulse / f64::from(self.settings.h()));
+        }
+        state.breaks = joint.break_load.is_some_and(|most| (0..2).any(|k| state.load[k] > most[k]));
+        Ok(state)
+    }
+
+    fn check_joint(&self, joint: &Joint) -> Result<(), Error> {
+        joint.kind.check()?;
+        let ends = [self.index_of(joint.a)?, self.index_of(joint.b)?];
+        if ends[0] == ends[1] {
+            return Err(Error::invalid("b", format!("body {} has no joint to itself", ends[1])));
+        }
+        if !ends.iter().any(|&i| self.bodies.is_dynamic(i)) && joint.kind != JointKind::Filter {
+            let message = format!("neither body {} nor body {} moves by forces", ends[0], ends[1]);
+            return Err(Error::invalid("b", message));
+        }
+        if let (Some(reason), false) = (self.settings.solver.holds_no_joints, joint.kind == JointKind::Filter) {
+            let message = format!("{} holds no joints: {reason}", self.settings.solver.name);
+            return Err(Error::invalid("solver", message));
+        }
+        Ok(())
+    }
+
+    /// Constraints of types of the caller's own.
+    pub(super) fn own_types(&self) -> &[Joined] {
+        &self.work.types[..self.work.types.len() - self.joints.groups]
+    }
+
+    /// Adds constraints of a type of the caller's own; groups of joints come after them.
+    pub(super) fn add_type(&mut self, kind: Box<dyn ConstraintType>) {
+        let place = self.own_types().len();
+        self.work.types.insert(place, Joined::new(kind));
+        for [group, _] in self.joints.places.iter_mut().flatten() {
+            *group += 1;
+        }
+    }
+
+    /// Removes all joints of a body.
+    pub(super) fn remove_joints_of(&mut self, body: BodyHandle) {
+        for index in 0..self.joints.joints.len() {
+            if self.joints.joints[index].as_ref().is_some_and(|joint| joint.a == body || joint.b == body) {
+                self.joints.joints[index] = None;
+                self.joints.generation[index] += 1;
+                self.joints_changed();
+            }
+        }
+        self.group_joints();
+    }
+
+    fn joints_changed(&mut self) {
+        (self.joints.stale, self.lanes_are_for, self.pairs_are_stale) = (true, None, true);
+    }
+
+    /// Sorts joints into groups of one type and form, which are solved in lanes.
+    pub(super) fn group_joints(&mut self) {
+        if !std::mem::take(&mut self.joints.stale) {
+            return;
+        }
+        let first = self.work.types.len() - self.joints.groups;
+        let old: Vec<Joined> = self.work.types.drain(first..).collect();
+        self.joints.apart.clear();
+        let mut keys: Vec<(&'static str, Form, bool)> = Vec::new();
+        for index in 0..self.joints.joints.len() {
+            let place = self.joints.places[index].take();
+            let Some(joint) = &self.joints.joints[index] else { continue };
+            let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
+            if !joint.collide_connected {
+                self.joints.apart.insert([a.min(b), a.max(b)]);
+            }
+            let key = (joint.kind.name(), joint.kind.form(), !self.bodies.is_dynamic(b as usize));
+            let was = place.map(|[group, i]| (&old[group as usize - first].kind, i as usize));
+            let (kept, angle) = was.map_or((&[][..], 0.0), |(kind, i)| (kind.impulses(i), kind.angle(i)));
+            of_kind!(&joint.kind, definition => {
+                let group = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
+                    keys.push(key);
+                    self.work.types.push(Joined::new(empty(definition, key.2)));
+                    keys.len() - 1
+                });
+                let kind: &mut dyn Any = self.work.types[first + group].kind.as_mut();
+                let at = push(kind, definition, [a, b], kept, angle);
+                self.joints.places[index] = Some([(first + group) as u32, at]);
+            }, else {});
+        }
+        self.joints.groups = keys.len();
+    }
+}
+
+fn empty<T: Definition>(of: &T, swapped: bool) -> Box<dyn ConstraintType> {
+    Box::new(Joints::<T>::new(of.form(), swapped))
+}
+
+/// Adds a joint to its group; returns its place there.
+fn push<T: Definition>(group: &mut dyn Any, joint: &T, ends: [u32; 2], kept: &[f32], angle: f32) -> u32 {
+    let Some(group) = group.downcast_mut::<Joints<T>>() else { unreachable!("a group has one type") };
+    group.push(joint.clone(), ends, kept, angle);
+    group.joints.len() as u32 - 1
+}
+
+/// Angle of b against a that counts as zero (rad).
+fn reference(kind: &JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute(joint) => joint.reference_angle,
+        JointKind::Prismatic(joint) => joint.reference_angle,
+        JointKind::Weld(joint) => joint.reference_angle,
+        JointKind::Motor(joint) => joint.angle,
+        JointKind::Distance(_) | JointKind::Wheel(_) | JointKind::Mouse(_) | JointKind::Filter => 0.0,
+    }
+}
