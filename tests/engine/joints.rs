@@ -50,7 +50,8 @@ fn bridge(world: &mut World, ground: BodyHandle) -> Vec<JointHandle> {
 #[test]
 #[ignore = "prints"]
 fn print_chain() {
-    let names = std::env::var("S").unwrap_or("shim,soft_step,pgs,tgs_soft,xpbd,pgs_ngs,tgs_ngs,nncg,jacobi".into());
+    let names =
+        std::env::var("S").unwrap_or("shim,soft_step,pgs,tgs_soft,xpbd,pgs_ngs,tgs_ngs,nncg,jacobi".into());
     for name in names.split(',') {
         for what in ["chain", "bridge"] {
             let (mut world, ground) = empty(find(name).unwrap());
@@ -74,7 +75,11 @@ fn print_chain() {
                 }
             }
             let time = start.elapsed().as_secs_f64() / 1.2e-3;
-            println!("{name} {what}: rms {:.4} mm, worst {:.3} mm, {time:.0} us", 1e3 * (sum / n as f64).sqrt(), 1e3 * worst);
+            println!(
+                "{name} {what}: rms {:.4} mm, worst {:.3} mm, {time:.0} us",
+                1e3 * (sum / n as f64).sqrt(),
+                1e3 * worst
+            );
         }
     }
 }
@@ -82,7 +87,8 @@ fn print_chain() {
 #[test]
 #[ignore = "prints"]
 fn print_pendulum() {
-    let names = std::env::var("S").unwrap_or("shim,soft_step,pgs,tgs_soft,xpbd,pgs_ngs,tgs_ngs,nncg,jacobi".into());
+    let names =
+        std::env::var("S").unwrap_or("shim,soft_step,pgs,tgs_soft,xpbd,pgs_ngs,tgs_ngs,nncg,jacobi".into());
     for name in names.split(',') {
         let (mut world, ground) = empty(find(name).unwrap());
         // A point mass at 120° from the lowest place.
@@ -96,7 +102,9 @@ fn print_pendulum() {
             let m = f64::from(b.inv_mass[i]).recip();
             let inertia = f64::from(b.inv_inertia[i]).recip();
             let v = b.velocity(i).as_dvec2().length_squared();
-            0.5 * m * v + 0.5 * inertia * f64::from(b.angular_velocity[i]).powi(2) + m * g * (b.center(i)[1] + 1.0)
+            0.5 * m * v
+                + 0.5 * inertia * f64::from(b.angular_velocity[i]).powi(2)
+                + m * g * (b.center(i)[1] + 1.0)
         };
         let begin = energy(&world);
         let mut worst: f64 = 0.0;

@@ -574,7 +574,7 @@ proptest! {
         steps in 1..=simpulse::lab::scenes::MAX_STEPS,
         bodies in prop::collection::vec(body(), 1..8),
     ) {
-        let scene = Scene { name, gravity, dt, steps, expect: None, bodies };
+        let scene = Scene { name, gravity, dt, steps, expect: None, bodies, joints: vec![] };
         let text = scene.to_json();
         let back = read(&text).map_err(|e| TestCaseError::fail(e.to_string()))?;
         prop_assert_eq!(format!("{:?}", back), format!("{:?}", scene));

@@ -9,7 +9,11 @@ use crate::engine::lanes::Lanes;
 
 /// Two points at a distance: rigid if there is neither spring nor motor nor limits.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Distance {
     /// In the frame of a (m).
     pub anchor_a: [f64; 2],

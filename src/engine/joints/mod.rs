@@ -367,7 +367,10 @@ fn check_limits(limits: Option<[f64; 2]>) -> Result<(), Error> {
     let Some([lower, upper]) = limits else { return Ok(()) };
     finite_pair("limits", [lower, upper])?;
     if lower > upper {
-        return Err(Error::invalid("limits", format!("lower must not be above upper, is [{lower}, {upper}]")));
+        return Err(Error::invalid(
+            "limits",
+            format!("lower must not be above upper, is [{lower}, {upper}]"),
+        ));
     }
     Ok(())
 }

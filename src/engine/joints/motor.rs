@@ -10,7 +10,11 @@ use crate::engine::lanes::Lanes;
 
 /// A drive of b to a pose against a.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct MotorJoint {
     /// In the frame of a (m): where b's anchor is to go.
     pub anchor_a: [f64; 2],

@@ -10,7 +10,11 @@ use crate::engine::lanes::Lanes;
 
 /// Pulls a point of b to a target, which may be changed between steps. Body a does not move.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Mouse {
     /// The target, in the frame of a (m).
     pub target: [f64; 2],

@@ -11,7 +11,11 @@ use glam::DVec2;
 
 /// A slider with spring, motor and limits along its axis.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Prismatic {
     /// In the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -56,10 +60,7 @@ const FRAME: usize = 9;
 ///
 /// The axis turns with a, so that a's arm goes on to the anchor of b: (r_a + way) × d.
 #[inline(always)]
-pub(super) fn along_and_across<L: Lanes>(
-    numbers: &[L],
-    on: &JointPass<L>,
-) -> ([Jacobian<L>; 2], [L; 2]) {
+pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPass<L>) -> ([Jacobian<L>; 2], [L; 2]) {
     let ([ra, rb], way) = on.anchors(numbers);
     let axis = on.turned(0, [numbers[6], numbers[7]]);
     let across = [-axis[1], axis[0]];

@@ -10,7 +10,11 @@ use crate::engine::lanes::Lanes;
 
 /// A hinge with spring, motor and limits of the angle.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Revolute {
     /// In the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -88,7 +92,12 @@ impl Definition for Revolute {
 
     fn measure(&self, at: &Measured) -> JointState {
         let angle = at.angle;
-        JointState { gap: at.way.length(), angle, excess: excess(self.limits, angle), ..JointState::default() }
+        JointState {
+            gap: at.way.length(),
+            angle,
+            excess: excess(self.limits, angle),
+            ..JointState::default()
+        }
     }
 
     fn load(&self, kept: &[f32]) -> [f64; 2] {

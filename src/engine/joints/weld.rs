@@ -10,7 +10,11 @@ use crate::engine::lanes::Lanes;
 
 /// A weld, rigid or soft, in places and in the angle apart.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Weld {
     /// In the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -41,7 +45,8 @@ impl JointType for Weld {
     fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
         numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
         numbers[6] = at.angle(self.reference_angle);
-        let springs = [self.linear, self.angular].into_iter().flatten().map(|spring| spring.coefficients(at.h));
+        let springs =
+            [self.linear, self.angular].into_iter().flatten().map(|spring| spring.coefficients(at.h));
         for (number, value) in numbers[FRAME..].iter_mut().zip(springs.flatten()) {
             *number = value;
         }
@@ -49,7 +54,8 @@ impl JointType for Weld {
 
     #[inline(always)]
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
-        let spring = |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
+        let spring =
+            |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
         let (linear, angular) = (form.spring, form.motor);
         if !linear && !angular {
             let (arms, way) = on.anchors(numbers);

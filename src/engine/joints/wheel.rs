@@ -11,7 +11,11 @@ use glam::DVec2;
 
 /// A wheel with a suspension along its axis and a motor.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Wheel {
     /// In the frame of a (m).
     pub anchor_a: [f64; 2],

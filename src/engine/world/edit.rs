@@ -142,7 +142,11 @@ impl World {
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
         let i = self.index_of(body)?;
         self.group_joints();
-        if self.own_types().iter().any(|joined| joined.kind.ends().iter().flatten().any(|&end| end as usize == i)) {
+        if self
+            .own_types()
+            .iter()
+            .any(|joined| joined.kind.ends().iter().flatten().any(|&end| end as usize == i))
+        {
             return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
         }
         self.remove_joints_of(body);

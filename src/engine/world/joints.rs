@@ -93,9 +93,11 @@ impl World {
 
     /// All joints.
     pub fn joints(&self) -> impl Iterator<Item = (JointHandle, &Joint)> {
-        self.joints.joints.iter().zip(&self.joints.generation).enumerate().filter_map(|(i, (joint, &generation))| {
-            joint.as_ref().map(|joint| (JointHandle { index: i as u32, generation }, joint))
-        })
+        self.joints.joints.iter().zip(&self.joints.generation).enumerate().filter_map(
+            |(i, (joint, &generation))| {
+                joint.as_ref().map(|joint| (JointHandle { index: i as u32, generation }, joint))
+            },
+        )
     }
 
     /// Errors and load of a joint after the last step. Errors: it was removed.
@@ -131,7 +133,8 @@ impl World {
             let message = format!("neither body {} nor body {} moves by forces", ends[0], ends[1]);
             return Err(Error::invalid("b", message));
         }
-        if let (Some(reason), false) = (self.settings.solver.holds_no_joints, joint.kind == JointKind::Filter) {
+        if let (Some(reason), false) = (self.settings.solver.holds_no_joints, joint.kind == JointKind::Filter)
+        {
             let message = format!("{} holds no joints: {reason}", self.settings.solver.name);
             return Err(Error::invalid("solver", message));
         }

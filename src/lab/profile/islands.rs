@@ -3,7 +3,7 @@
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
-use crate::lab::scenes::Scene;
+use crate::lab::scenes::{Scene, SceneJoint};
 
 /// Air between copies (m).
 const AIR: f64 = 1.0;
@@ -25,7 +25,14 @@ pub fn islands(scene: &Scene, count: usize) -> Result<Scene, Error> {
     let columns = ((count as f64 * height / width).sqrt().ceil() as usize).clamp(1, count.max(1));
     let rows = count.div_ceil(columns);
     let mut bodies = Vec::with_capacity(count * scene.bodies.len());
+    let mut joints = Vec::with_capacity(count * scene.joints.len());
     for copy in 0..count {
+        let first = bodies.len();
+        joints.extend(scene.joints.iter().cloned().map(|joint| SceneJoint {
+            a: first + joint.a,
+            b: first + joint.b,
+            ..joint
+        }));
         // About the origin, where positions have most digits.
         let x = ((copy % columns) as f64 - 0.5 * (columns - 1) as f64) * width;
         let y = ((copy / columns) as f64 - 0.5 * (rows - 1) as f64) * height;
@@ -34,7 +41,7 @@ pub fn islands(scene: &Scene, count: usize) -> Result<Scene, Error> {
             body
         }));
     }
-    Ok(Scene { name: format!("{count} × {}", scene.name), bodies, ..scene.clone() })
+    Ok(Scene { name: format!("{count} × {}", scene.name), bodies, joints, ..scene.clone() })
 }
 
 #[cfg(test)]

@@ -28,11 +28,13 @@ impl Scene {
     /// a number that is not finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; no steps, or more than [`MAX_STEPS`];
     /// no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
     /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
-    /// constructors refuse; a dynamic body without mass.
+    /// constructors refuse; a dynamic body without mass; a joint to a body that is not there, to itself or between two
+    /// bodies that do not move.
     pub fn validate(&self) -> Result<(), Error> {
         self.check_head()?;
         let check = |(i, body)| body_def(body).map(drop).map_err(|e| e.within(&format!("bodies[{i}]")));
-        self.bodies.iter().enumerate().try_for_each(check)
+        self.bodies.iter().enumerate().try_for_each(check)?;
+        self.check_joints()
     }
 
     fn check_head(&self) -> Result<(), Error> {
@@ -81,8 +83,10 @@ impl Scene {
         let bodies = self.body_defs()?;
         let gravity = self.gravity.map(|g| g as f32);
         let mut world = World::new(Settings { gravity, dt: self.dt as f32, ..settings });
-        for body in &bodies {
-            world.add_body(body)?;
+        self.check_joints()?;
+        let handles = bodies.iter().map(|body| world.add_body(body)).collect::<Result<Vec<_>, _>>()?;
+        for joint in self.joint_defs(&handles) {
+            world.add_joint(&joint)?;
         }
         Ok(world)
     }

@@ -5,6 +5,7 @@
 //! reading it back therefore gives the same bits.
 
 use super::expect::Expect;
+use super::joints::SceneJoint;
 use super::place::place_at;
 use crate::engine::bodies::BodyKind;
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
@@ -54,6 +55,9 @@ pub struct Scene {
     pub expect: Option<Expect>,
     /// Bodies, in the order of their indices in a world.
     pub bodies: Vec<SceneBody>,
+    /// Joints between them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<SceneJoint>,
 }
 
 /// One body of a scene.
@@ -302,10 +306,16 @@ impl Scene {
         // Infallible: every map key is a string and nothing here can fail to serialize.
         let line = |value: serde_json::Result<String>| value.unwrap_or_default();
         let bodies: Vec<String> = self.bodies.iter().map(|b| line(serde_json::to_string(b))).collect();
+        let joints: Vec<String> = self.joints.iter().map(|j| line(serde_json::to_string(j))).collect();
+        let joints = if joints.is_empty() {
+            String::new()
+        } else {
+            format!(", \"joints\": [\n{}\n]", joints.join(",\n"))
+        };
         let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));
         let expect = expect.map_or(String::new(), |text| format!("\"expect\": {text}, "));
         format!(
-            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {expect}\"bodies\": [\n{}\n]}}\n",
+            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {expect}\"bodies\": [\n{}\n]{joints}}}\n",
             line(serde_json::to_string(&self.name)),
             line(serde_json::to_string(&self.gravity)),
             line(serde_json::to_string(&self.dt)),

@@ -20,6 +20,7 @@ mod free;
 mod friction_ramp;
 pub mod holds;
 mod incline;
+mod joints;
 mod junkyard;
 mod mass_ratio;
 mod overlap;
@@ -43,6 +44,7 @@ pub use expected::loaded as expecting;
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
 };
+pub use joints::SceneJoint;
 pub use truth::{Observer, Truth};
 
 use crate::lab::error::Error;

@@ -15,6 +15,7 @@ impl Scene {
             steps: DEFAULT_STEPS,
             expect: None,
             bodies,
+            joints: Vec::new(),
         }
     }
 

@@ -51,7 +51,9 @@ impl Placing<'_> {
     /// `[r_a, r_b, way from a's anchor to b's]` (m), of anchors in the bodies' frames.
     pub fn anchors(&self, anchor_a: [f64; 2], anchor_b: [f64; 2]) -> [f32; 6] {
         let [a, b] = self.bodies.relative_poses(self.ends[0], self.ends[1]);
-        let arm = |k: usize, [x, y]: [f64; 2]| Vec2::new(x as f32, y as f32) - self.bodies.local_center[self.ends[k]];
+        let arm = |k: usize, [x, y]: [f64; 2]| {
+            Vec2::new(x as f32, y as f32) - self.bodies.local_center[self.ends[k]]
+        };
         let (ra, rb) = (a.rotation.rotate(arm(0, anchor_a)), b.rotation.rotate(arm(1, anchor_b)));
         let way = b.position + (rb - ra);
         [ra.x, ra.y, rb.x, rb.y, way.x, way.y]

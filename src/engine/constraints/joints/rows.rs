@@ -41,9 +41,7 @@
 //!
 //! The error x is that at the beginning of the substep, also in relaxing sweeps, which come after bodies have moved.
 
-use crate::engine::constraints::kernels::frame::{
-    DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn,
-};
+use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::lanes::Lanes;
 use std::f32::consts::TAU;
@@ -283,7 +281,8 @@ impl<L: Lanes> JointPass<L> {
         let mut k = [[L::zero(); N]; N];
         for r in 0..N {
             for c in 0..=r {
-                let by_turning = (ia * j[r].arms[0]).mul_add(j[c].arms[0], (ib * j[r].arms[1]) * j[c].arms[1]);
+                let by_turning =
+                    (ia * j[r].arms[0]).mul_add(j[c].arms[0], (ib * j[r].arms[1]) * j[c].arms[1]);
                 k[r][c] = mass.mul_add(dot(j[r].axis, j[c].axis), by_turning);
             }
         }
@@ -292,7 +291,13 @@ impl<L: Lanes> JointPass<L> {
 
     /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s).
     #[inline(always)]
-    pub fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+    pub fn block<const N: usize>(
+        &mut self,
+        j: [Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        kept: &mut [L],
+    ) {
         const VELOCITY: [usize; 3] = [VX, VY, W];
         let (impulse, held) = kept.split_at_mut(N);
         match self.task {
@@ -420,7 +425,9 @@ mod tests {
     /// A mass on a spring, alone, over 20 periods or time constants.
     #[test]
     fn springs_decay_as_their_law_says_at_any_step_and_hold_their_load() {
-        for (zeta, y) in [(0.0, 0.3f64), (0.01, 0.02), (0.1, 0.2), (0.5, 0.4), (1.0, 0.1), (3.0, 0.1), (20.0, 0.4)] {
+        for (zeta, y) in
+            [(0.0, 0.3f64), (0.01, 0.02), (0.1, 0.2), (0.5, 0.4), (1.0, 0.1), (3.0, 0.1), (20.0, 0.4)]
+        {
             let h = 1.0 / 840.0;
             let omega = y / h;
             let [s, d] = spring_coefficients((omega / std::f64::consts::TAU) as f32, zeta as f32, h as f32);
@@ -432,7 +439,11 @@ mod tests {
             let size = if root > 0.0 { trace / 2.0 + root.sqrt() } else { a.sqrt() };
             let slow = if zeta < 1.0 { zeta } else { zeta - (zeta * zeta - 1.0).sqrt() };
             let expected = slow * y;
-            assert!((-size.ln() - expected).abs() < 0.01 * expected + 1e-6, "{zeta} {y}: {} for {expected}", -size.ln());
+            assert!(
+                (-size.ln() - expected).abs() < 0.01 * expected + 1e-6,
+                "{zeta} {y}: {} for {expected}",
+                -size.ln()
+            );
             // At rest S x = h g.
             assert!((s - omega * omega * h).abs() < 1e-5 * s, "{zeta} {y}");
         }

@@ -54,7 +54,9 @@ impl<'a> TypeRows<'a> {
     pub(crate) fn new(rows: &'a mut [BodyRow], sums: &'a mut [BodyRow], mode: PassMode) -> Self {
         TypeRows(match mode {
             PassMode::Jacobi { .. } => Access::Summed(SummedRows { before: rows, sums }),
-            PassMode::InTurn | PassMode::Masses | PassMode::Forget | PassMode::Position { .. } => Access::InPlace(rows),
+            PassMode::InTurn | PassMode::Masses | PassMode::Forget | PassMode::Position { .. } => {
+                Access::InPlace(rows)
+            }
         })
     }
 

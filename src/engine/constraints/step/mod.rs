@@ -18,8 +18,8 @@ use crate::engine::clock::{Clock, Phase};
 use crate::engine::constraints::impacts::ImpactLaw;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
 use crate::engine::constraints::kernels::prepare::{Prepare, Store};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::Layout;
 use crate::engine::constraints::records::kept::Kept;
@@ -255,7 +255,15 @@ impl<'a> Passes<'a> {
             let Workspace { rows, types, .. } = &mut *self.work;
             for Joined { kind, lanes, serial } in types {
                 let (rows, batches) = (TypeRows::new(rows, &mut [], mode), part.of(lanes, serial));
-                kind.run(TypeInput { phase, mode, law: Softness::RIGID, h: self.input.h, width, rows, batches });
+                kind.run(TypeInput {
+                    phase,
+                    mode,
+                    law: Softness::RIGID,
+                    h: self.input.h,
+                    width,
+                    rows,
+                    batches,
+                });
             }
         }
     }

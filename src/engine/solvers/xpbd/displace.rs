@@ -107,7 +107,11 @@ impl Pass for Displace<'_> {
     }
 
     fn mode(&self) -> PassMode {
-        PassMode::Position { fraction: 1.0, max_correction: self.push_speed * self.h, impulses: Some(self.first) }
+        PassMode::Position {
+            fraction: 1.0,
+            max_correction: self.push_speed * self.h,
+            impulses: Some(self.first),
+        }
     }
 
     #[inline(never)]

@@ -54,8 +54,8 @@ use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
 };
 use crate::engine::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Segment};
 use crate::engine::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
