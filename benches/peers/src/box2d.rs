@@ -5,7 +5,8 @@
 use crate::engine::{Contender, Engine, Stage, State};
 use boxdd_sys::ffi::*;
 use simpulse::engine::bodies::BodyKind;
-use simpulse::lab::scenes::{Geometry, Scene, SceneShape};
+use simpulse::engine::joints::JointKind;
+use simpulse::lab::scenes::{Geometry, Scene, SceneJoint, SceneShape};
 
 /// Most contacts of one body that are counted.
 const MOST_CONTACTS: usize = 100_000;
@@ -67,6 +68,9 @@ impl Box2d {
                 }
                 engine.bodies.push(id);
             }
+            for joint in &scene.joints {
+                add_joint(&engine, joint)?;
+            }
             Ok(engine)
         }
     }
@@ -120,6 +124,46 @@ unsafe fn add_shape(body: b2BodyId, shape: &SceneShape, group: i32) -> Result<()
                 let segment = b2Segment { point1: vector(s.a), point2: vector(s.b) };
                 b2CreateSegmentShape(body, &def, &segment);
             }
+        }
+    }
+    Ok(())
+}
+
+/// # Safety
+/// The engine's world and bodies must be alive.
+unsafe fn add_joint(engine: &Box2d, joint: &SceneJoint) -> Result<(), String> {
+    let base = |base: &mut b2JointDef, anchor_a: [f64; 2], anchor_b: [f64; 2]| {
+        (base.bodyIdA, base.bodyIdB) = (engine.bodies[joint.a], engine.bodies[joint.b]);
+        (base.localFrameA.p, base.localFrameB.p) = (vector(anchor_a), vector(anchor_b));
+        base.collideConnected = joint.collide_connected;
+    };
+    // SAFETY: as in `Box2d::new`.
+    unsafe {
+        match &joint.kind {
+            JointKind::Revolute(of) if of.reference_angle == 0.0 => {
+                let mut def = b2DefaultRevoluteJointDef();
+                base(&mut def.base, of.anchor_a, of.anchor_b);
+                if let Some(spring) = of.spring {
+                    (def.enableSpring, def.targetAngle) = (true, spring.rest as f32);
+                    (def.hertz, def.dampingRatio) = (spring.hertz as f32, spring.damping_ratio as f32);
+                }
+                if let Some([lower, upper]) = of.limits {
+                    (def.enableLimit, def.lowerAngle, def.upperAngle) = (true, lower as f32, upper as f32);
+                }
+                if let Some(motor) = of.motor {
+                    def.enableMotor = true;
+                    (def.motorSpeed, def.maxMotorTorque) = (motor.speed as f32, motor.max as f32);
+                }
+                b2CreateRevoluteJoint(engine.world, &def);
+            }
+            JointKind::Weld(of)
+                if of.linear.is_none() && of.angular.is_none() && of.reference_angle == 0.0 =>
+            {
+                let mut def = b2DefaultWeldJointDef();
+                base(&mut def.base, of.anchor_a, of.anchor_b);
+                b2CreateWeldJoint(engine.world, &def);
+            }
+            other => return Err(format!("{} joints of this form are not in the race", other.name())),
         }
     }
     Ok(())

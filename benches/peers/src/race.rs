@@ -173,6 +173,7 @@ pub fn race(
 ) -> Result<Vec<Outcome>, String> {
     let load = || match seed {
         Some(seed) => scenes::load_with_seed(name, seed),
+        None if name.ends_with(".json") => Scene::from_file(name).and_then(scenes::expecting),
         None => scenes::load(name),
     };
     let load = || load().map_err(|e| e.to_string());

@@ -3,7 +3,8 @@
 use crate::engine::{Contender, Engine, Stage, State};
 use rapier2d::prelude::*;
 use simpulse::engine::bodies::BodyKind;
-use simpulse::lab::scenes::{Geometry, Scene, SceneShape};
+use simpulse::engine::joints::JointKind;
+use simpulse::lab::scenes::{Geometry, Scene, SceneJoint, SceneShape};
 
 /// A scene in rapier. Its default mixing is by averages; here friction mixes by the geometric
 /// mean and restitution by the maximum, as in the scene's terms.
@@ -49,7 +50,37 @@ impl Rapier {
             }
             bodies.push(handle);
         }
+        for joint in &scene.joints {
+            let [a, b] = [joint.a, joint.b].map(|body| bodies[body]);
+            world.impulse_joints.insert(a, b, data_of(joint)?, true);
+        }
         Ok(Rapier { world, bodies })
+    }
+}
+
+fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
+    match &joint.kind {
+        JointKind::Revolute(of) if of.reference_angle == 0.0 && of.spring.is_none() => {
+            let mut builder = RevoluteJointBuilder::new()
+                .local_anchor1(vector(of.anchor_a))
+                .local_anchor2(vector(of.anchor_b))
+                .contacts_enabled(joint.collide_connected);
+            if let Some([lower, upper]) = of.limits {
+                builder = builder.limits([lower as f32, upper as f32]);
+            }
+            if let Some(motor) = of.motor {
+                builder = builder.motor_velocity(motor.speed as f32, 1.0).motor_max_force(motor.max as f32);
+            }
+            Ok(builder.build().into())
+        }
+        JointKind::Weld(of) if of.linear.is_none() && of.angular.is_none() && of.reference_angle == 0.0 => {
+            let builder = FixedJointBuilder::new()
+                .local_anchor1(vector(of.anchor_a))
+                .local_anchor2(vector(of.anchor_b))
+                .contacts_enabled(joint.collide_connected);
+            Ok(builder.build().into())
+        }
+        other => Err(format!("{} joints of this form are not in the race", other.name())),
     }
 }
 

@@ -35,14 +35,18 @@ impl Distance {
     }
 }
 
-/// Numbers: `[r_a, r_b, way, length]`, then what works along the line.
-const FRAME: usize = 7;
+/// Numbers: `[length]`, then what works along the line.
+const FRAME: usize = 1;
 
 /// Points that are nearer than this have no line between them (m).
 const NO_LINE: f32 = 1e-9;
 
 impl JointType for Distance {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
 
     fn numbers(form: Form) -> usize {
         FRAME + Axial::numbers(form)
@@ -56,8 +60,7 @@ impl JointType for Distance {
     }
 
     fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
-        numbers[6] = self.length as f32;
+        numbers[0] = self.length as f32;
         // A spring is at rest at the length, limits are of the distance.
         let limits = self.limits.map(|limits| limits.map(|x| x - self.length));
         Axial { limits, ..self.axial() }.place(at.h, &mut numbers[FRAME..]);
@@ -65,11 +68,11 @@ impl JointType for Distance {
 
     #[inline(always)]
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
-        let (arms, way) = on.anchors(numbers);
+        let (arms, way) = on.anchors();
         let distance = dot(way, way).sqrt();
         let scale = (distance - L::splat(NO_LINE)).select_positive(L::splat(1.0) / distance, L::zero());
         let j = Jacobian::along(way.map(|x| x * scale), arms);
-        let error = distance - numbers[6];
+        let error = distance - numbers[0];
         if Axial::kept(form) == 0 {
             on.row(j, error, RowLaw::Rigid, kept);
         } else {
@@ -92,8 +95,8 @@ impl Definition for Distance {
         self.axial().check()
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn refer(&mut self, _angle: f64, length: f64) {

@@ -141,8 +141,8 @@ pub(crate) trait Definition: JointType<Form = Form> {
     fn form(&self) -> Form;
     /// Whether its values are within their ranges.
     fn check(&self) -> Result<(), Error>;
-    /// Anchors in the frames of a and b, if it has them.
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]>;
+    /// [`JointType::anchors`], to write.
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2];
     /// Takes angle (rad) and length (m) between bodies as they are for its reference.
     fn refer(&mut self, _angle: f64, _length: f64) {}
     /// Its errors.
@@ -194,8 +194,7 @@ impl JointKind {
 
     /// Anchors in the frames of a and b (m).
     pub fn anchors(&self) -> [[f64; 2]; 2] {
-        let mut kind = self.clone();
-        of_kind!(&mut kind, joint => joint.anchors().map_or([[0.0; 2]; 2], |anchors| anchors.map(|p| *p)), else [[0.0; 2]; 2])
+        of_kind!(self, joint => joint.anchors(), else [[0.0; 2]; 2])
     }
 
     pub(crate) fn measure(&self, at: &Measured) -> JointState {
@@ -321,9 +320,8 @@ impl Joint {
         let [from, to] = points.map(DVec2::from);
         let angle = f64::from(bodies.angle(ends[1])) - f64::from(bodies.angle(ends[0]));
         of_kind!(&mut joint.kind, kind => {
-            if let Some([a, b]) = kind.anchors() {
-                (*a, *b) = (local(0), local(1));
-            }
+            let [a, b] = kind.anchors_mut();
+            (*a, *b) = (local(0), local(1));
             kind.refer(angle, (to - from).length());
         }, else {});
         joint

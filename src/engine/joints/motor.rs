@@ -43,11 +43,15 @@ impl Default for MotorJoint {
     }
 }
 
-/// Numbers: `[r_a, r_b, way, angle, S, D, F h, M h]`.
-const NUMBERS: usize = 11;
+/// Numbers: `[angle, S, D, F h, M h]`.
+const NUMBERS: usize = 5;
 
 impl JointType for MotorJoint {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
 
     fn numbers(_form: Form) -> usize {
         NUMBERS
@@ -58,19 +62,18 @@ impl JointType for MotorJoint {
     }
 
     fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
-        numbers[6] = at.angle(self.angle);
-        numbers[7..9].copy_from_slice(&self.spring.coefficients(at.h));
-        (numbers[9], numbers[10]) = (self.max_force as f32 * at.h, self.max_torque as f32 * at.h);
+        numbers[0] = at.angle(self.angle);
+        numbers[1..3].copy_from_slice(&self.spring.coefficients(at.h));
+        (numbers[3], numbers[4]) = (self.max_force as f32 * at.h, self.max_torque as f32 * at.h);
     }
 
     #[inline(always)]
     fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
-        let law = |cap: L| RowLaw::Spring { stiffness: numbers[7], damping: numbers[8], cap: Some(cap) };
+        let law = |cap: L| RowLaw::Spring { stiffness: numbers[1], damping: numbers[2], cap: Some(cap) };
         let (of_points, of_angle) = kept.split_at_mut(4);
-        on.row(Jacobian::angle(), numbers[6] + on.turn(), law(numbers[10]), of_angle);
-        let (arms, way) = on.anchors(numbers);
-        on.block(Jacobian::point(arms), way, law(numbers[9]), of_points);
+        on.row(Jacobian::angle(), numbers[0] + on.turn(), law(numbers[4]), of_angle);
+        let (arms, way) = on.anchors();
+        on.block(Jacobian::point(arms), way, law(numbers[3]), of_points);
     }
 }
 
@@ -87,8 +90,8 @@ impl Definition for MotorJoint {
         check_not_negative("max_torque", self.max_torque)
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn refer(&mut self, angle: f64, _length: f64) {

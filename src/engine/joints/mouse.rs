@@ -33,11 +33,15 @@ impl Default for Mouse {
     }
 }
 
-/// Numbers: `[r_a, r_b, way, S, D, F h]`.
-const NUMBERS: usize = 9;
+/// Numbers: `[S, D, F h]`.
+const NUMBERS: usize = 3;
 
 impl JointType for Mouse {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.target, self.anchor_b]
+    }
 
     fn numbers(_form: Form) -> usize {
         NUMBERS
@@ -48,15 +52,14 @@ impl JointType for Mouse {
     }
 
     fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.target, self.anchor_b));
-        numbers[6..8].copy_from_slice(&self.spring.coefficients(at.h));
-        numbers[8] = self.max_force as f32 * at.h;
+        numbers[..2].copy_from_slice(&self.spring.coefficients(at.h));
+        numbers[2] = self.max_force as f32 * at.h;
     }
 
     #[inline(always)]
     fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
-        let law = RowLaw::Spring { stiffness: numbers[6], damping: numbers[7], cap: Some(numbers[8]) };
-        let (arms, way) = on.anchors(numbers);
+        let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) };
+        let (arms, way) = on.anchors();
         on.block(Jacobian::point(arms), way, law, kept);
     }
 }
@@ -73,8 +76,8 @@ impl Definition for Mouse {
         check_not_negative("max_force", self.max_force)
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.target, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.target, &mut self.anchor_b]
     }
 
     fn measure(&self, at: &Measured) -> JointState {

@@ -53,16 +53,16 @@ impl Prismatic {
     }
 }
 
-/// Numbers: `[r_a, r_b, way, axis, angle]`, then what works along the axis.
-const FRAME: usize = 9;
+/// Numbers: `[axis, angle]`, then what works along the axis.
+const FRAME: usize = 3;
 
 /// The rows along `axis` and along t = (−axis_y, axis_x), the way in both directions, and the direction t.
 ///
 /// The axis turns with a, so that a's arm goes on to the anchor of b: (r_a + way) × d.
 #[inline(always)]
 pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPass<L>) -> ([Jacobian<L>; 2], [L; 2]) {
-    let ([ra, rb], way) = on.anchors(numbers);
-    let axis = on.turned(0, [numbers[6], numbers[7]]);
+    let ([ra, rb], way) = on.anchors();
+    let axis = on.turned(0, [numbers[0], numbers[1]]);
     let across = [-axis[1], axis[0]];
     let arms = [add(ra, way), rb];
     ([Jacobian::along(axis, arms), Jacobian::along(across, arms)], [dot(axis, way), dot(across, way)])
@@ -70,6 +70,10 @@ pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPass<L>) -> ([
 
 impl JointType for Prismatic {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
 
     fn numbers(form: Form) -> usize {
         FRAME + Axial::numbers(form)
@@ -80,9 +84,8 @@ impl JointType for Prismatic {
     }
 
     fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
-        numbers[6..8].copy_from_slice(&at.direction(unit(self.axis)).to_array());
-        numbers[8] = at.angle(self.reference_angle);
+        numbers[..2].copy_from_slice(&at.direction(unit(self.axis)).to_array());
+        numbers[2] = at.angle(self.reference_angle);
         self.axial().place(at.h, &mut numbers[FRAME..]);
     }
 
@@ -91,7 +94,7 @@ impl JointType for Prismatic {
         let ([along, across], [way, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(2);
         Axial::rows(form, along, way, &numbers[FRAME..], kept, on);
-        on.block([across, Jacobian::angle()], [off, numbers[8] + on.turn()], RowLaw::Rigid, rigid);
+        on.block([across, Jacobian::angle()], [off, numbers[2] + on.turn()], RowLaw::Rigid, rigid);
     }
 }
 
@@ -107,8 +110,8 @@ impl Definition for Prismatic {
         self.axial().check()
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn refer(&mut self, angle: f64, _length: f64) {

@@ -36,15 +36,16 @@ impl Revolute {
     }
 }
 
-/// Numbers: `[r_a, r_b, way]`, then the angle and what works along it.
-const POINT: usize = 6;
-
 impl JointType for Revolute {
     type Form = Form;
 
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
+
     fn numbers(form: Form) -> usize {
         let axial = Axial::numbers(form);
-        POINT + axial + usize::from(axial > 0)
+        axial + usize::from(axial > 0)
     }
 
     fn kept(form: Form) -> usize {
@@ -52,10 +53,9 @@ impl JointType for Revolute {
     }
 
     fn place(&self, form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..POINT].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
         if Axial::numbers(form) > 0 {
-            numbers[POINT] = at.angle(self.reference_angle);
-            self.axial().place(at.h, &mut numbers[POINT + 1..]);
+            numbers[0] = at.angle(self.reference_angle);
+            self.axial().place(at.h, &mut numbers[1..]);
         }
     }
 
@@ -63,10 +63,10 @@ impl JointType for Revolute {
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
         let (point, kept) = kept.split_at_mut(2);
         if Axial::numbers(form) > 0 {
-            let angle = numbers[POINT] + on.turn();
-            Axial::rows(form, Jacobian::angle(), angle, &numbers[POINT + 1..], kept, on);
+            let angle = numbers[0] + on.turn();
+            Axial::rows(form, Jacobian::angle(), angle, &numbers[1..], kept, on);
         }
-        let (arms, way) = on.anchors(numbers);
+        let (arms, way) = on.anchors();
         on.block(Jacobian::point(arms), way, RowLaw::Rigid, point);
     }
 }
@@ -82,8 +82,8 @@ impl Definition for Revolute {
         self.axial().check()
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn refer(&mut self, angle: f64, _length: f64) {

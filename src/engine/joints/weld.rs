@@ -28,11 +28,15 @@ pub struct Weld {
     pub angular: Option<Spring>,
 }
 
-/// Numbers: `[r_a, r_b, way, angle]`, then `[S, D]` of each spring.
-const FRAME: usize = 7;
+/// Numbers: `[angle]`, then `[S, D]` of each spring.
+const FRAME: usize = 1;
 
 impl JointType for Weld {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
 
     fn numbers(form: Form) -> usize {
         FRAME + 2 * usize::from(form.spring) + 2 * usize::from(form.motor)
@@ -43,8 +47,7 @@ impl JointType for Weld {
     }
 
     fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
-        numbers[6] = at.angle(self.reference_angle);
+        numbers[0] = at.angle(self.reference_angle);
         let springs =
             [self.linear, self.angular].into_iter().flatten().map(|spring| spring.coefficients(at.h));
         for (number, value) in numbers[FRAME..].iter_mut().zip(springs.flatten()) {
@@ -58,15 +61,15 @@ impl JointType for Weld {
             |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
         let (linear, angular) = (form.spring, form.motor);
         if !linear && !angular {
-            let (arms, way) = on.anchors(numbers);
+            let (arms, way) = on.anchors();
             let [x, y] = Jacobian::point(arms);
-            let error = [way[0], way[1], numbers[6] + on.turn()];
+            let error = [way[0], way[1], numbers[0] + on.turn()];
             return on.block([x, y, Jacobian::angle()], error, RowLaw::Rigid, kept);
         }
         let (of_points, of_angle) = kept.split_at_mut(if linear { 4 } else { 2 });
         let law = if angular { spring(if linear { FRAME + 2 } else { FRAME }) } else { RowLaw::Rigid };
-        on.row(Jacobian::angle(), numbers[6] + on.turn(), law, of_angle);
-        let (arms, way) = on.anchors(numbers);
+        on.row(Jacobian::angle(), numbers[0] + on.turn(), law, of_angle);
+        let (arms, way) = on.anchors();
         let law = if linear { spring(FRAME) } else { RowLaw::Rigid };
         on.block(Jacobian::point(arms), way, law, of_points);
     }
@@ -86,8 +89,8 @@ impl Definition for Weld {
         Ok(())
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn refer(&mut self, angle: f64, _length: f64) {

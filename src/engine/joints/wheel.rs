@@ -54,11 +54,15 @@ const fn split(form: Form) -> [Form; 2] {
     [Form { spring, motor: false, limits }, Form { spring: false, motor, limits: false }]
 }
 
-/// Numbers: `[r_a, r_b, way, axis]`, then the suspension, then the motor.
-const FRAME: usize = 8;
+/// Numbers: `[axis]`, then the suspension, then the motor.
+const FRAME: usize = 2;
 
 impl JointType for Wheel {
     type Form = Form;
+
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        [self.anchor_a, self.anchor_b]
+    }
 
     fn numbers(form: Form) -> usize {
         FRAME + Axial::numbers(form)
@@ -69,8 +73,7 @@ impl JointType for Wheel {
     }
 
     fn place(&self, form: Form, at: Placing<'_>, numbers: &mut [f32]) {
-        numbers[..6].copy_from_slice(&at.anchors(self.anchor_a, self.anchor_b));
-        numbers[6..8].copy_from_slice(&at.direction(unit(self.axis)).to_array());
+        numbers[..2].copy_from_slice(&at.direction(unit(self.axis)).to_array());
         let (suspension, drive) = numbers[FRAME..].split_at_mut(Axial::numbers(split(form)[0]));
         self.suspension().place(at.h, suspension);
         self.drive().place(at.h, drive);
@@ -101,8 +104,8 @@ impl Definition for Wheel {
         self.drive().check()
     }
 
-    fn anchors(&mut self) -> Option<[&mut [f64; 2]; 2]> {
-        Some([&mut self.anchor_a, &mut self.anchor_b])
+    fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2] {
+        [&mut self.anchor_a, &mut self.anchor_b]
     }
 
     fn measure(&self, at: &Measured) -> JointState {

@@ -161,6 +161,11 @@ impl World {
 }
 
 impl Narrow {
+    /// Poses of all bodies in the collision of this step.
+    pub fn poses(&self) -> &[PoseRow] {
+        &self.poses
+    }
+
     /// Bytes held for candidates.
     pub fn candidate_bytes(&self) -> usize {
         let lists: usize = self.of_kind.iter().map(held).sum();

@@ -1,7 +1,7 @@
 //! Adding, changing, removing and reading joints.
 
 use super::World;
-use crate::engine::bodies::BodyHandle;
+use crate::engine::bodies::{Bodies, BodyHandle};
 use crate::engine::constraints::joints::Joints;
 use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
 use crate::engine::error::Error;
@@ -15,6 +15,8 @@ pub(super) struct JointSlots {
     /// `[joints]`
     joints: Vec<Option<Joint>>,
     generation: Vec<u32>,
+    /// Places that may be taken.
+    free: Vec<u32>,
     /// Place among the types of the workspace, and among the joints of that type; `[joints]`.
     places: Vec<Option<[u32; 2]>>,
     /// Types of the workspace that are groups of joints; they come last.
@@ -31,9 +33,15 @@ impl JointSlots {
         !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
     }
 
+    fn remove(&mut self, index: usize) {
+        self.joints[index] = None;
+        self.generation[index] = self.generation[index].wrapping_add(1);
+        self.places[index] = None;
+        self.free.push(index as u32);
+    }
+
     fn add(&mut self, joint: Joint) -> JointHandle {
-        let free = self.joints.iter().position(Option::is_none).filter(|_| self.joints.len() > 64);
-        let index = free.unwrap_or(self.joints.len());
+        let index = self.free.pop().map_or(self.joints.len(), |index| index as usize);
         if index == self.joints.len() {
             (self.joints.push(None), self.generation.push(0), self.places.push(None));
         }
@@ -77,8 +85,7 @@ impl World {
     /// Removes a joint. Errors: it was removed before.
     pub fn remove_joint(&mut self, handle: JointHandle) -> Result<(), Error> {
         self.joint(handle)?;
-        self.joints.joints[handle.index()] = None;
-        self.joints.generation[handle.index()] += 1;
+        self.joints.remove(handle.index());
         self.joints_changed();
         Ok(())
     }
@@ -159,8 +166,7 @@ impl World {
     pub(super) fn remove_joints_of(&mut self, body: BodyHandle) {
         for index in 0..self.joints.joints.len() {
             if self.joints.joints[index].as_ref().is_some_and(|joint| joint.a == body || joint.b == body) {
-                self.joints.joints[index] = None;
-                self.joints.generation[index] += 1;
+                self.joints.remove(index);
                 self.joints_changed();
             }
         }
@@ -197,7 +203,7 @@ impl World {
                     keys.len() - 1
                 });
                 let kind: &mut dyn Any = self.work.types[first + group].kind.as_mut();
-                let at = push(kind, definition, [a, b], kept, angle);
+                let at = push(kind, definition, &self.bodies, [a, b], kept, angle);
                 self.joints.places[index] = Some([(first + group) as u32, at]);
             }, else {});
         }
@@ -210,9 +216,16 @@ fn empty<T: Definition>(of: &T, swapped: bool) -> Box<dyn ConstraintType> {
 }
 
 /// Adds a joint to its group; returns its place there.
-fn push<T: Definition>(group: &mut dyn Any, joint: &T, ends: [u32; 2], kept: &[f32], angle: f32) -> u32 {
+fn push<T: Definition>(
+    group: &mut dyn Any,
+    joint: &T,
+    bodies: &Bodies,
+    ends: [u32; 2],
+    kept: &[f32],
+    angle: f32,
+) -> u32 {
     let Some(group) = group.downcast_mut::<Joints<T>>() else { unreachable!("a group has one type") };
-    group.push(joint.clone(), ends, kept, angle);
+    group.push(joint.clone(), bodies, ends, kept, angle);
     group.joints.len() as u32 - 1
 }
 

@@ -14,7 +14,7 @@ use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCou
 use crate::engine::contacts::Contact;
 use crate::engine::continuous::{Continuous, Moving};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::lanes::Class;
+use crate::engine::narrowphase::lanes::{Class, PoseRow};
 use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
@@ -283,7 +283,13 @@ impl World {
         };
         self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
         let h = self.settings.h();
-        self.work.types.iter_mut().for_each(|joined| joined.kind.begin(&self.bodies, h));
+        let Workspace { types, poses, .. } = &mut self.work;
+        if !types.is_empty() {
+            poses.clear();
+            poses.extend_from_slice(self.narrow.poses());
+            poses.push(PoseRow::default());
+        }
+        types.iter_mut().for_each(|joined| joined.kind.begin(&self.bodies, h));
     }
 
     /// The solver's stages, on rows and lanes that are ready.

@@ -8,9 +8,10 @@ pub mod rows;
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, at_width};
 use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
-use crate::engine::lanes::{LaneWidth, Lanes, RowStore, held};
+use crate::engine::lanes::{LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
 use rows::{JointPass, Task};
 use std::f32::consts::TAU;
@@ -21,7 +22,10 @@ pub trait JointType: Clone + fmt::Debug + Send + 'static {
     /// Which rows there are; joints of one form are solved together.
     type Form: Copy + fmt::Debug + Send;
 
-    /// Numbers of a joint that do not change in a step.
+    /// Anchors in the frames of a and b (m).
+    fn anchors(&self) -> [[f64; 2]; 2];
+
+    /// Numbers of a joint, besides its [`ANCHORS`], that do not change in a step.
     fn numbers(form: Self::Form) -> usize;
 
     /// Numbers that rows change: impulses (N·s or N·m·s), and errors of springs behind theirs.
@@ -30,9 +34,13 @@ pub trait JointType: Clone + fmt::Debug + Send + 'static {
     /// Sets the numbers for the coming step.
     fn place(&self, form: Self::Form, at: Placing<'_>, numbers: &mut [f32]);
 
-    /// States the rows, from these numbers.
+    /// States the rows from its numbers.
     fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>);
 }
+
+/// Numbers that every record begins with: `[r_a, r_b, way]` (m), arms from the centers of mass to the anchors, and the way
+/// from a's anchor to b's, at the start of the step.
+pub const ANCHORS: usize = 6;
 
 /// Where the two bodies of a joint are at the start of a step.
 #[derive(Debug)]
@@ -48,17 +56,6 @@ pub struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    /// `[r_a, r_b, way from a's anchor to b's]` (m), of anchors in the bodies' frames.
-    pub fn anchors(&self, anchor_a: [f64; 2], anchor_b: [f64; 2]) -> [f32; 6] {
-        let [a, b] = self.bodies.relative_poses(self.ends[0], self.ends[1]);
-        let arm = |k: usize, [x, y]: [f64; 2]| {
-            Vec2::new(x as f32, y as f32) - self.bodies.local_center[self.ends[k]]
-        };
-        let (ra, rb) = (a.rotation.rotate(arm(0, anchor_a)), b.rotation.rotate(arm(1, anchor_b)));
-        let way = b.position + (rb - ra);
-        [ra.x, ra.y, rb.x, rb.y, way.x, way.y]
-    }
-
     /// A direction in a's frame, turned with a.
     pub fn direction(&self, local: Vec2) -> Vec2 {
         self.bodies.pose(self.ends[0]).rotation.rotate(local)
@@ -84,6 +81,8 @@ pub struct Joints<T: JointType> {
     swapped: bool,
     /// Of the batches.
     ends: Vec<[u32; 2]>,
+    /// `[a_x, a_y, b_x, b_y]` from the centers of mass, in the bodies' frames (m). `[joints]`
+    anchors: Vec<Quad>,
     /// `[joints × numbers]`
     numbers: Vec<f32>,
     /// `[joints × kept]`
@@ -97,12 +96,19 @@ pub struct Joints<T: JointType> {
 impl<T: JointType> Joints<T> {
     /// None yet. `swapped`: it is b that does not move by impulses.
     pub fn new(form: T::Form, swapped: bool) -> Self {
-        let (joints, ends, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![]);
-        Joints { joints, form, swapped, ends, numbers, kept, angles, h: 0.0 }
+        let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
+        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, h: 0.0 }
     }
 
     /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
-    pub fn push(&mut self, joint: T, [a, b]: [u32; 2], kept: &[f32], angle: f32) {
+    pub fn push(&mut self, joint: T, bodies: &Bodies, [a, b]: [u32; 2], kept: &[f32], angle: f32) {
+        let [from_a, from_b] = joint.anchors();
+        let arm = |body: u32, [x, y]: [f64; 2]| {
+            let center = bodies.local_center[body as usize];
+            [(x - f64::from(center.x)) as f32, (y - f64::from(center.y)) as f32]
+        };
+        let ([ax, ay], [bx, by]) = (arm(a, from_a), arm(b, from_b));
+        self.anchors.push(Quad([ax, ay, bx, by]));
         self.joints.push(joint);
         self.ends.push(if self.swapped { [b, a] } else { [a, b] });
         self.numbers.resize(self.joints.len() * T::numbers(self.form), 0.0);
@@ -113,27 +119,45 @@ impl<T: JointType> Joints<T> {
         self.angles.push(angle);
     }
 
+    /// Lane vectors of a record before those that change.
+    fn first_kept(&self) -> usize {
+        ANCHORS + T::numbers(self.form)
+    }
+
     fn fill<L: Lanes>(&self, on: TypeInput<'_>) {
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
-        let stride = numbers + kept;
+        let stride = self.stride();
+        let poses: &[Quad] = bytemuck::cast_slice(on.poses);
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let lists = parts.contact.batches::<L::Index>();
-            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
-                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
+            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
+            for (record, (batch, (joints, (row_a, row_b)))) in
+                parts.records.chunks_exact_mut(stride).zip(indices)
+            {
                 let filled = segment.filled(batch, L::WIDTH);
+                let (a, b) = if self.swapped { (row_b, row_a) } else { (row_a, row_b) };
+                let [local_ax, local_ay, local_bx, local_by] = L::gather_quads::<1, 0>(&self.anchors, joints);
+                let turned = |row, [x, y]: [L; 2]| {
+                    let [cos, sin, ..] = L::gather_quads::<2, 1>(poses, row);
+                    [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
+                };
+                let (ra, rb) = (turned(a, [local_ax, local_ay]), turned(b, [local_bx, local_by]));
+                let (from, to) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
+                let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
+                record[..ANCHORS].copy_from_slice(&[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]);
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
                 if filled < L::WIDTH {
-                    floats.fill(0.0);
+                    // What the inert row has none of stays zero.
+                    floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
+                    floats[ANCHORS * L::WIDTH..].fill(0.0);
                 }
                 for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
                     let joint = joint as usize;
-                    let values = &self.numbers[joint * numbers..][..numbers];
-                    for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
-                        to[lane] = value;
-                    }
-                    let values = &self.kept[joint * kept..][..kept];
-                    for (to, &value) in floats[numbers * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
+                    let values = self.numbers[joint * numbers..][..numbers].iter();
+                    let values = values.chain(&self.kept[joint * kept..][..kept]);
+                    for (to, &value) in floats[ANCHORS * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
                         to[lane] = value;
                     }
                 }
@@ -142,8 +166,8 @@ impl<T: JointType> Joints<T> {
     }
 
     fn store<L: Lanes>(&mut self, on: TypeInput<'_>) {
-        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
-        let stride = numbers + kept;
+        let (numbers, kept) = (self.first_kept(), T::kept(self.form));
+        let stride = self.stride();
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
@@ -162,8 +186,7 @@ impl<T: JointType> Joints<T> {
     }
 
     fn forget<L: Lanes>(&self, on: TypeInput<'_>) {
-        let numbers = T::numbers(self.form);
-        let stride = numbers + T::kept(self.form);
+        let (numbers, stride) = (self.first_kept(), self.stride());
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
@@ -173,25 +196,35 @@ impl<T: JointType> Joints<T> {
 
     #[inline(never)]
     fn pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
-        let numbers = T::numbers(self.form);
-        let stride = numbers + T::kept(self.form);
-        let [a, b] = if self.swapped { [1, 0] } else { [0, 1] };
+        let (first_kept, stride) = (self.first_kept(), self.stride());
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
+            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
+            let [rows_a, rows_b] =
+                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
+            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
             for (record, (row_a, row_b)) in parts.records.chunks_exact_mut(stride).zip(indices) {
-                let lanes = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
-                let mut pass = JointPass::new([lanes[a], lanes[b]], task);
-                let (numbers, kept) = record.split_at_mut(numbers);
+                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
+                let (numbers, kept) = record.split_at_mut(first_kept);
+                let (anchors, numbers) = numbers.split_at(ANCHORS);
+                let mut pass = JointPass::new(bodies, anchors, task);
                 T::rows(self.form, numbers, kept, &mut pass);
-                let mut write = |index, [vx, vy, w, m, dx, dy, turn, i]: [L; 8]| match task {
-                    Task::Position { .. } => on.rows.scatter_delta::<L>(index, [dx, dy, turn, i]),
-                    _ => on.rows.scatter_velocity::<L>(index, [vx, vy, w, m]),
-                };
-                write(row_b, pass.bodies[b]);
-                if segment.pushes_a() {
-                    write(row_a, pass.bodies[a]);
+                let [a, b] = pass.bodies;
+                if matches!(task, Task::Position { .. }) {
+                    if pushes[1] {
+                        on.rows.scatter_delta::<L>(row_b, [b[DX], b[DY], b[TURN], b[INV_INERTIA]]);
+                    }
+                    if pushes[0] {
+                        on.rows.scatter_delta::<L>(row_a, [a[DX], a[DY], a[TURN], a[INV_INERTIA]]);
+                    }
+                    continue;
+                }
+                if pushes[1] {
+                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+                }
+                if pushes[0] {
+                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
                 }
             }
         }
@@ -204,7 +237,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn stride(&self) -> usize {
-        T::numbers(self.form) + T::kept(self.form)
+        self.first_kept() + T::kept(self.form)
     }
 
     fn begin(&mut self, bodies: &Bodies, h: f32) {
@@ -215,6 +248,9 @@ impl<T: JointType> ConstraintType for Joints<T> {
             self.h = h;
         }
         let count = T::numbers(self.form);
+        if count == 0 {
+            return;
+        }
         let places = self.numbers.chunks_exact_mut(count).zip(&mut self.angles);
         for ((joint, ends), (numbers, angle)) in self.joints.iter().zip(&self.ends).zip(places) {
             let [a, b] = ends.map(|i| i as usize);
@@ -260,7 +296,12 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn held_bytes(&self) -> usize {
-        held(&self.joints) + held(&self.ends) + held(&self.numbers) + held(&self.kept) + held(&self.angles)
+        held(&self.joints)
+            + held(&self.ends)
+            + held(&self.anchors)
+            + held(&self.numbers)
+            + held(&self.kept)
+            + held(&self.angles)
     }
 
     fn boxed(&self) -> Box<dyn ConstraintType> {

@@ -19,6 +19,7 @@ use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::fmt;
 
@@ -37,6 +38,8 @@ pub struct TypeInput<'a> {
     pub width: PassWidth,
     /// The rows of all bodies.
     pub rows: TypeRows<'a>,
+    /// Poses of all bodies at the start of the step, and of the inert one.
+    pub poses: &'a [PoseRow],
     /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
     pub batches: &'a mut Batches,
 }

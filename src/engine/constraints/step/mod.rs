@@ -237,13 +237,13 @@ impl<'a> Passes<'a> {
     /// Constraints of other types that come at this rank.
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
         let (width, mode, law) = (self.width_of(part), pass.mode_of(), pass.law_of());
-        let Workspace { rows, types, .. } = &mut *self.work;
+        let Workspace { rows, types, poses, .. } = &mut *self.work;
         for Joined { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
                 let rows = TypeRows::new(rows, pass.sums_of(), mode);
-                kind.run(TypeInput { phase, mode, law, h: self.input.h, width, rows, batches });
+                kind.run(TypeInput { phase, mode, law, h: self.input.h, width, rows, poses, batches });
             }
         }
     }
@@ -252,7 +252,7 @@ impl<'a> Passes<'a> {
     fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
         for part in [Part::Lanes, Part::Serial] {
             let width = self.width_of(part);
-            let Workspace { rows, types, .. } = &mut *self.work;
+            let Workspace { rows, types, poses, .. } = &mut *self.work;
             for Joined { kind, lanes, serial } in types {
                 let (rows, batches) = (TypeRows::new(rows, &mut [], mode), part.of(lanes, serial));
                 kind.run(TypeInput {
@@ -262,6 +262,7 @@ impl<'a> Passes<'a> {
                     h: self.input.h,
                     width,
                     rows,
+                    poses,
                     batches,
                 });
             }

@@ -11,6 +11,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::point_vector::PointVector;
 use crate::engine::constraints::vectors::system::System;
 use crate::engine::lanes::BodyRow;
+use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::{Budget, Parameters, Without};
 use std::fmt;
 
@@ -27,6 +28,8 @@ pub struct Workspace {
     pub serial: Batches,
     /// Constraints of other types than contacts.
     pub types: Vec<Joined>,
+    /// Poses at the start of the step, where there are such constraints; one per row.
+    pub poses: Vec<PoseRow>,
     /// Numbers that a solver keeps per contact, per contact point and per body.
     pub kept: Kept,
     /// Side records of what bounces; empty in scenes without restitution.
@@ -62,6 +65,7 @@ impl Clone for Workspace {
             lanes: self.lanes.clone(),
             serial: self.serial.clone(),
             types: self.types.clone(),
+            poses: self.poses.clone(),
             kept: self.kept.clone(),
             impacts: self.impacts.clone(),
             vectors: self.vectors.clone(),
