@@ -230,7 +230,8 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
-    note(&(without + &cost));
+    let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
+    note(&(without + &not_held + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
         let (plan, out, finished, elsewhere) =

@@ -7,9 +7,7 @@ use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
 use crate::lab::estimate::Estimate;
-use crate::lab::verify::{
-    self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, NEEDS_JOINTS, Required, Sweep, SweepRow,
-};
+use crate::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, Required, Sweep, SweepRow};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -127,17 +125,12 @@ fn list(cases: &[&Case]) -> String {
         text += &format!("{}  {} [{}]{law}\n", case.id, case.summary, case.unit);
         text += &format!("    tolerance: {}\n    {word} of {DEFAULT}: {why}\n", case.tolerance);
     }
-    text + &skipped()
-}
-
-fn skipped() -> String {
-    let list: Vec<_> = NEEDS_JOINTS.iter().map(|(id, what)| format!("{id} ({what})")).collect();
-    format!("skipped, needs joints: {}\n", list.join(", "))
+    text
 }
 
 const LEGEND: &str = "\
 A cell: pass or FAIL, the measured value, and in brackets the margin, error over tolerance: up to 1 passes.
-reference: what it should be.  n/a: the reference value is that of soft contacts.
+reference: what it should be.  n/a: the reference value is that of soft contacts, or the solver holds no joints.
 *: required of the default solver; --list says why.
 ";
 
@@ -172,7 +165,7 @@ fn text(matrix: &Matrix) -> String {
     let others = CASES.len() - matrix.cases.len();
     let left =
         if others > 0 { format!("not run: {others} of {} cases\n", CASES.len()) } else { String::new() };
-    text + &skipped() + &left
+    text + &left
 }
 
 /// The value that all solvers share; none if they differ.
@@ -291,7 +284,6 @@ fn json(matrix: &Matrix, impacts: Impacts) -> Value {
         "broken_promises": matrix.broken_promises(DEFAULT),
         "cases": matrix.cases.iter().map(described).collect::<Vec<_>>(),
         "results": results,
-        "needs_joints": NEEDS_JOINTS.iter().map(|(id, what)| json!({ "case": id, "what": what })).collect::<Vec<_>>(),
     })
 }
 
@@ -343,10 +335,10 @@ mod tests {
     }
 
     #[test]
-    fn the_list_says_what_is_required_and_what_is_skipped() {
+    fn the_list_says_what_is_required() {
         let cases = verify::select(&["B2.box".to_string(), "A17".to_string(), "B19".to_string()]).unwrap();
         let text = list(&cases);
-        for part in ["A17.spin", "not required of shim", "(soft contacts only)", "B20 (bridge"] {
+        for part in ["A17.spin", "not required of shim", "(soft contacts only)"] {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
     }

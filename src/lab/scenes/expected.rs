@@ -75,7 +75,7 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     if let Some(name) = &expect.catalogue {
         let (entry, size) = entry_of(name)?;
         let twin = load(name)?.scene;
-        if (&twin.bodies, twin.gravity) == (&scene.bodies, scene.gravity) {
+        if (&twin.bodies, &twin.joints, twin.gravity) == (&scene.bodies, &scene.joints, scene.gravity) {
             let own = entry.loaded(scene.clone(), size);
             demands.extend(own.demands.into_iter().filter(|d| matches!(d, Demand::Contains(_))));
             (truth, tolerances) = (own.truth, own.tolerances);

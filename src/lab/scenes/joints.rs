@@ -5,6 +5,7 @@ use crate::engine::bodies::{BodyHandle, BodyKind};
 use crate::engine::joints::{
     Distance, Joint, JointKind, MotorJoint, Mouse, Prismatic, Revolute, Weld, Wheel,
 };
+use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -141,6 +142,18 @@ impl Scene {
     /// With these joints.
     pub fn joined(self, joints: Vec<SceneJoint>) -> Self {
         Scene { joints, ..self }
+    }
+
+    /// Whether a solver can run this scene.
+    ///
+    /// Errors: the scene has joints with rows, which the solver does not hold, with its reason.
+    pub fn runs_on(&self, solver: &Variant) -> Result<(), Error> {
+        match solver.holds_no_joints {
+            Some(reason) if self.joints.iter().any(|joint| joint.kind != JointKind::Filter) => {
+                Err(Error::invalid(&self.name, format!("{} holds no joints: {reason}", solver.name)))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Errors, naming place and value: a body that is not there, a joint of a body to itself or between two that cannot

@@ -6,6 +6,7 @@
 mod arch;
 mod bounce;
 mod card_house;
+mod chains;
 mod check;
 mod circle_pile;
 mod collision;
@@ -22,11 +23,15 @@ pub mod holds;
 mod incline;
 mod joints;
 mod junkyard;
+mod linked;
+mod machines;
 mod mass_ratio;
 mod overlap;
 mod parts;
+mod pendulums;
 mod place;
 mod pyramid;
+mod ragdolls;
 mod single_box;
 mod sliding;
 mod smash;
@@ -88,6 +93,19 @@ pub static CATALOG: &[Entry] = &[
     junkyard::JUNKYARD,
     compounds::COMPOUNDS,
     circle_pile::PILE,
+    chains::BRIDGE,
+    chains::BALL,
+    chains::STRETCHED,
+    chains::CANTILEVER,
+    chains::HANGING_CHAIN,
+    pendulums::PENDULUM,
+    pendulums::DOUBLE,
+    pendulums::FOUR_BAR,
+    pendulums::CRADLE_OF_FIVE,
+    machines::VEHICLE,
+    machines::CRANE,
+    machines::GRID,
+    ragdolls::PILE,
 ];
 
 /// A row of [`CATALOG`].

@@ -182,12 +182,29 @@ impl StudyPlan {
                 scene = Some(self.open_at(name, point)?.scene);
             }
             let Some(scene) = scene else { continue };
+            if self.solvers.iter().all(|solver| scene.runs_on(solver).is_err()) {
+                scene.runs_on(self.solvers[0])?;
+            }
             if names.contains(&scene.name) {
                 return Err(Error::invalid("scenes", format!("two are called '{}'", scene.name)));
             }
             names.push(scene.name);
         }
         Ok(())
+    }
+
+    /// What is left out because solvers do not hold what scenes have, in lines.
+    ///
+    /// Errors: as [`Self::check`].
+    pub fn not_held(&self) -> Result<Vec<String>, Error> {
+        let mut lines = Vec::new();
+        for name in &self.scenes {
+            let scene = self.open_at(name, self.points().pop().flatten())?.scene;
+            lines.extend(
+                self.solvers.iter().filter_map(|solver| Some(scene.runs_on(solver).err()?.to_string())),
+            );
+        }
+        Ok(lines)
     }
 
     /// The treatments of impacts that a scene runs with: where nothing bounces they are all the same.
@@ -321,7 +338,7 @@ pub fn run(
         for (k, &swept) in points.iter().enumerate() {
             let mut loaded = plan.open_at(name, swept)?;
             loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
-            for &solver in &plan.solvers {
+            for &solver in plan.solvers.iter().filter(|solver| loaded.scene.runs_on(solver).is_ok()) {
                 for &impacts in plan.impacts_on(&loaded.scene) {
                     let budgets = plan.budgets(solver, swept)?.into_iter();
                     let cell = |budget| Cell { scene: [i, k], swept, name, solver, impacts, budget };

@@ -60,6 +60,7 @@ impl Lab {
         if let Some(change) = self.change {
             change(&mut scene);
         }
+        scene.runs_on(self.settings.solver).map_err(Failure::NotHeld)?;
         Ok(scene.build(self.settings.clone())?)
     }
 
@@ -165,6 +166,17 @@ pub(super) fn kinetic_energy(world: &World) -> f64 {
         0.5 * (m * (x * x + y * y) + inertia * w * w)
     };
     dynamic(world).map(of).sum()
+}
+
+/// Gaps of all joints (m).
+pub(super) fn gaps(world: &World) -> impl Iterator<Item = f64> + '_ {
+    world.joints().map(|(handle, _)| world.joint_state(handle).map_or(f64::NAN, |state| state.gap))
+}
+
+/// Force (N) and torque (N·m) of the joint that was added as number `i`, in the last substep.
+pub(super) fn joint_load(world: &World, i: usize) -> [f64; 2] {
+    let handle = world.joints().nth(i).map(|(handle, _)| handle);
+    handle.and_then(|handle| world.joint_state(handle).ok()).map_or([f64::NAN; 2], |state| state.load)
 }
 
 /// kg

@@ -65,17 +65,20 @@ mod columns;
 mod far;
 mod flight;
 mod impacts;
+mod joined;
 mod lab;
 mod limits;
 mod motion;
 mod overlap;
 mod pairs;
 mod paradox;
+mod pendulums;
 mod ratios;
 mod rocking;
 mod runner;
 mod slender;
 mod sliding;
+mod springs;
 mod stacks;
 mod sudden;
 mod table;
@@ -83,7 +86,7 @@ mod together;
 
 pub use lab::Lab;
 pub use runner::{Cell, Matrix, Progress, run, select};
-pub use table::{CASES, NEEDS_JOINTS};
+pub use table::CASES;
 
 use crate::engine::solvers::Variant;
 use crate::engine::world::Divergence;
@@ -253,6 +256,9 @@ pub enum Failure {
     /// The event to be measured never happened.
     #[error("not measured: {0}")]
     Unmeasured(String),
+    /// The solver does not hold what the scene has.
+    #[error("{0}")]
+    NotHeld(Error),
     /// The case itself is wrong.
     #[error(transparent)]
     Refused(#[from] Error),

@@ -14,7 +14,7 @@ pub enum Cell {
     Found(Finding),
     /// No number: the run diverged, or what was to be measured did not happen.
     Failed(Failure),
-    /// The truth is another solver's own law.
+    /// The truth is another solver's own law, or the scene has joints and the solver holds none.
     Foreign,
 }
 
@@ -127,6 +127,7 @@ fn judge(case: &Case, lab: &Lab, solver: &Variant) -> Cell {
     }
     match (case.measure)(lab) {
         Ok(finding) => Cell::Found(finding),
+        Err(Failure::NotHeld(_)) => Cell::Foreign,
         Err(failure) => Cell::Failed(failure),
     }
 }

@@ -1,22 +1,10 @@
 //! The list of cases.
 
 use super::{
-    Case, balance, bullets, carried, changes, columns, far, flight, impacts, limits, motion, overlap, pairs,
-    paradox, ratios, rocking, slender, sliding, stacks, sudden, together,
+    Case, balance, bullets, carried, changes, columns, far, flight, impacts, joined, limits, motion, overlap,
+    pairs, paradox, pendulums, ratios, rocking, slender, sliding, springs, stacks, sudden, together,
 };
 use std::sync::LazyLock;
-
-/// Hard cases that need joints or springs, which the crate does not have: listed as skipped.
-pub static NEEDS_JOINTS: &[(&str, &str)] = &[
-    ("A9", "oscillator damped by Coulomb friction"),
-    ("A10", "block on a belt, held by a spring"),
-    ("A13", "falling rod on a pin"),
-    ("A14", "pendulum of large amplitude"),
-    ("A15", "double pendulum"),
-    ("B16", "hanging chain"),
-    ("B17", "tension of a chain with a ball"),
-    ("B20", "bridge of 160 links"),
-];
 
 /// Every case, by family. The rows of a group are in its file.
 pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
@@ -29,15 +17,18 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
         far::CASES,
         flight::CASES,
         impacts::CASES,
+        joined::CASES,
         limits::CASES,
         motion::CASES,
         overlap::CASES,
         pairs::CASES,
         paradox::CASES,
+        pendulums::CASES,
         ratios::CASES,
         rocking::CASES,
         slender::CASES,
         sliding::CASES,
+        springs::CASES,
         stacks::CASES,
         sudden::CASES,
         together::CASES,

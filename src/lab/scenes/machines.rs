@@ -1,0 +1,97 @@
+//! Machines: many joints at once, motors, springs and limits.
+
+use super::holds::{Demand, Outside};
+use super::linked::{gaps, link};
+use super::parts::{below_floor, ground_line};
+use super::tolerance::Tolerances;
+use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
+use crate::engine::bodies::BodyKind;
+use crate::engine::joints::{JointKind, Motor, Prismatic, Spring, Weld, Wheel};
+
+/// Box2D's joint grid: discs that do not collide, hinged to the one above and the one on the left.
+pub(super) const GRID: Entry =
+    Entry::new("joint_grid", "a square net of hinged discs, hung by a few", |size| {
+        let n = size as usize;
+        let held = |k: usize, i: usize| i == 0 && k + 3 >= n / 2 && k <= n / 2 + 3;
+        let (mut bodies, mut joints) = (Vec::with_capacity(n * n), vec![]);
+        for (k, i) in (0..n).flat_map(|k| (0..n).map(move |i| (k, i))) {
+            let kind = if held(k, i) { BodyKind::Static } else { BodyKind::Dynamic };
+            let body = SceneBody::new(kind, [k as f64, -(i as f64)], SceneShape::disc(0.4));
+            bodies.push(SceneBody { group: -1, ..body });
+            let this = k * n + i;
+            if i > 0 {
+                joints.push(SceneJoint::revolute(this - 1, this, [0.0, -0.5], [0.0, 0.5]));
+            }
+            if k > 0 && !(held(k, i) && held(k - 1, i)) {
+                joints.push(SceneJoint::revolute(this - n, this, [0.5, 0.0], [-0.5, 0.0]));
+            }
+        }
+        Scene::new("joint_grid", bodies).joined(joints).steps(500)
+    })
+    .sized(30, 2, 200, "discs in a row")
+    .known(|scene, _| gaps(scene, 1.0))
+    .holds(&[Demand::GainsNoEnergy])
+    .within(|scene, _| Tolerances::standard(scene).truth(0.005, "half a percent of the distance of discs"));
+
+/// A car of 1.5 kg with two driven wheels on springs.
+pub(super) const VEHICLE: Entry = Entry::new("vehicle", "a car on springs that drives over bumps", |_| {
+    let mut bodies = vec![ground_line(60.0)];
+    for i in 0..8 {
+        // They stand out by 0.1 to 0.17 m.
+        let x = 4.0 + 3.0 * f64::from(i);
+        bodies.push(SceneBody::fixed([x, -0.9 + 0.01 * f64::from(i)], SceneShape::disc(1.0)));
+    }
+    let car = bodies.len();
+    bodies.push(SceneBody::dynamic([0.0, 1.0], SceneShape::rectangle(1.25, 0.3)));
+    let mut joints = vec![];
+    for (i, x) in [-0.9, 0.9].into_iter().enumerate() {
+        bodies.push(SceneBody::dynamic([x, 0.4], SceneShape::disc(0.4).friction(1.0)));
+        let wheel = Wheel {
+            anchor_a: [x, -0.6],
+            axis: [0.0, 1.0],
+            spring: Some(Spring { hertz: 5.0, damping_ratio: 0.7, rest: 0.0 }),
+            motor: Some(Motor { speed: -10.0, max: 2.0 }),
+            limits: Some([-0.25, 0.25]),
+            ..Wheel::default()
+        };
+        joints.push(SceneJoint::new(car, car + 1 + i, JointKind::Wheel(wheel)));
+    }
+    Scene::new("vehicle", bodies).joined(joints).steps(600)
+})
+.known(|scene, _| gaps(scene, 0.0))
+.holds(&[Demand::Contains(Outside(below_floor))])
+.within(|scene, _| Tolerances::standard(scene).truth(0.005, "half a percent of a wheel's distance of 1 m"));
+
+/// A jib, a trolley, ten links of 1 kg and a load of a tonne.
+pub(super) const CRANE: Entry =
+    Entry::new("crane", "a trolley takes a load on a cable along a welded jib", |_| {
+        let jib = 5.0;
+        let mut bodies = vec![
+            SceneBody::fixed([0.0, 5.0], SceneShape::rectangle(0.5, 5.0)),
+            SceneBody::dynamic([0.5 + jib, 9.5], SceneShape::rectangle(jib, 0.25).density(100.0)),
+            SceneBody::dynamic([2.5, 9.0], SceneShape::rectangle(0.4, 0.2).density(100.0)),
+        ];
+        let weld = Weld { anchor_a: [0.5, 4.5], anchor_b: [-jib, 0.0], ..Weld::default() };
+        let rail = Prismatic {
+            anchor_a: [-3.0, -0.5],
+            motor: Some(Motor { speed: 1.0, max: 5000.0 }),
+            limits: Some([0.0, 6.0]),
+            ..Prismatic::default()
+        };
+        let mut joints = vec![
+            SceneJoint::new(0, 1, JointKind::Weld(weld)),
+            SceneJoint::new(1, 2, JointKind::Prismatic(rail)),
+        ];
+        for i in 0..10 {
+            let y = 8.55 - 0.5 * f64::from(i);
+            let at = SceneBody::dynamic([2.5, y], link(0.25, 0.05).density(17.0));
+            bodies.push(at.turned(-std::f64::consts::FRAC_PI_2));
+            let anchor = if i == 0 { [0.0, -0.2] } else { [0.25, 0.0] };
+            joints.push(SceneJoint::revolute(i as usize + 2, i as usize + 3, anchor, [-0.25, 0.0]));
+        }
+        bodies.push(SceneBody::dynamic([2.5, 3.3], SceneShape::rectangle(0.5, 0.5).density(1000.0)));
+        joints.push(SceneJoint::revolute(12, 13, [0.25, 0.0], [0.0, 0.5]));
+        Scene::new("crane", bodies).joined(joints).steps(600)
+    })
+    .known(|scene, _| gaps(scene, 0.2))
+    .within(|scene, _| Tolerances::standard(scene).truth(0.005, "1 % of a link of half a meter"));
