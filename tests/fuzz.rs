@@ -31,7 +31,7 @@ fn scene_seeds() -> Vec<Vec<u8>> {
     const MOST_BYTES: usize = 6000;
     let small = ["disc_column:3", "stack:2", "pyramid:3", "circle_pile:12"];
     let names = CATALOG.iter().map(|e| e.name).chain(small);
-    let texts = names.map(|name| scenes::load(name).unwrap().scene.to_json());
+    let texts = names.map(|name| scenes::load(name).unwrap().scene.to_json()).chain([values::all_joints()]);
     texts.map(String::into_bytes).filter(|text| text.len() < MOST_BYTES).collect()
 }
 

@@ -55,6 +55,12 @@ pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
     }
     let settings = settings(salt);
     let solver = settings.solver.name;
+    if let Err(error) = scene.runs_on(settings.solver) {
+        return match scene.build(settings) {
+            Err(_) => Ok(format!("accepted: not held, {solver}")),
+            Ok(_) => Err(format!("build: accepted what it cannot hold, {error}")),
+        };
+    }
     let mut world = scene.build(settings).map_err(|e| format!("build: refused a valid scene, {e}"))?;
     let ending = steps(&mut world, salt % STEPS)?;
     let c = &world.counts;

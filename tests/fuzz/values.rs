@@ -57,11 +57,53 @@ const GEOMETRIES: &[&str] = &[
     r#"{}"#,
 ];
 
+/// One joint of every kind, between bodies 0 and 1.
+#[rustfmt::skip]
+const JOINTS: &[&str] = &[
+    r#"{"revolute":{"a":0,"b":1,"anchor_a":[0.5,0],"anchor_b":[-0.5,0],"limits":[-1,1],"motor":{"speed":1,"max":2}}}"#,
+    r#"{"revolute":{"a":0,"b":1,"spring":{"hertz":2,"damping_ratio":0.5,"rest":1}}}"#,
+    r#"{"prismatic":{"a":0,"b":1,"axis":[1,1],"motor":{"speed":1,"max":2},"limits":[-1,1]}}"#,
+    r#"{"distance":{"a":0,"b":1,"length":1}}"#,
+    r#"{"distance":{"a":0,"b":1,"length":1,"spring":{"hertz":30,"damping_ratio":0},"limits":[0,2]}}"#,
+    r#"{"weld":{"a":0,"b":1,"anchor_a":[1,0],"reference_angle":0.5}}"#,
+    r#"{"weld":{"a":0,"b":1,"linear":{"hertz":2,"damping_ratio":1},"angular":{"hertz":2,"damping_ratio":1}}}"#,
+    r#"{"wheel":{"a":0,"b":1,"spring":{"hertz":4,"damping_ratio":0.7},"motor":{"speed":9,"max":1},"limits":[-0.2,0.2]}}"#,
+    r#"{"motor":{"a":0,"b":1,"max_force":10,"max_torque":1,"angle":1}}"#,
+    r#"{"mouse":{"a":0,"b":1,"target":[1,1],"max_force":100,"break_load":[1,2]}}"#,
+    r#"{"filter":{"a":0,"b":1,"collide_connected":true}}"#,
+];
+
+/// A scene with a joint of every kind.
+pub fn all_joints() -> String {
+    let body = r#""position":[0,0],"shapes":[{"circle":{"radius":0.5}}]"#;
+    let bodies = format!(r#"{{"type":"static",{body}}},{{"type":"dynamic",{body}}}"#);
+    format!(r#"{{"name":"joints","bodies":[{bodies}],"joints":[{}]}}"#, JOINTS.join(","))
+}
+
+/// Adds a joint between two of the bodies that there are, or one more.
+fn add_joint(random: &mut Random, scene: &mut Value) {
+    let bodies = scene.get("bodies").and_then(Value::as_array).map_or(0, Vec::len) as u64;
+    let Ok(mut joint) = serde_json::from_str::<Value>(one(random, JOINTS)) else { return };
+    if let Some(members) = joint.as_object_mut().and_then(|kinds| kinds.values_mut().next()) {
+        for name in ["a", "b"] {
+            members[name] = json!(random.random_range(0..=bodies));
+        }
+    }
+    if let Some(scene) = scene.as_object_mut() {
+        let joints = scene.entry("joints").or_insert_with(|| json!([]));
+        if let Some(joints) = joints.as_array_mut() {
+            joints.push(joint);
+        }
+    }
+}
+
 /// A scene with one to six changes, most of them to values that scenes may have.
 pub fn mutate_scene(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let Some(mut scene) = parse(random, corpus) else { return super::bytes::mutate(random, corpus) };
     for _ in 0..random.random_range(1..=6) {
-        if random.random_ratio(1, 2) {
+        if random.random_ratio(1, 6) {
+            add_joint(random, &mut scene);
+        } else if random.random_ratio(1, 2) {
             change_bodies(random, &mut scene, corpus);
         } else {
             change(random, &mut scene);

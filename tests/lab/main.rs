@@ -12,6 +12,7 @@ mod features;
 mod golden;
 mod impulses;
 mod invariance;
+mod joint_files;
 mod metrics;
 mod piles;
 mod plastic;

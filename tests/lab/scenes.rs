@@ -407,7 +407,7 @@ fn bad_files_are_refused_with_place_and_value() {
         ("[0, -10]", "[0, NaN]", "gravity[1]: ", "line 1 column"),
         ("[0, -10]", "[0]", "gravity", "length 1"),
         (r#""gravity""#, r#""gravty""#, "gravty: ", "did you mean `gravity`?"),
-        (r#""steps": 10"#, r#""joints": []"#, "joints: ", "unknown field"),
+        (r#""steps": 10"#, r#""hinges": []"#, "hinges: ", "unknown field"),
         (r#""steps": 10"#, r#""ste\nps": 10"#, r"ste\nps: ", r"unknown field `ste\nps`"),
         (r#""steps": 10"#, r#""dt": 1"#, "dt: ", "duplicate field"),
         ("[1, 2]", "[1, -1e300]", "bodies[1].position[1]: ", "-1e300"),

@@ -64,6 +64,37 @@ fn every_scene_of_the_catalogue_follows_the_schema() {
     }
 }
 
+/// Every kind of joint, with what it has besides what all have.
+const JOINTS: [(&str, &str); 8] = [
+    ("revolute", "anchor_a anchor_b reference_angle spring motor limits"),
+    ("prismatic", "anchor_a anchor_b axis reference_angle spring motor limits"),
+    ("distance", "anchor_a anchor_b length spring motor limits"),
+    ("weld", "anchor_a anchor_b reference_angle linear angular"),
+    ("wheel", "anchor_a anchor_b axis spring motor limits"),
+    ("motor", "anchor_a anchor_b angle spring max_force max_torque"),
+    ("mouse", "target anchor_b spring max_force"),
+    ("filter", ""),
+];
+
+/// Places of all members of joints, and of their springs and motors.
+fn joint_places() -> Vec<String> {
+    let mut places = vec!["/joints".to_string()];
+    for (i, (kind, members)) in JOINTS.iter().enumerate() {
+        for name in
+            members.split(' ').filter(|name| !name.is_empty()).chain(["collide_connected", "break_load"])
+        {
+            places.push(format!("/joints/{i}/{kind}/{name}"));
+            let inner: &[&str] = match (name, *kind) {
+                ("spring" | "linear" | "angular", _) => &["hertz", "damping_ratio", "rest"],
+                ("motor", _) => &["speed", "max"],
+                _ => &[],
+            };
+            places.extend(inner.iter().map(|inner| format!("/joints/{i}/{kind}/{name}/{inner}")));
+        }
+    }
+    places
+}
+
 fn scene() -> Value {
     json!({
         "name": "x", "gravity": [0, -10], "dt": 0.01, "steps": 5,
@@ -85,6 +116,19 @@ fn scene() -> Value {
                 ],
             },
         ],
+        "joints": JOINTS.map(|(kind, members)| {
+            let mut joint = json!({ "a": 0, "b": 1, "collide_connected": true, "break_load": [1, 2] });
+            for name in members.split(' ').filter(|name| !name.is_empty()) {
+                joint[name] = match name {
+                    "limits" => json!([0.5, 2]),
+                    "spring" | "linear" | "angular" => json!({ "hertz": 2, "damping_ratio": 0.5, "rest": 0 }),
+                    "motor" => json!({ "speed": -1, "max": 3 }),
+                    "anchor_a" | "anchor_b" | "axis" | "target" => json!([1, 0]),
+                    _ => json!(0.5),
+                };
+            }
+            json!({ kind: joint })
+        }),
     })
 }
 
@@ -127,6 +171,7 @@ fn schema_and_reading_agree_on_every_member() {
         ["box/half", "box/half/0", "box/angle", "box/radius", "box/center"]
             .map(|name| shape(1, name))
             .to_vec(),
+        joint_places(),
         ["polygon/points", "polygon/points/0", "polygon/radius"].map(|name| shape(2, name)).to_vec(),
         ["capsule/a", "capsule/b", "capsule/radius"].map(|name| shape(3, name)).to_vec(),
     ]
@@ -166,7 +211,9 @@ fn schema_and_reading_agree_on_every_member() {
             let (schema, reading) = (by_schema(&changed), by_reading(&changed));
             // Beyond the schema: a dynamic body has shapes, and what is known of a body is of a dynamic one.
             let beyond = place == "/bodies/1/shapes" && value == &json!([])
-                || place == "/bodies/1/type" && value == &json!("static");
+                || place == "/bodies/1/type" && value == &json!("static")
+                // The joints are those of bodies 0 and 1.
+                || place == "/bodies" && by_schema(&changed);
             assert_eq!(schema, reading || beyond, "{place} = {value}");
             if reading { accepted += 1 } else { refused += 1 }
         }

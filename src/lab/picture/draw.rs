@@ -145,6 +145,8 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
             picture.line(view.at(spoke[0]), view.at(spoke[1]), BORDER, 0.8);
         }
     }
+    let mark = (0.3 * typical(stage, scale)).clamp(3.0, 12.0);
+    super::joints::draw(&mut picture, &stage.joints, &frame.poses, mark, |place| view.at(place));
     let arrow = points(&mut picture, stage, frame, &view, deepest);
     // Whatever of the ground reaches into them.
     let top = HEADER + height;

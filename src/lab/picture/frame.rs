@@ -1,5 +1,6 @@
 //! One instant of a world, for pictures and recordings.
 
+use super::joints::JointRecord;
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::pair_key;
 use crate::engine::shapes::Shape;
@@ -17,17 +18,20 @@ pub struct Stage {
     pub kinds: Vec<BodyKind>,
     /// Body of each shape, and the shape in the frame of that body's center of mass.
     pub shapes: Vec<(u32, Shape)>,
+    /// Joints, as they are drawn.
+    pub joints: Vec<JointRecord>,
     /// Step (s).
     pub dt: f64,
 }
 
 impl Stage {
-    /// Of a world whose bodies have all been added.
+    /// Of a world whose bodies and joints have all been added.
     pub fn of(world: &World) -> Self {
         let bodies = &world.bodies;
         let origin = if bodies.is_empty() { [0.0; 2] } else { bodies.center(0) };
         let shapes = world.shape_body.iter().copied().zip(world.shapes.iter().copied()).collect();
-        Stage { origin, kinds: bodies.kind.clone(), shapes, dt: f64::from(world.settings.dt) }
+        let joints = super::joints::records(world);
+        Stage { origin, kinds: bodies.kind.clone(), shapes, joints, dt: f64::from(world.settings.dt) }
     }
 }
 

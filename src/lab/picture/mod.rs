@@ -7,6 +7,7 @@
 
 pub mod draw;
 pub mod frame;
+pub mod joints;
 #[doc(hidden)]
 pub mod letters;
 #[doc(hidden)]

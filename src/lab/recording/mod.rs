@@ -36,6 +36,8 @@ pub mod page;
 pub mod read;
 pub mod record;
 
+use crate::lab::picture::joints::JointRecord;
+
 /// First bytes of every recording.
 const MAGIC: [u8; 8] = *b"SIMPREC\x1a";
 /// What is written; nothing else is read.
@@ -74,6 +76,9 @@ pub struct Header {
     pub kinds: String,
     /// In the order in which they are drawn.
     pub shapes: Vec<ShapeRecord>,
+    /// Drawn over the shapes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<JointRecord>,
     /// Whether frames have contact points.
     pub contacts: bool,
     /// What the curves are.

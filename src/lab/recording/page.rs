@@ -81,6 +81,7 @@ mod tests {
             quantum: 0.1,
             kinds: "s".into(),
             shapes: vec![ShapeRecord { body: 0, points: vec![[0.0; 2]], radius: 1.0 }],
+            joints: Vec::new(),
             contacts: false,
             curves: Vec::new(),
         };

@@ -99,6 +99,11 @@ fn check(header: &Header) -> Result<(), String> {
         "a shape of a body that there is not"
     } else if header.shapes.iter().any(|s| s.points.is_empty() || !finite(s)) {
         "a shape that cannot be drawn"
+    } else if header.joints.iter().flat_map(|j| j.bodies).any(|body| body as usize >= bodies) {
+        "a joint of a body that there is not"
+    } else if !header.joints.iter().all(|j| j.anchors.iter().flatten().chain(&j.axis).all(|x| x.is_finite()))
+    {
+        "a joint that cannot be drawn"
     } else {
         return Ok(());
     };
@@ -149,6 +154,7 @@ mod tests {
     use crate::engine::world::{Settings, World};
     use crate::lab::metrics::overlaps::Overlaps;
     use crate::lab::picture::frame::Stage;
+    use crate::lab::picture::joints::{JointRecord, Mark};
     use crate::lab::recording::record::{Caption, Recorder, file};
     use crate::lab::scenes;
 
@@ -187,10 +193,12 @@ mod tests {
             ("circle_pile:30", 3, true),
             ("far_stack:4", 1, true),
             ("pyramid:6", 2, false),
+            ("vehicle", 1, true),
         ] {
             let (bytes, frames) = run(name, 40, every, contacts);
             let found = read(&bytes).unwrap();
             assert_eq!((found.frames.len(), found.header.outcome.as_str()), (frames.len(), "holds"));
+            assert_eq!(found.header.joints, Stage::of(&world(name)).joints);
             assert_eq!((found.header.setting.as_str(), found.header.every), ("c · µ", every));
             let quantum = found.header.quantum;
             for (found, exact) in found.frames.iter().zip(&frames) {
@@ -272,7 +280,9 @@ mod tests {
         };
         assert!(read(&file(&good, frames).unwrap()).is_ok());
         type Lie<'a> = &'a dyn Fn(&mut Header);
-        let liars: [(Lie, &str); 9] = [
+        let ghost = JointRecord { mark: Mark::Weld, bodies: [0, 9], anchors: [[0.0; 2]; 2], axis: [0.0; 2] };
+        let liars: [(Lie, &str); 10] = [
+            (&|h| h.joints.push(ghost.clone()), "a joint of a body"),
             (&|h| h.frames = 0, "no frames"),
             (&|h| h.frames = u32::MAX, "no room"),
             (&|h| h.frames -= 1, "after its last frame"),

@@ -67,6 +67,7 @@ impl Recorder {
             quantum: (least / FINENESS).log2().floor().exp2(),
             kinds: stage.kinds.iter().map(letter).collect(),
             shapes: stage.shapes.iter().map(shape).collect(),
+            joints: stage.joints.clone(),
             contacts,
             curves: [("penetration", "m"), ("law residual", ""), ("speed", "m/s")].map(curve).to_vec(),
         };

@@ -139,7 +139,7 @@
     }));
     // Arrows compare with what the median frame carries; an impact is cut at three bodies' widths.
     const carried = median(recordings.flatMap((r) => r.frames.map((f) => Math.max(0, ...f.points.map((p) => Math.hypot(p.ix, p.iy))))).filter((v) => v > 0));
-    const state = { time: 0, playing: false, speed: 1, zoom: 1, x: 0, y: 0, forces: true, depths: true };
+    const state = { time: 0, playing: false, speed: 1, zoom: 1, x: 0, y: 0, forces: true, depths: true, joints: true };
 
     const frameOf = (r) => Math.min(Math.floor(state.time / r.span + 1e-6), r.frames.length - 1);
 
@@ -154,6 +154,63 @@
       context.setTransform(ratio, 0, 0, ratio, 0, 0);
       context.clearRect(0, 0, w, h);
       return [context, w, h];
+    }
+
+    // As people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
+    function drawJoints(c, { joints = [] }, poses, px, py, scale) {
+      const s = Math.min(Math.max(0.3 * size * scale, 3), 12);
+      c.strokeStyle = "#7a3e9d";
+      c.fillStyle = "#fbf7fd";
+      c.lineWidth = Math.min(Math.max(0.18 * s, 0.7), 1.8);
+      for (const { mark, bodies, anchors, axis } of joints) {
+        const place = (k) => {
+          const [x, y, angle] = poses.subarray(3 * bodies[k], 3 * bodies[k] + 3);
+          const [cos, sin] = [Math.cos(angle), Math.sin(angle)], [u, v] = anchors[k];
+          return [px(x + cos * u - sin * v), py(y + sin * u + cos * v)];
+        };
+        const [[ax, ay], [bx, by]] = [place(0), place(1)];
+        const turn = poses[3 * bodies[0] + 2], [dx, dy] = [bx - ax, by - ay];
+        const stroke = (...path) => {
+          c.beginPath();
+          path.forEach(([x, y], i) => (i ? c.lineTo(x, y) : c.moveTo(x, y)));
+          c.stroke();
+        };
+        const ring = (corners, start, radius) => {
+          c.beginPath();
+          for (let k = 0; k < corners; k++) c.lineTo(bx + radius * Math.cos(start + 2 * Math.PI * k / corners), by + radius * Math.sin(start + 2 * Math.PI * k / corners));
+          c.closePath();
+          c.fill();
+          c.stroke();
+        };
+        const along = () => {
+          const u = Math.cos(turn) * axis[0] - Math.sin(turn) * axis[1], v = -(Math.sin(turn) * axis[0] + Math.cos(turn) * axis[1]);
+          const way = u * dx + v * dy, [low, high] = [Math.min(way, 0) - s, Math.max(way, 0) + s];
+          stroke([ax + low * u, ay + low * v], [ax + high * u, ay + high * v]);
+          return Math.atan2(v, u);
+        };
+        if (mark === "spring") {
+          const side = 0.5 * s / Math.max(Math.hypot(dx, dy), 1e-9), path = [[ax, ay], [ax + 0.1 * dx, ay + 0.1 * dy]];
+          for (let k = 1; k < 10; k++) {
+            const share = (k + 1) / 12, to = k % 2 ? -side : side;
+            path.push([ax + share * dx - to * dy, ay + share * dy + to * dx]);
+          }
+          stroke(...path, [ax + 0.9 * dx, ay + 0.9 * dy], [bx, by]);
+        } else if (mark === "prismatic") {
+          ring(4, along() + Math.PI / 4, 0.7 * s);
+        } else if (mark === "wheel") {
+          along();
+          ring(16, 0, 0.5 * s);
+        } else if (mark === "weld") {
+          ring(4, Math.PI / 4 - turn, 0.7 * s);
+        } else {
+          const dashed = mark === "motor" || mark === "mouse";
+          c.setLineDash(dashed ? [s, s] : []);
+          stroke([ax, ay], [bx, by]);
+          c.setLineDash([]);
+          if (mark === "motor") ring(4, 0, 0.6 * s);
+          if (!dashed) ring(16, 0, (mark === "revolute" ? 0.5 : 0.3) * s);
+        }
+      }
     }
 
     // Below the scene, for the bar of a round length.
@@ -206,6 +263,7 @@
         c.fill();
         c.stroke();
       }
+      if (state.joints) drawJoints(c, recording, poses, px, py, scale);
       if (state.forces) {
         const unit = 1.1 * size * scale / carried;
         for (const p of points) {
@@ -318,6 +376,7 @@
       box2("impulses", "forces");
       box2(`penetration (to ${si(deepest, "m")})`, "depths");
     }
+    if (recordings.some((r) => r.joints)) box2("joints", "joints");
     button("fit", "whole scene", () => { Object.assign(state, { zoom: 1, x: 0, y: 0 }); draw(); }).className = "fit";
 
     function draw() {

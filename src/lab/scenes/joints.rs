@@ -59,6 +59,9 @@ impl SceneJoint {
         let (a, b) = (body(&mut object, "a")?, body(&mut object, "b")?);
         let collide_connected = take(&mut object, "collide_connected")?.unwrap_or(false);
         let break_load = take(&mut object, "break_load")?;
+        if let Some((key, _)) = object.iter().find(|(_, value)| value.is_null()) {
+            return Err(format!("{key}: null is no value: leave it out"));
+        }
         let kind = match kind {
             "revolute" => JointKind::Revolute(rest::<Revolute>(object)?),
             "prismatic" => JointKind::Prismatic(rest::<Prismatic>(object)?),
@@ -177,6 +180,12 @@ impl Scene {
             if !moves(joint.a) && !moves(joint.b) && joint.kind != JointKind::Filter {
                 let message = format!("neither body {} nor body {} moves by forces", joint.a, joint.b);
                 return Err(Error::invalid(format!("{place}.b"), message));
+            }
+            for (k, load) in joint.break_load.into_iter().flatten().enumerate() {
+                if !(load as f32).is_finite() || load < 0.0 {
+                    let message = format!("must be finite in 32 bits and not negative, is {load:?}");
+                    return Err(Error::invalid(format!("{place}.break_load[{k}]"), message));
+                }
             }
             joint.kind.check().map_err(|e| Error::from(e.within(&format!("joints[{i}]"))))?;
         }

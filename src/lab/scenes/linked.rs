@@ -6,9 +6,9 @@ use super::truth::{Observer, Truth};
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::{Settings, World};
 
-/// A static pin without extent to speak of (m).
+/// A static pin without extent to speak of (m), in the group of what does not collide.
 pub(super) fn pin(at: [f64; 2]) -> SceneBody {
-    SceneBody::fixed(at, SceneShape::disc(0.05))
+    SceneBody { group: -1, ..SceneBody::fixed(at, SceneShape::disc(0.05)) }
 }
 
 /// A horizontal capsule about the origin: half its straight part, and its radius (m).

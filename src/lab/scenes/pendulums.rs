@@ -7,11 +7,12 @@ use super::truth::{Truth, Worst, weight};
 use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
 use std::f64::consts::FRAC_PI_3;
 
-/// A rod of 1 m and 0.1 m² that hangs from `top` at an angle (rad) from the lowest place.
+/// A rod of 1 m and 0.1 m² that hangs from `top` at an angle (rad) from the lowest place, and does not collide.
 pub(super) fn rod(top: [f64; 2], angle: f64) -> SceneBody {
     let (sin, cos) = angle.sin_cos();
     let center = [top[0] + 0.5 * sin, top[1] - 0.5 * cos];
-    SceneBody::dynamic(center, SceneShape::rectangle(0.05, 0.5)).turned(angle)
+    let rod = SceneBody::dynamic(center, SceneShape::rectangle(0.05, 0.5)).turned(angle);
+    SceneBody { group: -1, ..rod }
 }
 
 /// A rod on a pin, released at rest `angle` from the lowest place (rad).

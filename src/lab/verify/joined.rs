@@ -127,7 +127,8 @@ fn cranks(lab: &Lab) -> Result<Finding, Failure> {
 fn triangle(lab: &Lab) -> Result<[f64; 2], Failure> {
     let speed = 3.0;
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.75_f64.sqrt()]];
-    let mut bodies = vec![SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.02))];
+    let pin = SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.02));
+    let mut bodies = vec![SceneBody { group: -1, ..pin }];
     let mut joints = vec![];
     for k in 0..3 {
         let [p, q] = [corners[k], corners[(k + 1) % 3]];
@@ -168,6 +169,7 @@ fn chain(links: usize, ratio: f64, sign: f64) -> Scene {
     let square = SceneShape::rectangle(0.25, 0.25).density(4.0 * ratio);
     bodies.push(SceneBody::dynamic([sign * (0.25 + links as f64), 0.0], square));
     joints.push(SceneJoint::revolute(links, links + 1, [0.5 * sign, 0.0], [-0.25 * sign, 0.0]));
+    bodies.iter_mut().for_each(|body| body.group = -1);
     Scene::new("chain", bodies).joined(joints)
 }
 

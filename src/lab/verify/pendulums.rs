@@ -165,7 +165,9 @@ fn damped_stop(lab: &Lab) -> Result<Finding, Failure> {
 fn on_belt(lab: &Lab) -> Result<Vec<(f64, f64)>, Failure> {
     let belt = SceneShape::rectangle(60.0, 0.5).friction(0.3);
     let belt = SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], belt).moving([0.5, 0.0], 0.0);
-    watch(lab, on_spring(belt, 0.0, 0.3), 10.0, |w| center(w, 2)[0])
+    let mut scene = on_spring(belt, 0.0, 0.3);
+    scene.bodies[2].velocity = [0.5, 0.0];
+    watch(lab, scene, 10.0, |w| center(w, 2)[0])
 }
 
 fn belt_reach(lab: &Lab) -> Result<Finding, Failure> {
@@ -190,11 +192,17 @@ const WIDTH: f64 = 0.02;
 fn rod(top: [f64; 2], angle: f64) -> SceneBody {
     let (sin, cos) = angle.sin_cos();
     let shape = SceneShape::rectangle(0.5 * WIDTH, 0.5).density(1.0 / WIDTH);
-    SceneBody::dynamic([top[0] + 0.5 * sin, top[1] - 0.5 * cos], shape).turned(angle)
+    let rod = SceneBody::dynamic([top[0] + 0.5 * sin, top[1] - 0.5 * cos], shape).turned(angle);
+    // Nothing here collides.
+    SceneBody { group: -1, ..rod }
+}
+
+fn pin() -> SceneBody {
+    SceneBody { group: -1, ..SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05)) }
 }
 
 fn pinned(angle: f64) -> Scene {
-    let bodies = vec![SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05)), rod([0.0, 0.0], angle)];
+    let bodies = vec![pin(), rod([0.0, 0.0], angle)];
     Scene::new("pendulum", bodies).joined(vec![SceneJoint::revolute(0, 1, [0.0, 0.0], [0.0, 0.5])])
 }
 
@@ -318,11 +326,7 @@ fn accelerations([a, b, u, v]: [f64; 4]) -> [f64; 4] {
 fn double_path(lab: &Lab) -> Result<Finding, Failure> {
     let start = FRAC_PI_3;
     let (sin, cos) = start.sin_cos();
-    let bodies = vec![
-        SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05)),
-        rod([0.0, 0.0], start),
-        rod([sin, -cos], start),
-    ];
+    let bodies = vec![pin(), rod([0.0, 0.0], start), rod([sin, -cos], start)];
     let joints = vec![
         SceneJoint::revolute(0, 1, [0.0, 0.0], [0.0, 0.5]),
         SceneJoint::revolute(1, 2, [0.0, -0.5], [0.0, 0.5]),
