@@ -136,8 +136,11 @@ pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
 /// What a pass does with blocks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Task {
-    /// Applies accumulated impulses.
-    WarmStart,
+    /// Applies accumulated impulses: of all rows, or only of springs and motors.
+    WarmStart {
+        /// Springs and motors alone.
+        driving: bool,
+    },
     /// Solves velocities.
     Velocity {
         /// Of rigid rows.
@@ -317,7 +320,10 @@ impl<L: Lanes> JointPass<L> {
         const VELOCITY: [usize; 3] = [VX, VY, W];
         let (impulse, held) = kept.split_at_mut(N);
         match self.task {
-            Task::WarmStart => {
+            Task::WarmStart { driving } => {
+                if driving && matches!(law, RowLaw::Rigid | RowLaw::Limit) {
+                    return;
+                }
                 for (j, &impulse) in j.iter().zip(impulse.iter()) {
                     self.apply(j, impulse, VELOCITY);
                 }
