@@ -45,7 +45,9 @@ impl JointSlots {
     fn add(&mut self, joint: Joint) -> JointHandle {
         let index = self.free.pop().map_or(self.joints.len(), |index| index as usize);
         if index == self.joints.len() {
-            (self.joints.push(None), self.generation.push(0), self.places.push(None));
+            self.joints.push(None);
+            self.generation.push(0);
+            self.places.push(None);
         }
         self.joints[index] = Some(joint);
         JointHandle { index: index as u32, generation: self.generation[index] }

@@ -216,8 +216,9 @@ fn solve<L: Lanes, const N: usize>(mut k: [[L; N]; N], mut x: [L; N]) -> [L; N] 
         inverse[j] = k[j][j].select_positive(L::splat(1.0) / k[j][j], L::zero());
         for i in j + 1..N {
             let factor = k[i][j] * inverse[j];
-            for c in j + 1..=i {
-                k[i][c] = factor.neg_mul_add(k[c][j], k[i][c]);
+            let column = k.map(|row| row[j]);
+            for (entry, &above) in k[i][..=i].iter_mut().zip(&column).skip(j + 1) {
+                *entry = factor.neg_mul_add(above, *entry);
             }
             x[i] = factor.neg_mul_add(x[j], x[i]);
         }
