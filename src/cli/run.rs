@@ -269,6 +269,18 @@ impl Found {
         let yes = if demanded { "yes" } else { "not checked" };
         let holds = self.broken.map_or(yes.to_string(), |broken| broken.mark.word().to_string());
         let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
+        let joints = e.joint_gap_rms.map_or(String::new(), |rms| {
+            let [gap, lean, excess] =
+                [e.joint_gap_max, e.joint_lean_max, e.joint_excess_max].map(Option::unwrap_or_default);
+            let mut rest = format!("greatest {}", si(gap, "m"));
+            if lean > 0.0 {
+                rest += &format!("; held angles {}", si(lean, "rad"));
+            }
+            if excess > 0.0 {
+                rest += &format!("; beyond limits {}", si(excess, "m or rad"));
+            }
+            line("joint gap, rms", si(rms, "m"), rest)
+        });
         [
             "cost\n".to_string(),
             line("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
@@ -283,6 +295,7 @@ impl Found {
                     si(e.flight_depth_max, "m")
                 ),
             ),
+            joints,
             line(
                 "contact-law residual, rms",
                 ratio(e.law_rms_lighter),

@@ -74,6 +74,7 @@ const ENGINE: &[&[&str]] = &[
     &["bodies"],
     &["broadphase", "narrowphase"],
     &["constraints", "continuous"],
+    &["joints"],
     &["solvers"],
     &["world"],
 ];

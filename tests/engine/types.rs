@@ -280,7 +280,8 @@ fn rods_are_in_the_passes_and_colors_of_the_contacts() {
     };
     let expected = [
         (Phase::Prepare, 5),
-        (Phase::WarmStart, 5),
+        // Arms of constraints may have turned, so each substep starts warm by a pass.
+        (Phase::WarmStart, 4 * 5),
         (Phase::Solve, 4 * 5),
         (Phase::Relax, 4 * 5),
         (Phase::Position, 0),
@@ -347,7 +348,7 @@ fn position_sweeps_move_bodies_of_other_types_and_leave_velocities() {
     }
 }
 
-/// A rod stops its discs moving apart in the first step; later ones have nothing to do.
+/// A rod stops its discs moving apart in the first step; the next has no sweep that would take its impulse back.
 #[test]
 fn solvers_that_forget_impulses_forget_those_of_other_types() {
     for (solver, forgets) in [("projection", true), ("tgs_sticky", true), ("pgs", false)] {
@@ -355,7 +356,8 @@ fn solvers_that_forget_impulses_forget_those_of_other_types() {
         world.step().unwrap();
         let first = impulses.lock().unwrap()[0];
         assert!(first < -0.1, "{solver}: {first}");
-        run(&mut world, 2);
+        world.settings.budget.velocity_iterations = 0;
+        run(&mut world, 1);
         let last = impulses.lock().unwrap()[0];
         assert_eq!(last.abs() < 1e-5, forgets, "{solver}: {first}, then {last}");
     }

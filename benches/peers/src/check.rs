@@ -136,6 +136,10 @@ impl Checker {
         self.broadphase.pairs(&self.proxies, &mut candidates);
         self.errors.pairs = 0;
         for pair in candidates {
+            let [i, j] = pair.map(|s| world.shape_body[s as usize] as usize);
+            if world.keeps_apart(i, j) {
+                continue;
+            }
             let [(a, pose_a), (b, pose_b)] = pair.map(|s| {
                 let s = s as usize;
                 (&world.shapes[s], world.bodies.pose(world.shape_body[s] as usize))

@@ -57,6 +57,7 @@ impl JointHandle {
 
 /// A joint between two bodies.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Joint {
     /// The body in whose frame axes are.
     pub a: BodyHandle,
@@ -75,6 +76,7 @@ pub struct Joint {
 
 /// What a joint holds.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum JointKind {
     /// A hinge.
     Revolute(Revolute),

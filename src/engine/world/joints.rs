@@ -3,7 +3,7 @@
 use super::World;
 use crate::engine::bodies::{Bodies, BodyHandle};
 use crate::engine::constraints::joints::Joints;
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Joined};
 use crate::engine::error::Error;
 use crate::engine::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
 use std::any::Any;
@@ -23,6 +23,8 @@ pub(super) struct JointSlots {
     groups: usize,
     /// Joints came, changed or went since they were grouped.
     stale: bool,
+    /// Kept numbers and angles of a world that was read; `[joints]`, or empty.
+    read: Vec<(Vec<f32>, f32)>,
     /// Pairs of bodies that do not collide, the smaller index first.
     apart: BTreeSet<[u32; 2]>,
 }
@@ -43,7 +45,9 @@ impl JointSlots {
     fn add(&mut self, joint: Joint) -> JointHandle {
         let index = self.free.pop().map_or(self.joints.len(), |index| index as usize);
         if index == self.joints.len() {
-            (self.joints.push(None), self.generation.push(0), self.places.push(None));
+            self.joints.push(None);
+            self.generation.push(0);
+            self.places.push(None);
         }
         self.joints[index] = Some(joint);
         JointHandle { index: index as u32, generation: self.generation[index] }
@@ -130,6 +134,19 @@ impl World {
         Ok(state)
     }
 
+    /// What a joint did to its bodies in the last step, with `Settings::record_impulses`; none without, or if the joint came
+    /// since. Errors: it was removed.
+    pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<Booked>, Error> {
+        self.joint(handle)?;
+        let place = self.joints.places[handle.index()];
+        Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.booked(i as usize)))
+    }
+
+    /// Whether a joint keeps two bodies from colliding.
+    pub fn keeps_apart(&self, a: usize, b: usize) -> bool {
+        self.joints.keeps_apart([a as u32, b as u32])
+    }
+
     fn check_joint(&self, joint: &Joint) -> Result<(), Error> {
         joint.kind.check()?;
         let ends = [self.index_of(joint.a)?, self.index_of(joint.b)?];
@@ -185,6 +202,7 @@ impl World {
         let first = self.work.types.len() - self.joints.groups;
         let old: Vec<Joined> = self.work.types.drain(first..).collect();
         self.joints.apart.clear();
+        let of_substep = self.impulses_of.unwrap_or_default();
         let mut keys: Vec<(&'static str, Form, bool)> = Vec::new();
         for index in 0..self.joints.joints.len() {
             let place = self.joints.places[index].take();
@@ -195,11 +213,15 @@ impl World {
             }
             let key = (joint.kind.name(), joint.kind.form(), !self.bodies.is_dynamic(b as usize));
             let was = place.map(|[group, i]| (&old[group as usize - first].kind, i as usize));
-            let (kept, angle) = was.map_or((&[][..], 0.0), |(kind, i)| (kind.impulses(i), kind.angle(i)));
+            let (kept, angle) = match (was, self.joints.read.get(index)) {
+                (Some((kind, i)), _) => (kind.impulses(i), kind.angle(i)),
+                (None, Some((kept, angle))) => (&kept[..], *angle),
+                (None, None) => (&[][..], 0.0),
+            };
             of_kind!(&joint.kind, definition => {
                 let group = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
                     keys.push(key);
-                    self.work.types.push(Joined::new(empty(definition, key.2)));
+                    self.work.types.push(Joined::new(empty(definition, key.2, of_substep)));
                     keys.len() - 1
                 });
                 let kind: &mut dyn Any = self.work.types[first + group].kind.as_mut();
@@ -208,11 +230,12 @@ impl World {
             }, else {});
         }
         self.joints.groups = keys.len();
+        self.joints.read.clear();
     }
 }
 
-fn empty<T: Definition>(of: &T, swapped: bool) -> Box<dyn ConstraintType> {
-    Box::new(Joints::<T>::new(of.form(), swapped))
+fn empty<T: Definition>(of: &T, swapped: bool, h: f32) -> Box<dyn ConstraintType> {
+    Box::new(Joints::<T>::new(of.form(), swapped, h))
 }
 
 /// Adds a joint to its group; returns its place there.
@@ -237,5 +260,60 @@ fn reference(kind: &JointKind) -> f64 {
         JointKind::Weld(joint) => joint.reference_angle,
         JointKind::Motor(joint) => joint.angle,
         JointKind::Distance(_) | JointKind::Wheel(_) | JointKind::Mouse(_) | JointKind::Filter => 0.0,
+    }
+}
+
+/// Joints as they are saved: definitions by place, generations, and what rows keep.
+#[cfg(feature = "serde")]
+#[derive(Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct SavedJoints {
+    joints: Vec<Option<Joint>>,
+    generation: Vec<u32>,
+    kept: Vec<(Vec<f32>, f32)>,
+}
+
+#[cfg(feature = "serde")]
+impl SavedJoints {
+    pub fn of(world: &World) -> Self {
+        let JointSlots { joints, generation, places, .. } = &world.joints;
+        let kept = places.iter().map(|place| match place {
+            Some([group, i]) => {
+                let kind = &world.work.types[*group as usize].kind;
+                (kind.impulses(*i as usize).to_vec(), kind.angle(*i as usize))
+            }
+            None => Default::default(),
+        });
+        SavedJoints { joints: joints.clone(), generation: generation.clone(), kept: kept.collect() }
+    }
+
+    /// Errors: lists of other lengths, a body that is not there, a value out of its range.
+    pub fn check(&self, bodies: usize) -> Result<(), String> {
+        let SavedJoints { joints, generation, kept } = self;
+        if generation.len() != joints.len() || kept.len() != joints.len() {
+            return Err(format!("lists of joints have other lengths than {}", joints.len()));
+        }
+        for (i, joint) in joints.iter().enumerate() {
+            let Some(joint) = joint else { continue };
+            if joint.a.index().max(joint.b.index()) >= bodies || joint.a == joint.b {
+                return Err(format!("joints[{i}] names a body that there is not"));
+            }
+            joint.kind.check().map_err(|e| format!("joints[{i}]: {e}"))?;
+        }
+        Ok(())
+    }
+
+    pub fn restore(self, world: &mut World) {
+        let places = vec![None; self.joints.len()];
+        let free = self.joints.iter().enumerate().filter(|(_, joint)| joint.is_none()).map(|(i, _)| i as u32);
+        world.joints = JointSlots {
+            free: free.collect(),
+            joints: self.joints,
+            generation: self.generation,
+            places,
+            read: self.kept,
+            ..JointSlots::default()
+        };
+        world.joints_changed();
+        world.group_joints();
     }
 }

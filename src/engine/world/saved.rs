@@ -5,6 +5,7 @@
 
 use super::edit::{Slots, Standing};
 use super::events::Events;
+use super::joints::SavedJoints;
 use super::traits::Traits;
 use super::{Order, Settings, World};
 use crate::engine::bodies::{BodyDef, BodyKind};
@@ -133,13 +134,15 @@ struct SavedWorld {
     applied: Vec<Standing>,
     events: Events,
     traits: Traits,
+    #[serde(default)]
+    joints: SavedJoints,
 }
 
-/// Errors: constraints of other types than contacts.
+/// Errors: constraints of the caller's own types.
 impl Serialize for World {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        if !self.work.types.is_empty() {
-            let message = "constraints of other types than contacts cannot be saved";
+        if !self.own_types().is_empty() {
+            let message = "constraints of the caller's own types cannot be saved";
             return Err(serde::ser::Error::custom(message));
         }
         let b = &self.bodies;
@@ -161,6 +164,7 @@ impl Serialize for World {
             applied: self.applied.clone(),
             events: self.events.clone(),
             traits: self.traits,
+            joints: SavedJoints::of(self),
         };
         saved.serialize(to)
     }
@@ -208,6 +212,7 @@ impl SavedWorld {
         for (i, shape) in self.shapes.iter().enumerate() {
             shape.check().map_err(|e| format!("shapes[{i}]: {e}"))?;
         }
+        self.joints.check(n)?;
         if !self.kept.is_consistent() {
             return Err("kept: as many numbers as names".into());
         }
@@ -255,6 +260,7 @@ impl SavedWorld {
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }
+        self.joints.restore(&mut world);
         world.update_pairs();
         world.contacts = self.contacts;
         world.narrow.relink(&mut world.contacts);

@@ -4,6 +4,7 @@
 //! with static and kinematic bodies, all of which are known. Damping is external too, but
 //! its impulse is not known: a scene with damping shows it as imbalance and as lost energy.
 
+use super::joints::Given;
 use super::law::{BodyStep, PointStep};
 use super::state::{BodyState, shadow_energy_change};
 use crate::engine::bodies::BodyKind;
@@ -30,12 +31,13 @@ pub struct Balance {
     angular_max: f64,
     energy: f64,
     created_max: f64,
+    joints: f64,
     friction: f64,
     impact: f64,
     unexplained_max: f64,
     kinetic_start: f64,
     kinetic_max: f64,
-    /// Work of weight and applied forces so far, and the least that it ever was (J).
+    /// Work of weight, applied forces and joints so far, and the least that it ever was (J).
     work: [f64; 2],
     /// The fastest point of a kinematic body at which it touched another (m/s).
     drive: f64,
@@ -55,6 +57,8 @@ pub struct Imbalance {
     pub energy_change: f64,
     /// Most energy created in one step.
     pub energy_created: f64,
+    /// Energy that springs and motors of joints gave over the run.
+    pub joint_work: f64,
     /// Energy that friction took over the run; negative if it gave.
     pub friction_loss: f64,
     /// Energy that normal impulses took over the run; negative if they gave.
@@ -88,6 +92,7 @@ impl Balance {
             angular_max: 0.0,
             energy: 0.0,
             created_max: 0.0,
+            joints: 0.0,
             friction: 0.0,
             impact: 0.0,
             unexplained_max: 0.0,
@@ -103,7 +108,13 @@ impl Balance {
         self.mass
     }
 
-    /// Adds a step: every body, and every contact point with its bodies' indices.
+    /// Where the impulses of a step act on a body, from the reference point of angular momentum (m); see [`Self::add`].
+    pub fn acts_at(&self, body: &BodyStep) -> DVec2 {
+        let middle = 0.5 * (1.0 - 1.0 / self.substeps);
+        body.before.position + middle * (body.after.position - body.before.position) - self.center
+    }
+
+    /// Adds a step: every body, every contact point with its bodies' indices, and what joints gave.
     ///
     /// *Where forces act.* In free fall in n substeps weight acts at x₀, x₁, … x_{n−1}; the
     /// torque that this makes about any fixed point is that of Δt F at
@@ -117,11 +128,8 @@ impl Balance {
     /// contact. In one substep that is all that changes the shadow energy, exactly but for the
     /// rounding; what is left over is positions that were moved without velocities, and, in
     /// more substeps, that velocities did not run straight from u⁻ to u⁺.
-    pub fn add(&mut self, bodies: &[BodyStep], points: &[([usize; 2], PointStep)]) {
+    pub fn add(&mut self, bodies: &[BodyStep], points: &[([usize; 2], PointStep)], given: &Given) {
         let (mut momentum, mut angular, mut energy, mut kinetic) = (DVec2::ZERO, 0.0, 0.0, 0.0);
-        let middle = 0.5 * (1.0 - 1.0 / self.substeps);
-        let acts_at =
-            |b: &BodyStep| b.before.position + middle * (b.after.position - b.before.position) - self.center;
         for body in bodies.iter().filter(|b| b.after.inv_mass > 0.0) {
             let BodyStep { before, after } = body;
             let (mass, inertia) = (after.mass(), after.inertia());
@@ -129,8 +137,9 @@ impl Balance {
             let about = |s: &BodyState| {
                 mass * (s.position - self.center).perp_dot(s.velocity) + inertia * s.angular_velocity
             };
-            angular +=
-                about(after) - about(before) - self.dt * (acts_at(body).perp_dot(after.force) + after.torque);
+            angular += about(after)
+                - about(before)
+                - self.dt * (self.acts_at(body).perp_dot(after.force) + after.torque);
             energy += shadow_energy_change(before, after, self.dt / self.substeps);
             kinetic += after.kinetic_energy();
             self.work[0] +=
@@ -150,11 +159,16 @@ impl Balance {
             }
             let impulse = point.impulse_on_b();
             momentum -= impulse;
-            angular -= (acts_at(other) + point.anchor_b).perp_dot(impulse);
+            angular -= (self.acts_at(other) + point.anchor_b).perp_dot(impulse);
             let driven = wall.before.velocity_at(point.anchor_a);
             energy -= impulse.dot(driven);
             self.drive = self.drive.max(driven.length());
         }
+        momentum -= given.momentum;
+        angular -= given.angular;
+        energy -= given.work;
+        self.joints += given.work;
+        self.work[0] += given.work;
         self.work[1] = self.work[1].min(self.work[0]);
         self.momentum += momentum;
         self.momentum_max = self.momentum_max.max(self.momentum.length());
@@ -185,6 +199,7 @@ impl Balance {
             angular_momentum: ratio(self.angular_max, momentum * self.gyration),
             energy_change: ratio(self.energy, energy),
             energy_created: ratio(self.created_max, energy),
+            joint_work: ratio(self.joints, energy),
             friction_loss: ratio(self.friction, energy),
             impact_loss: ratio(self.impact, energy),
             energy_unexplained: ratio(self.unexplained_max, energy),
@@ -233,14 +248,14 @@ mod tests {
     fn run(wall: BodyState, before: BodyState, after: BodyState, point: PointStep) -> Imbalance {
         let mut balance = Balance::new(&[wall, before], DT, 1);
         let steps = [BodyStep { before: wall, after: wall }, BodyStep { before, after }];
-        balance.add(&steps, &[([0, 1], point)]);
+        balance.add(&steps, &[([0, 1], point)], &Given::default());
         balance.close()
     }
 
     #[test]
     fn of_nothing_everything_is_zero() {
         let mut balance = Balance::new(&[], DT, 4);
-        balance.add(&[], &[]);
+        balance.add(&[], &[], &Given::default());
         assert_eq!(balance.close(), Imbalance::default());
         let rest = body();
         let none = run(fixed(BodyKind::Static), rest, rest, point([0.0; 2], DVec2::ZERO));
@@ -291,7 +306,7 @@ mod tests {
             after.velocity += DT / n as f64 * after.force * after.inv_mass;
             after.position += DT / n as f64 * after.velocity;
         }
-        balance.add(&[BodyStep { before, after }], &[]);
+        balance.add(&[BodyStep { before, after }], &[], &Given::default());
         // Terms of 30 N·m·s cancel.
         assert!(balance.angular_max < 1e-13, "{}", balance.angular_max);
         assert!(balance.momentum_max < 1e-14);
@@ -335,7 +350,7 @@ mod tests {
         // A force of 10 N that moves the body by 0.4 m adds 4 J.
         let pushed = BodyState { force: DVec2::new(10.0, 0.0), ..start };
         let after = BodyState { position: DVec2::new(0.4, 0.0), ..pushed };
-        balance.add(&[BodyStep { before: pushed, after }], &[]);
+        balance.add(&[BodyStep { before: pushed, after }], &[], &Given::default());
         assert!(!balance.is_blown_up(800.0) && balance.is_blown_up(801.0));
         assert!(!Balance::new(&[], DT, 1).is_blown_up(1.0));
     }

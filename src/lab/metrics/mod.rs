@@ -43,6 +43,7 @@
 
 pub mod balance;
 pub mod distribution;
+pub mod joints;
 pub mod law;
 pub mod overlaps;
 pub mod own;
@@ -58,6 +59,7 @@ use crate::engine::world::{Criterion, Divergence, Quantity, World};
 use balance::{Balance, ratio, weight};
 use distribution::Distribution;
 use glam::{DVec2, Vec2};
+use joints::{Given, JointErrors};
 use law::{BodyStep, PointStep};
 use overlaps::Overlaps;
 use rest::Rest;
@@ -146,6 +148,21 @@ pub struct Errors {
     pub energy_change: f64,
     /// Most energy created in one step.
     pub energy_created: f64,
+    /// Energy that springs and motors of joints gave over the run; none without joints.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_work: Option<f64>,
+    /// Largest gap of a joint (m); none without joints.
+    #[serde(rename = "joint_gap_max_m", skip_serializing_if = "Option::is_none", default)]
+    pub joint_gap_max: Option<f64>,
+    /// Root mean square of the gaps of all joints and steps (m).
+    #[serde(rename = "joint_gap_rms_m", skip_serializing_if = "Option::is_none", default)]
+    pub joint_gap_rms: Option<f64>,
+    /// Largest error of an angle that a joint holds (rad).
+    #[serde(rename = "joint_lean_max_rad", skip_serializing_if = "Option::is_none", default)]
+    pub joint_lean_max: Option<f64>,
+    /// Largest violation of a joint's limits (m or rad).
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_excess_max: Option<f64>,
     /// Energy that friction took.
     pub friction_loss: f64,
     /// Energy that normal impulses took.
@@ -242,6 +259,7 @@ pub struct Observation {
     softness: Option<[f64; 2]>,
     substeps: f64,
     blown_up: Option<Divergence>,
+    joints: JointErrors,
 }
 
 impl Observation {
@@ -279,6 +297,7 @@ impl Observation {
             softness: settings.solver.softness.map(|s| s(&settings.parameters, settings.h()).map(f64::from)),
             substeps: settings.budget.substeps.max(1) as f64,
             blown_up: None,
+            joints: JointErrors::default(),
         }
     }
 
@@ -308,7 +327,9 @@ impl Observation {
         for residual in own::residuals(world, &bodies, &points) {
             self.own.iter_mut().zip(residual).for_each(|(sum, r)| sum.add(r));
         }
-        self.balance.add(&bodies, &points);
+        let given = Given::of(world, &bodies, |body| self.balance.acts_at(body));
+        self.balance.add(&bodies, &points, &given);
+        self.joints.add(world);
         self.add_penetrations(world, &points);
 
         let kinetic: f64 = now.iter().map(BodyState::kinetic_energy).sum();
@@ -438,6 +459,11 @@ impl Observation {
             angular_momentum: balance.angular_momentum,
             energy_change: balance.energy_change,
             energy_created: balance.energy_created,
+            joint_work: self.joints.gap_rms().map(|_| balance.joint_work),
+            joint_gap_max: self.joints.gap_rms().map(|_| self.joints.gap_max),
+            joint_gap_rms: self.joints.gap_rms(),
+            joint_lean_max: self.joints.gap_rms().map(|_| self.joints.lean_max),
+            joint_excess_max: self.joints.gap_rms().map(|_| self.joints.excess_max),
             friction_loss: balance.friction_loss,
             impact_loss: balance.impact_loss,
             energy_unexplained: balance.energy_unexplained,

@@ -27,7 +27,7 @@ impl Default for Overlaps {
 
 impl Overlaps {
     /// Calls `each` with every pair of shapes that is as near as a contact, in a contact's order (the
-    /// second is that of a dynamic body) and ascending by [pair](crate::engine::contacts::pair_key).
+    /// second is that of a dynamic body; no joint keeps them apart) and ascending by [pair](crate::engine::contacts::pair_key).
     pub fn find(&mut self, world: &World, mut each: impl FnMut([u32; 2], &Manifold)) {
         let bodies = &world.bodies;
         // Bounds are relative to the first body: far from the origin they would round.
@@ -45,6 +45,9 @@ impl Overlaps {
         for &[i, j] in &self.pairs {
             let [a, b] = if self.proxies[j as usize].dynamic { [i, j] } else { [j, i] };
             let [body_a, body_b] = [a, b].map(|s| world.shape_body[s as usize] as usize);
+            if world.keeps_apart(body_a, body_b) {
+                continue;
+            }
             let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
             let [shape_a, shape_b] = [a, b].map(|s| &world.shapes[s as usize]);
             let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, SPECULATIVE_DISTANCE);

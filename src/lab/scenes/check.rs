@@ -2,8 +2,10 @@
 
 use super::format::{Geometry, Scene, SceneBody, SceneShape};
 pub use crate::engine::bodies::MAX_FRICTION;
-use crate::engine::bodies::{BodyDef, ShapeDef};
+use crate::engine::bodies::{BodyDef, BodyHandle, BodyKind, ShapeDef};
+use crate::engine::joints::{Joint, JointKind};
 use crate::engine::shapes::Shape;
+use crate::engine::solvers::Variant;
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use glam::Vec2;
@@ -89,6 +91,60 @@ impl Scene {
             world.add_joint(&joint)?;
         }
         Ok(world)
+    }
+
+    /// Whether a solver can run this scene.
+    ///
+    /// Errors: the scene has joints with rows, which the solver does not hold, with its reason.
+    pub fn runs_on(&self, solver: &Variant) -> Result<(), Error> {
+        match solver.holds_no_joints {
+            Some(reason) if self.joints.iter().any(|joint| joint.kind != JointKind::Filter) => {
+                Err(Error::invalid(&self.name, format!("{} holds no joints: {reason}", solver.name)))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Errors, naming place and value: a body that is not there, a joint of a body to itself or between two that cannot
+    /// move, a value out of its range.
+    fn check_joints(&self) -> Result<(), Error> {
+        for (i, joint) in self.joints.iter().enumerate() {
+            let place = format!("joints[{i}].{}", joint.kind.name());
+            for (name, body) in [("a", joint.a), ("b", joint.b)] {
+                if body >= self.bodies.len() {
+                    let message = format!("there is no body {body} among {}", self.bodies.len());
+                    return Err(Error::invalid(format!("{place}.{name}"), message));
+                }
+            }
+            if joint.a == joint.b {
+                return Err(Error::invalid(
+                    format!("{place}.b"),
+                    format!("body {} has no joint to itself", joint.b),
+                ));
+            }
+            let moves = |body: usize| self.bodies[body].kind == BodyKind::Dynamic;
+            if !moves(joint.a) && !moves(joint.b) && joint.kind != JointKind::Filter {
+                let message = format!("neither body {} nor body {} moves by forces", joint.a, joint.b);
+                return Err(Error::invalid(format!("{place}.b"), message));
+            }
+            for (k, load) in joint.break_load.into_iter().flatten().enumerate() {
+                if !(load as f32).is_finite() || load < 0.0 {
+                    let message = format!("must be finite in 32 bits and not negative, is {load:?}");
+                    return Err(Error::invalid(format!("{place}.break_load[{k}]"), message));
+                }
+            }
+            joint.kind.check().map_err(|e| Error::from(e.within(&format!("joints[{i}]"))))?;
+        }
+        Ok(())
+    }
+
+    /// The joints between these bodies.
+    fn joint_defs<'s>(&'s self, bodies: &'s [BodyHandle]) -> impl Iterator<Item = Joint> + 's {
+        self.joints.iter().map(|joint| Joint {
+            collide_connected: joint.collide_connected,
+            break_load: joint.break_load,
+            ..Joint::new(bodies[joint.a], bodies[joint.b], joint.kind.clone())
+        })
     }
 }
 

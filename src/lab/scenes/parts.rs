@@ -1,6 +1,7 @@
 //! Words that scenes are written in.
 
 use super::format::*;
+use super::joints::SceneJoint;
 use super::truth::View;
 use crate::engine::bodies::BodyKind;
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
@@ -17,6 +18,11 @@ impl Scene {
             bodies,
             joints: Vec::new(),
         }
+    }
+
+    /// With these joints.
+    pub fn joined(self, joints: Vec<SceneJoint>) -> Self {
+        Scene { joints, ..self }
     }
 
     /// The same scene, run for `steps` steps.

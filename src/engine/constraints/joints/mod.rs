@@ -10,7 +10,7 @@ use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, at_width};
-use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, TypeInput};
 use crate::engine::lanes::{LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
 use rows::{JointPass, Task};
@@ -89,15 +89,18 @@ pub struct Joints<T: JointType> {
     kept: Vec<f32>,
     /// `[joints]`
     angles: Vec<f32>,
+    /// Of the step; empty unless asked for. `[joints]`
+    booked: Vec<Booked>,
     /// Substep that the impulses belong to (s).
     h: f32,
 }
 
 impl<T: JointType> Joints<T> {
-    /// None yet. `swapped`: it is b that does not move by impulses.
-    pub fn new(form: T::Form, swapped: bool) -> Self {
+    /// None yet. `swapped`: it is b that does not move by impulses. `h`: substep that impulses of the joints that come belong
+    /// to (s).
+    pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, h: 0.0 }
+        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, booked: vec![], h }
     }
 
     /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
@@ -194,6 +197,44 @@ impl<T: JointType> Joints<T> {
         }
     }
 
+    /// Adds Jᵀ λ of each joint, which is what a warm start gives to bodies of unit mass and inertia at rest.
+    fn book<L: Lanes>(&mut self, on: TypeInput<'_>) {
+        let (first_kept, stride) = (self.first_kept(), self.stride());
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
+            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
+            for (record, (batch, (joints, (row_a, row_b)))) in
+                parts.records.chunks_exact_mut(stride).zip(indices)
+            {
+                let [row_a, row_b] = if self.swapped { [row_b, row_a] } else { [row_a, row_b] };
+                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)].map(|mut row| {
+                    [VX, VY, W].into_iter().for_each(|k| row[k] = L::zero());
+                    [INV_MASS, INV_INERTIA].into_iter().for_each(|k| row[k] = L::splat(1.0));
+                    row
+                });
+                let (numbers, kept) = record.split_at_mut(first_kept);
+                let (anchors, numbers) = numbers.split_at(ANCHORS);
+                for driving in [false, true] {
+                    let mut pass = JointPass::new(bodies, anchors, Task::WarmStart { driving });
+                    rows_once::<T, L>(self.form, numbers, kept, &mut pass);
+                    for (lane, &joint) in
+                        joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate()
+                    {
+                        let booked = &mut self.booked[joint as usize];
+                        let sums = if driving { &mut booked.driving } else { &mut booked.all };
+                        for (sum, body) in sums.iter_mut().zip(&pass.bodies) {
+                            for (sum, k) in sum.iter_mut().zip([VX, VY, W]) {
+                                *sum += bytemuck::cast_slice::<L, f32>(&body[k..=k])[lane];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     #[inline(never)]
     fn pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
@@ -231,6 +272,12 @@ impl<T: JointType> Joints<T> {
     }
 }
 
+/// [`JointType::rows`] where speed does not matter: compiled once.
+#[inline(never)]
+fn rows_once<T: JointType, L: Lanes>(form: T::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    T::rows(form, numbers, kept, on);
+}
+
 impl<T: JointType> ConstraintType for Joints<T> {
     fn ends(&self) -> &[[u32; 2]] {
         &self.ends
@@ -241,6 +288,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn begin(&mut self, bodies: &Bodies, h: f32) {
+        self.booked.clear();
         if self.h != h {
             // The forces stay the same.
             let factor = if self.h > 0.0 { h / self.h } else { 1.0 };
@@ -265,9 +313,13 @@ impl<T: JointType> ConstraintType for Joints<T> {
         let task = match (on.phase, on.mode) {
             (_, PassMode::Masses) => return,
             (_, PassMode::Forget) => return at_width!(width, Self::forget(self, on)),
+            (_, PassMode::Book) => {
+                self.booked.resize(self.joints.len(), Booked::default());
+                return at_width!(width, Self::book(self, on));
+            }
             (Phase::Prepare, _) => return at_width!(width, Self::fill(self, on)),
             (Phase::Store, _) => return at_width!(width, Self::store(self, on)),
-            (Phase::WarmStart, _) => Task::WarmStart,
+            (Phase::WarmStart, _) => Task::WarmStart { driving: false },
             (_, PassMode::Position { fraction, max_correction, impulses }) => Task::Position {
                 fraction,
                 max_correction,
@@ -289,6 +341,10 @@ impl<T: JointType> ConstraintType for Joints<T> {
     fn impulses(&self, constraint: usize) -> &[f32] {
         let kept = T::kept(self.form);
         &self.kept[constraint * kept..][..kept]
+    }
+
+    fn booked(&self, constraint: usize) -> Option<Booked> {
+        self.booked.get(constraint).copied()
     }
 
     fn angle(&self, constraint: usize) -> f32 {

@@ -136,8 +136,11 @@ pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
 /// What a pass does with blocks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Task {
-    /// Applies accumulated impulses.
-    WarmStart,
+    /// Applies accumulated impulses: of all rows, or only of springs and motors.
+    WarmStart {
+        /// Springs and motors alone.
+        driving: bool,
+    },
     /// Solves velocities.
     Velocity {
         /// Of rigid rows.
@@ -213,8 +216,9 @@ fn solve<L: Lanes, const N: usize>(mut k: [[L; N]; N], mut x: [L; N]) -> [L; N] 
         inverse[j] = k[j][j].select_positive(L::splat(1.0) / k[j][j], L::zero());
         for i in j + 1..N {
             let factor = k[i][j] * inverse[j];
-            for c in j + 1..=i {
-                k[i][c] = factor.neg_mul_add(k[c][j], k[i][c]);
+            let column = k.map(|row| row[j]);
+            for (entry, &above) in k[i][..=i].iter_mut().zip(&column).skip(j + 1) {
+                *entry = factor.neg_mul_add(above, *entry);
             }
             x[i] = factor.neg_mul_add(x[j], x[i]);
         }
@@ -317,7 +321,10 @@ impl<L: Lanes> JointPass<L> {
         const VELOCITY: [usize; 3] = [VX, VY, W];
         let (impulse, held) = kept.split_at_mut(N);
         match self.task {
-            Task::WarmStart => {
+            Task::WarmStart { driving } => {
+                if driving && matches!(law, RowLaw::Rigid | RowLaw::Limit) {
+                    return;
+                }
                 for (j, &impulse) in j.iter().zip(impulse.iter()) {
                     self.apply(j, impulse, VELOCITY);
                 }

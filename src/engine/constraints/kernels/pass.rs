@@ -82,6 +82,8 @@ pub enum PassMode {
         /// Displacements count as impulses of h; these begin at zero in the first sweep of a substep.
         impulses: Option<bool>,
     },
+    /// Accumulated impulses are added to those of the step, for metrics.
+    Book,
     /// The solver does not start warm: only accumulated impulses are set to zero.
     Forget,
 }

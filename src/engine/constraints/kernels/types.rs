@@ -57,9 +57,7 @@ impl<'a> TypeRows<'a> {
     pub(crate) fn new(rows: &'a mut [BodyRow], sums: &'a mut [BodyRow], mode: PassMode) -> Self {
         TypeRows(match mode {
             PassMode::Jacobi { .. } => Access::Summed(SummedRows { before: rows, sums }),
-            PassMode::InTurn | PassMode::Masses | PassMode::Forget | PassMode::Position { .. } => {
-                Access::InPlace(rows)
-            }
+            _ => Access::InPlace(rows),
         })
     }
 
@@ -159,6 +157,11 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
         &[]
     }
 
+    /// What a constraint did to its bodies in the last step, where that was booked ([`PassMode::Book`]).
+    fn booked(&self, _constraint: usize) -> Option<Booked> {
+        None
+    }
+
     /// Angle of a constraint's bodies, counted on from turn to turn (rad).
     fn angle(&self, _constraint: usize) -> f32 {
         0.0
@@ -177,6 +180,15 @@ impl Clone for Box<dyn ConstraintType> {
     fn clone(&self) -> Self {
         (**self).boxed()
     }
+}
+
+/// Impulses of a constraint on its bodies a and b in a step: `[N·s, N·s, N·m·s]` each, about their centers of mass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Booked {
+    /// All of them.
+    pub all: [[f32; 3]; 2],
+    /// Those that give and take energy by what they are: of springs and motors.
+    pub driving: [[f32; 3]; 2],
 }
 
 /// A type and the lanes of its constraints.

@@ -6,6 +6,7 @@ use crate::engine::constraints::Workspace;
 use crate::engine::constraints::impacts::restitution::Rebound;
 use crate::engine::constraints::impacts::spread::{self, Find, Leads, On};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
+use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::bounces::Bounces;
 
@@ -134,6 +135,7 @@ impl Passes<'_> {
     /// The second part of [`Self::end_substep`]: adds the accumulated impulses to those of the step.
     pub fn book_impulses(&mut self) {
         if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
+            self.over_types_alone(Phase::Store, PassMode::Book);
             let super::Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
                 let width = batches.width();

@@ -153,7 +153,12 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return false;
         }
-        self.over_batches(phase, pass);
+        if matches!(phase, Phase::Prepare | Phase::Store) {
+            // Other types have their records already.
+            self.over_contacts(pass);
+        } else {
+            self.over_batches(phase, pass);
+        }
         self.clock.lap(phase);
         true
     }
@@ -249,7 +254,7 @@ impl<'a> Passes<'a> {
     }
 
     /// Constraints of other types, without the contacts.
-    fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
+    pub(super) fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
         for part in [Part::Lanes, Part::Serial] {
             let width = self.width_of(part);
             let Workspace { rows, types, poses, .. } = &mut *self.work;

@@ -25,6 +25,7 @@ use crate::engine::constraints::kernels::frame::{
 };
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::stages::over_segments;
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{
     KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind,
@@ -77,6 +78,10 @@ impl Pass for StickySweep<'_> {
             floats_written: sweep.floats_written + layout.points,
             ..sweep
         }
+    }
+
+    fn law(&self) -> Softness {
+        Softness { bias_rate: self.sticky.fraction / self.sticky.h, ..Softness::RIGID }
     }
 
     #[inline(never)]
