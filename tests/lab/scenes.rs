@@ -131,7 +131,7 @@ fn scenes_have_as_many_bodies_and_shapes_as_they_should() {
         ("junkyard", 2, 8000),
         ("compounds", 1, 3000),
         ("circle_pile:500", 3, 500),
-        ("bridge", 1, 160),
+        ("bridge", 2, 160),
         ("ball_and_chain", 1, 41),
         ("stretched_chain", 1, 40),
         ("cantilever", 1, 8),
@@ -361,10 +361,9 @@ fn the_pile_follows_its_seed() {
 #[test]
 fn wrong_names_and_sizes_are_named() {
     let message = |name: &str| load(name).err().map(|e| e.to_string()).unwrap_or_default();
-    let names: Vec<&str> = CATALOG.iter().map(|entry| entry.name).collect();
-    let names = names.join(", ");
-    assert_eq!(message("stak"), format!("unknown scene 'stak'; did you mean 'stack'? [{names}]"));
-    assert_eq!(message("qqqqqqqqqqqqqq"), format!("unknown scene 'qqqqqqqqqqqqqq' [{names}]"));
+    // Too many names to repeat.
+    assert_eq!(message("stak"), "unknown scene 'stak'; did you mean 'stack'?");
+    assert_eq!(message("qqqqqqqqqqqqqq"), "unknown scene 'qqqqqqqqqqqqqq'");
     for size in ["0", "1001", "x", "", "-3", "1:2", "99999999999"] {
         let text = message(&format!("stack:{size}"));
         assert!(text.contains(&format!("'{size}'")) && text.contains("1 to 1000 (boxes)"), "{text}");

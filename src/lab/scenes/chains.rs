@@ -13,15 +13,16 @@ const GAP: (f64, &str) = (0.005, "half a percent of a link of 1 m starts to be v
 /// Solver2D's bridge. Links of 160 m over 160 m: any sag is a gap, since a rigid one needs an infinite tension.
 pub(super) const BRIDGE: Entry =
     Entry::new("bridge", "160 planks between two points at their distance", |_| {
-        let mut bodies = vec![SceneBody::fixed([0.0, 0.0], SceneShape::line(80.0))];
+        let mut bodies = vec![pin([-80.0, 20.0])];
         let mut joints = vec![];
         for i in 0..160 {
             let plank = SceneShape::rectangle(0.5, 0.125).density(20.0);
             bodies.push(damped(SceneBody::dynamic([f64::from(i) - 79.5, 20.0], plank)));
-            let (before, anchor) = if i == 0 { (0, [-80.0, 20.0]) } else { (i as usize, [0.5, 0.0]) };
+            let (before, anchor) = if i == 0 { (0, [0.0, 0.0]) } else { (i as usize, [0.5, 0.0]) };
             joints.push(SceneJoint::revolute(before, i as usize + 1, anchor, [-0.5, 0.0]));
         }
-        joints.push(SceneJoint::revolute(160, 0, [0.5, 0.0], [80.0, 20.0]));
+        bodies.push(pin([80.0, 20.0]));
+        joints.push(SceneJoint::revolute(160, 161, [0.5, 0.0], [0.0, 0.0]));
         Scene::new("bridge", bodies).joined(joints).steps(600)
     })
     .known(|scene, _| gaps(scene, 1.0))

@@ -56,6 +56,12 @@ impl SceneJoint {
         if let Some((key, _)) = object.iter().find(|(_, value)| value.is_null()) {
             return Err(format!("{key}: null is no value: leave it out"));
         }
+        let parts = ["spring", "motor", "linear", "angular"].into_iter();
+        for (key, value) in parts.filter_map(|key| Some((key, object.get(key)?))) {
+            if !value.is_object() {
+                return Err(format!("{key}: must be an object, is {value}"));
+            }
+        }
         let kind = match kind {
             "revolute" => JointKind::Revolute(rest::<Revolute>(object)?),
             "prismatic" => JointKind::Prismatic(rest::<Prismatic>(object)?),
