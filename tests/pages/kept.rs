@@ -41,19 +41,18 @@ fn compared(before: &Path, after: &StudyFile) -> Comparison {
     compare(&before, after, &Options { threshold: 0.05, relative: false })
 }
 
-/// Settings whose time is judged worse, and better.
+/// Settings and solvers whose time is judged worse, and better.
 fn told(found: &Comparison) -> [usize; 2] {
-    [Verdict::Worse, Verdict::Better].map(|verdict| {
-        let times = found.pairs.iter().filter_map(|pair| pair.time);
-        times.filter(|time| time.verdict(found.threshold) == verdict).count()
-    })
+    let times = found.pairs.iter().filter_map(|pair| pair.time.map(|time| time.verdict(found.threshold)));
+    let verdicts: Vec<_> = times.chain(found.solvers.iter().map(|s| s.verdict(found.threshold))).collect();
+    [Verdict::Worse, Verdict::Better].map(|verdict| verdicts.iter().filter(|v| **v == verdict).count())
 }
 
 /// `cargo test --release --test pages null_race -- --ignored --nocapture`: how often one program against itself
 /// is told to differ (never, also on a busy machine), and how often one solver that is slower by a tenth is found
-/// (nine times of ten on a quiet machine). The slower one is made of the second run: its times, a tenth longer.
+/// (nine times of ten). The slower one is made of the second run: its times, a tenth longer.
 #[test]
-#[ignore = "takes minutes, and its second half needs a quiet machine"]
+#[ignore = "takes minutes"]
 fn null_race() {
     const TRIES: usize = 20;
     let folder = tempfile::tempdir().unwrap();
@@ -77,7 +76,7 @@ fn null_race() {
         println!("{i}: null {:?}, slower {:?}, {:?}", told(&null), told(&slower), null.noise);
     }
     println!("differences in {differ} of {TRIES} null races; a tenth found in {found} of {TRIES}");
-    assert_eq!(differ, 0);
+    assert!(differ == 0 && 10 * found >= 9 * TRIES);
 }
 
 #[test]
