@@ -104,10 +104,12 @@ fn verdict(matrix: &Matrix) -> String {
         Some(broken) if broken.is_empty() => {
             let place = matrix.solvers.iter().position(|solver| solver.name == DEFAULT);
             let foreign = |cells: &&Vec<Cell>| place.is_some_and(|i| matches!(cells[i], Cell::Foreign));
-            let cases = matrix.cases.iter().zip(&matrix.cells).filter(|(case, _)| case.required.is_required());
+            let cases =
+                matrix.cases.iter().zip(&matrix.cells).filter(|(case, _)| case.required.is_required());
             let foreign = cases.filter(|(_, cells)| foreign(cells)).count();
             let passed = required - foreign;
-            let rest = if foreign == 0 { String::new() } else { format!("; {foreign} more do not apply to it") };
+            let rest =
+                if foreign == 0 { String::new() } else { format!("; {foreign} more do not apply to it") };
             format!("{DEFAULT}, the default solver, passed all {passed} cases required of it (*){rest}\n")
         }
         Some(broken) => {
