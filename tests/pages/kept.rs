@@ -79,6 +79,41 @@ fn null_race() {
     assert!(differ == 0 && 10 * found >= 9 * TRIES);
 }
 
+/// `cargo test --release --test pages agree_on_the_time -- --ignored --nocapture`: what `run`, `study` and `profile` call
+/// the time of a step and of its phases is the same, within a fifth.
+#[test]
+#[ignore = "measures times; needs a machine that is not too busy"]
+fn commands_agree_on_the_time_of_a_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let json = |args: &str| -> serde_json::Value {
+        let args: Vec<&str> = args.split(' ').collect();
+        serde_json::from_str(&succeeds(path, &args)).unwrap()
+    };
+    let scene = "pyramid:20 --solver soft_step --lanes 8";
+    let run = json(&format!("run {scene} --json"));
+    let profile = json(&format!("profile {scene} --phase all --seconds 0.3 --no-ceilings --json"));
+    let study = "study --scenes pyramid:20 --solvers soft_step --lanes 8 --substeps 4 --out study";
+    succeeds(path, &study.split(' ').collect::<Vec<_>>());
+    let study = StudyFile::read(&path.join("study")).unwrap();
+    let colored = study.records.iter().find(|r| r.lanes == 8).and_then(|r| r.sample.as_ref()).unwrap();
+    let substeps = run["budget"]["substeps"].as_f64().unwrap();
+    let pass = |phase: &str| {
+        let phases = profile["phases"].as_array().unwrap();
+        phases.iter().find(|p| p["phase"] == phase).unwrap()["median_pass_ns"].as_f64().unwrap()
+    };
+    let of_run = |phase: &str| run["phase_ns"][phase].as_f64().unwrap();
+    for (what, one, other) in [
+        ("step, run and study", run["median_step_ns"].as_f64().unwrap(), colored.median_ns),
+        ("solve, run and profile", of_run("solve"), substeps * pass("solve")),
+        ("relax, run and profile", of_run("relax"), substeps * pass("relax")),
+        ("prepare, run and profile", of_run("prepare"), pass("prepare")),
+    ] {
+        println!("{what}: {one:.0} ns, {other:.0} ns");
+        assert!((0.8..1.25).contains(&(one / other)), "{what}: {one:.0} ns, {other:.0} ns");
+    }
+}
+
 #[test]
 fn a_sweep_says_which_values_are_the_same_run() {
     let folder = tempfile::tempdir().unwrap();
