@@ -38,7 +38,7 @@ pub struct PapersArgs {
 const PRINTED: usize = 4;
 
 /// A row of the table: claim, command, figure, expected, printed, verdict.
-struct Row<'a> {
+struct ClaimRow<'a> {
     line: usize,
     cells: Vec<&'a str>,
     command: &'a str,
@@ -46,7 +46,7 @@ struct Row<'a> {
     expected: [f64; 2],
 }
 
-impl<'a> Row<'a> {
+impl<'a> ClaimRow<'a> {
     /// None for lines that are not rows of the table. Errors: a range that cannot be read.
     fn parse(line: usize, text: &'a str) -> Result<Option<Self>, Error> {
         let Some(inner) = text.strip_prefix("| ").and_then(|text| text.strip_suffix(" |")) else {
@@ -65,7 +65,7 @@ impl<'a> Row<'a> {
                 format!("'{}' is not a range 'low to high'", cells[3]),
             )
         })?;
-        Ok(Some(Row { line, command, figure, expected, cells }))
+        Ok(Some(ClaimRow { line, command, figure, expected, cells }))
     }
 }
 
@@ -126,11 +126,11 @@ fn digits(value: f64) -> String {
 pub fn run(args: &PapersArgs) -> Result<ExitCode, Error> {
     let text = std::fs::read_to_string(&args.file).map_err(Error::io(&args.file))?;
     let mut lines: Vec<String> = text.lines().map(String::from).collect();
-    let rows = text.lines().enumerate().map(|(i, line)| Row::parse(i, line));
-    let rows: Vec<Row> = rows.filter_map(Result::transpose).collect::<Result<_, _>>()?;
+    let rows = text.lines().enumerate().map(|(i, line)| ClaimRow::parse(i, line));
+    let rows: Vec<ClaimRow> = rows.filter_map(Result::transpose).collect::<Result<_, _>>()?;
     let is_asked =
-        |row: &&Row| args.only.as_ref().is_none_or(|only| row.cells.join(" ").contains(only.as_str()));
-    let rows: Vec<&Row> = rows.iter().filter(is_asked).collect();
+        |row: &&ClaimRow| args.only.as_ref().is_none_or(|only| row.cells.join(" ").contains(only.as_str()));
+    let rows: Vec<&ClaimRow> = rows.iter().filter(is_asked).collect();
     if rows.is_empty() {
         return Err(Error::invalid(
             args.file.to_string_lossy(),
@@ -177,12 +177,12 @@ mod tests {
     fn rows_have_a_command_a_figure_and_a_range() {
         let line =
             "| a claim | `simpulse run stack` | `errors/penetration_max` | 0 to 1e-3 | 5 | reproduced |";
-        let row = Row::parse(3, line).unwrap().unwrap();
+        let row = ClaimRow::parse(3, line).unwrap().unwrap();
         assert_eq!((row.command, row.figure), ("simpulse run stack", "errors/penetration_max"));
         assert_eq!((row.expected, row.line), ([0.0, 1e-3], 3));
-        assert!(Row::parse(0, "| a | b | c |").unwrap().is_none());
-        assert!(Row::parse(0, "|---|---|---|---|---|---|").unwrap().is_none());
-        assert!(Row::parse(0, &line.replace("0 to 1e-3", "small")).is_err());
+        assert!(ClaimRow::parse(0, "| a | b | c |").unwrap().is_none());
+        assert!(ClaimRow::parse(0, "|---|---|---|---|---|---|").unwrap().is_none());
+        assert!(ClaimRow::parse(0, &line.replace("0 to 1e-3", "small")).is_err());
     }
 
     #[test]

@@ -100,7 +100,15 @@ fn verdict(matrix: &Matrix) -> String {
     match matrix.broken_promises(DEFAULT) {
         None => format!("{DEFAULT}, the default solver, did not run: nothing was required\n"),
         Some(broken) if broken.is_empty() => {
-            format!("{DEFAULT}, the default solver, passed all {required} cases required of it (*)\n")
+            let place = matrix.solvers.iter().position(|solver| solver.name == DEFAULT);
+            let foreign = |cells: &&Vec<Cell>| place.is_some_and(|i| matches!(cells[i], Cell::Foreign));
+            let cases =
+                matrix.cases.iter().zip(&matrix.cells).filter(|(case, _)| case.required.is_required());
+            let foreign = cases.filter(|(_, cells)| foreign(cells)).count();
+            let passed = required - foreign;
+            let rest =
+                if foreign == 0 { String::new() } else { format!("; {foreign} more do not apply to it") };
+            format!("{DEFAULT}, the default solver, passed all {passed} cases required of it (*){rest}\n")
         }
         Some(broken) => {
             let (count, ids) = (broken.len(), broken.join(", "));
@@ -259,7 +267,7 @@ fn json(matrix: &Matrix, impacts: Impacts) -> Value {
             Cell::Found(f) => {
                 for (key, x) in [
                     ("measured", f.measured),
-                    ("truth", f.truth),
+                    ("reference", f.truth),
                     ("tolerance", f.tolerance),
                     ("margin", f.margin()),
                 ] {
@@ -279,7 +287,7 @@ fn json(matrix: &Matrix, impacts: Impacts) -> Value {
         .flat_map(|(case, cells)| matrix.solvers.iter().zip(cells).map(|(solver, c)| cell(case, solver, c)))
         .collect();
     json!({
-        "version": 1,
+        "version": 2,
         "default_solver": DEFAULT,
         "broken_promises": matrix.broken_promises(DEFAULT),
         "cases": matrix.cases.iter().map(described).collect::<Vec<_>>(),

@@ -25,13 +25,15 @@ pub struct OnScene {
 
 /// A mechanism, and what is lost without it.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Row {
-    /// Its name; `all of them` for the last row of several.
+pub struct Ablated {
+    /// Its name.
     pub mechanism: String,
     /// What it does.
     pub meaning: String,
     /// Lines of code in files of its own.
     pub lines: u32,
+    /// What a test holds it to: a case, a family of random scenes, or a test.
+    pub needed_for: &'static str,
     /// Cases that pass with it and fail without.
     pub lost: Vec<&'static str>,
     /// Cases that fail with it and pass without.
@@ -57,7 +59,7 @@ pub struct Plan {
 }
 
 /// Leaves out each mechanism in turn. `tell` is given how many of how many are done, and what runs.
-pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Row>, Error> {
+pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Ablated>, Error> {
     let total = plan.mechanisms.len() + 1;
     let passed = |without: Without, done: usize, name: &str| -> Vec<Option<bool>> {
         let lab = |solver| Lab::new(solver).without(without);
@@ -69,7 +71,7 @@ pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Ve
     let whole = passed(Without::default(), 0, "whole");
     let mut rows = Vec::new();
     for (done, &place) in plan.mechanisms.iter().enumerate() {
-        let Mechanism { name, meaning, lines, .. } = plan.solver.mechanisms[place];
+        let Mechanism { name, meaning, case, lines } = plan.solver.mechanisms[place];
         let without = Without::default().and(place);
         let found = passed(without, done + 1, name);
         let of = |before: bool| {
@@ -83,7 +85,15 @@ pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Ve
         });
         let scenes = scenes.collect::<Result<_, _>>()?;
         let (mechanism, meaning) = (name.into(), meaning.into());
-        rows.push(Row { mechanism, meaning, lines, lost: of(true), won: of(false), scenes });
+        rows.push(Ablated {
+            mechanism,
+            meaning,
+            lines,
+            needed_for: case,
+            lost: of(true),
+            won: of(false),
+            scenes,
+        });
     }
     Ok(rows)
 }
@@ -121,15 +131,16 @@ fn on_scene(plan: &Plan, name: &str, without: Without) -> Result<OnScene, Error>
 }
 
 /// The rows as two tables: cases, and scenes.
-pub fn text(rows: &[Row]) -> String {
-    let mut cases = table(&["without", "lines", "cases lost", "cases won"]);
+pub fn text(rows: &[Ablated]) -> String {
+    let mut cases = table(&["without", "lines", "needed for", "cases won", "cases lost"]);
     let mut on_scenes = table(&["without", "scene", "overlap µm", "without", "rest mm/s", "without", "time"]);
     let list = |cases: &[&str]| if cases.is_empty() { "–".to_string() } else { cases.join(" ") };
     let number =
         |value: Option<f64>, scale: f64| value.map_or("diverged".into(), |v| format!("{:.3}", v * scale));
     for row in rows {
         let lines = if row.lines == 0 { "–".into() } else { row.lines.to_string() };
-        cases.add_row([row.mechanism.clone(), lines, list(&row.lost), list(&row.won)]);
+        let needed_for = row.needed_for.to_string();
+        cases.add_row([row.mechanism.clone(), lines, needed_for, list(&row.won), list(&row.lost)]);
         for OnScene { scene, overlap_m, rest_speed_m_s, time } in &row.scenes {
             let [all, without] = overlap_m.map(|v| number(v, 1e6));
             let [rest, rest_without] = rest_speed_m_s.map(|v| number(v, 1e3));
@@ -139,5 +150,5 @@ pub fn text(rows: &[Row]) -> String {
     }
     let scenes =
         if rows.iter().all(|row| row.scenes.is_empty()) { String::new() } else { finish(on_scenes, 2) };
-    finish(cases, 4) + "\n" + &scenes
+    finish(cases, 5) + "\n" + &scenes
 }

@@ -395,7 +395,7 @@ proptest! {
     }
 
     #[test]
-    fn sizes_from_a_millimetre_to_a_kilometre(
+    fn sizes_from_a_millimeter_to_a_kilometer(
         a in shape(), b in shape(), scale_a in -3.0f32..3.0, scale_b in -3.0f32..3.0,
         angle in coordinate(3.0), direction in coordinate(3.0), gap in coordinate(0.5),
     ) {

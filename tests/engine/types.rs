@@ -235,7 +235,7 @@ fn rods_take_part_in_sweeps_that_sum_up() {
 
 /// In one sweep that sums up, a rod sees nothing of what its neighbors do.
 #[test]
-fn one_jacobi_sweep_moves_the_neighbours_of_what_moves_and_no_others() {
+fn one_jacobi_sweep_moves_the_neighbors_of_what_moves_and_no_others() {
     let speeds = |solver: &str| {
         let (mut world, _) = chain(find(solver).unwrap(), LaneWidth::W8, Order::Natural);
         let budget = &mut world.settings.budget;

@@ -94,10 +94,10 @@ pub fn run(target: &Target, inputs: u64) {
             eprintln!("{}: {took:.0?} for salt {salt} and {}", target.name, path.display());
         }
         match verdict {
-            Ok(behaviour) => {
-                let good = behaviour.starts_with("accepted");
+            Ok(behavior) => {
+                let good = behavior.starts_with("accepted");
                 accepted += u64::from(good);
-                if seen.insert(behaviour) && input.len() <= MOST_BYTES_KEPT {
+                if seen.insert(behavior) && input.len() <= MOST_BYTES_KEPT {
                     if good { accepting.push(input) } else { refusing.push(input) }
                 }
             }

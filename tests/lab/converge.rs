@@ -6,7 +6,7 @@ use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
-use simpulse::lab::converge::replay::{Outcome, Replay, Sequence, Start};
+use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
 use simpulse::lab::converge::{Curve, Options, Report, converge, plot, table};
 use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
@@ -293,7 +293,7 @@ fn a_replayed_problem_is_the_step_of_the_world() {
             {
                 let mut world = world(name, variant, budget, order, 20);
                 let problem = capture(&mut world, name);
-                let Outcome { velocities, sweeps, .. } =
+                let Replayed { velocities, sweeps, .. } =
                     replay(&problem, sequence, variant).run(variant, budget, Start::Warm);
                 world.frozen_step();
                 assert_eq!(sweeps, world.counts.sweeps);
@@ -369,7 +369,7 @@ fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() 
     let mut replay = replay(&problem, Sequence::Natural, apgd);
     let rounding = 1e-6 * least.abs();
     for k in 1..200 {
-        let Outcome { impulses, .. } = replay.run(apgd, apgd.of_iterations(k), Start::Cold);
+        let Replayed { impulses, .. } = replay.run(apgd, apgd.of_iterations(k), Start::Cold);
         let bound = 2.0 * 4.0 * square / f64::from(k + 1).powi(2) + rounding;
         let gap = objective(&impulses) - least;
         assert!(gap < bound, "{k}: {gap:e} for {bound:e}");
@@ -382,7 +382,7 @@ fn the_relaxation_parts_in_proportion_to_sliding() {
     let problem = sliding_box();
     let apgd = solvers::find("apgd").unwrap();
     let mut replay = replay(&problem, Sequence::Natural, apgd);
-    let Outcome { velocities, impulses, .. } = replay.run(apgd, apgd.of_iterations(2000), Start::Cold);
+    let Replayed { velocities, impulses, .. } = replay.run(apgd, apgd.of_iterations(2000), Start::Cold);
     let mut pushing = 0;
     for ((c, [un, ut]), l) in
         problem.contacts.iter().zip(problem.contact_velocities(&velocities)).zip(&impulses)

@@ -56,7 +56,7 @@ fn by_reading(value: &Value) -> bool {
 }
 
 #[test]
-fn every_scene_of_the_catalogue_follows_the_schema() {
+fn every_scene_of_the_catalog_follows_the_schema() {
     for entry in CATALOG {
         let size = entry.size.map_or(String::new(), |s| format!(":{}", s.min));
         let json = scenes::load(&format!("{}{size}", entry.name)).unwrap().scene.to_json();
@@ -99,7 +99,7 @@ fn scene() -> Value {
     json!({
         "name": "x", "gravity": [0, -10], "dt": 0.01, "steps": 5,
         "expect": {
-            "catalogue": "arch", "rests": true, "stands": false, "stays_stacked": true, "gains_no_energy": false,
+            "catalog": "arch", "rests": true, "stands": false, "stays_stacked": true, "gains_no_energy": false,
             "stays_within": 0.5, "stays_inside": [[-5, -5], [5, 5]],
             "reference": { "measure": "resting_height", "body": 1, "value": 0.5, "tolerance": 0.1 },
         },

@@ -21,7 +21,7 @@ fn a_snapshot_is_svg_or_png_by_its_name() {
     refused(path, &["snapshot", "staack", "-o", "b.svg"], &["'staack'", "'stack'"]);
     refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--lanes", "3"], &["lanes", "3"]);
     refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--scale", "0mm"], &["--scale", "0mm"]);
-    // One scale for all pictures: micrometres look like nothing, unless a scale of micrometres is asked for.
+    // One scale for all pictures: micrometers look like nothing, unless a scale of micrometers is asked for.
     let colors = |options: &[&str]| {
         succeeds(path, &[&["snapshot", "stack:2", "--without", "statics", "-o", "c.svg"], options].concat());
         let text = std::fs::read_to_string(path.join("c.svg")).unwrap();

@@ -51,7 +51,7 @@ fn the_controls_do_what_they_say() {
         out.panned = [state.x, state.y];
         get("fit").click();
         get("forces").click(); out.without = hash() !== plain;
-        get("forces").click(); get("depths").click(); out.grey = hash() !== plain; get("depths").click();
+        get("forces").click(); get("depths").click(); out.gray = hash() !== plain; get("depths").click();
         root.dispatchEvent(new KeyboardEvent("keydown", { key: "End" })); out.last = state.time;
         root.dispatchEvent(new KeyboardEvent("keydown", { key: "Home" })); out.home = state.time;
         get("play").click(); out.playing = state.playing;
@@ -85,7 +85,7 @@ fn the_controls_do_what_they_say() {
     near("home", 0.0);
     assert!(number("wheel") > 1.5 && (number("played") > 0.0 || number("ticks") < 3.0), "{found}");
     assert!((number("picked") - 1.0).abs() < 0.02, "{found}");
-    for name in ["moved", "zoomed", "same", "without", "grey", "playing"] {
+    for name in ["moved", "zoomed", "same", "without", "gray", "playing"] {
         assert_eq!(found[name], true, "{name}: {found}");
     }
     assert_eq!(found["paused"], false, "{found}");

@@ -56,7 +56,7 @@ const CLASSES: usize = 257;
 #[derive(Clone, Debug, Default)]
 pub struct HashGrid {
     /// Finest first.
-    levels: Vec<Level>,
+    levels: Vec<GridLevel>,
     /// Size class of each proxy, `[proxies]`.
     class: Vec<u16>,
     /// Bucket of each proxy, `[proxies]`.
@@ -64,20 +64,20 @@ pub struct HashGrid {
     /// First entry of each bucket, `[buckets + 2]`.
     starts: Vec<u32>,
     /// Proxies by bucket, so that a run of cells is read as a stream.
-    entries: Vec<Entry>,
+    entries: Vec<GridEntry>,
     /// Pairs as they are met; only a prefix is in use.
     found: Vec<[u32; 2]>,
     sort: PairSort,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct GridEntry {
     proxy: Proxy,
     index: u32,
 }
 
 #[derive(Clone, Debug)]
-struct Level {
+struct GridLevel {
     /// 1/h, zero for the infinite cell (1/m).
     inv_cell: f32,
     /// Its first bucket.
@@ -88,7 +88,7 @@ struct Level {
     entries: Range<usize>,
 }
 
-impl Level {
+impl GridLevel {
     /// Index of the cell that holds coordinate `x`.
     #[inline]
     fn cell(&self, x: f32) -> i32 {
@@ -165,11 +165,11 @@ impl HashGrid {
     /// Bytes of memory that depend on the proxies but not on the pairs; at
     /// most 64 per proxy and 16 KiB in all on a grid that has not shrunk.
     pub fn bytes(&self) -> usize {
-        self.levels.capacity() * size_of::<Level>()
+        self.levels.capacity() * size_of::<GridLevel>()
             + self.class.capacity() * size_of::<u16>()
             + (self.bucket.capacity() + self.starts.capacity()) * size_of::<u32>()
             + self.sort.bytes()
-            + self.entries.capacity() * size_of::<Entry>()
+            + self.entries.capacity() * size_of::<GridEntry>()
     }
 
     /// Counting sort of the proxies by bucket.
@@ -204,10 +204,10 @@ impl HashGrid {
             self.entries.clear();
             return;
         };
-        self.entries.resize(proxies.len(), Entry { proxy, index: 0 });
+        self.entries.resize(proxies.len(), GridEntry { proxy, index: 0 });
         for (index, (&proxy, &bucket)) in proxies.iter().zip(&self.bucket).enumerate() {
             let next = &mut self.starts[bucket as usize + 1];
-            self.entries[*next as usize] = Entry { proxy, index: index as u32 };
+            self.entries[*next as usize] = GridEntry { proxy, index: index as u32 };
             *next += 1;
         }
     }
@@ -229,7 +229,12 @@ impl HashGrid {
             let blocks = (count * BUCKETS_PER_PROXY).div_ceil(BLOCK);
             let inv_cell = if coarser == CLASSES - 1 { 0.0 } else { 2f64.powi(127 - coarser as i32) as f32 };
             level_of[finer..=coarser].fill(self.levels.len() as u8);
-            self.levels.push(Level { inv_cell, base, blocks: blocks as u32, entries: first..first + count });
+            self.levels.push(GridLevel {
+                inv_cell,
+                base,
+                blocks: blocks as u32,
+                entries: first..first + count,
+            });
             base += (blocks * BLOCK) as u32;
             first += count;
             class = coarser + 1;
@@ -240,7 +245,7 @@ impl HashGrid {
     /// Meets every candidate pair once; returns how many are in `found`.
     fn search(&mut self) -> usize {
         let mut search =
-            Search { starts: &self.starts, entries: &self.entries, found: &mut self.found, len: 0 };
+            GridSearch { starts: &self.starts, entries: &self.entries, found: &mut self.found, len: 0 };
         for (i, level) in self.levels.iter().enumerate() {
             for position in level.entries.clone() {
                 let entry = self.entries[position];
@@ -275,21 +280,21 @@ impl HashGrid {
     }
 }
 
-struct Search<'a> {
+struct GridSearch<'a> {
     starts: &'a [u32],
-    entries: &'a [Entry],
+    entries: &'a [GridEntry],
     found: &'a mut Vec<[u32; 2]>,
     len: usize,
 }
 
-impl Search<'_> {
+impl GridSearch<'_> {
     /// Tests `entry` against cells x0..=x1 of row y, at most three of them.
     ///
     /// Other rows may share the buckets and are met through their own. Of row
     /// y itself no stranger is let in: the cells that (1) leaves in question
     /// are four neighbors at most, and those never share a bucket.
     #[inline]
-    fn row(&mut self, entry: &Entry, level: &Level, y: i32, x0: i32, x1: i32) {
+    fn row(&mut self, entry: &GridEntry, level: &GridLevel, y: i32, x0: i32, x1: i32) {
         let (first, last) = (level.bucket(x0, y), level.bucket(x1, y));
         let (start, end) = (self.starts[first] as usize, self.starts[last + 1] as usize);
         let in_row = |other: &Proxy| level.row(other) == y;
@@ -305,7 +310,7 @@ impl Search<'_> {
 
     /// Tests `entry` against a run of entries.
     #[inline]
-    fn run(&mut self, entry: &Entry, run: Range<usize>, accept: impl Fn(&Proxy) -> bool) {
+    fn run(&mut self, entry: &GridEntry, run: Range<usize>, accept: impl Fn(&Proxy) -> bool) {
         let run = &self.entries[run];
         if self.found.len() < self.len + run.len() {
             self.found.resize((self.len + run.len()).max(2 * self.found.len()), [0; 2]);

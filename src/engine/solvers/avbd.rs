@@ -51,7 +51,7 @@ use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
 use crate::engine::params::{Budget, Parameter};
-use descent::{Bodies, Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
+use descent::{Descent, DescentInput, NORMAL, PER_BODY, PER_POINT, TANGENT};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -164,7 +164,7 @@ impl Avbd {
         &mut self,
         passes: &mut Passes<'_>,
         phase: Phase,
-        work: impl FnOnce(&mut Descent, &mut Bodies<'_>),
+        work: impl FnOnce(&mut Descent, &mut DescentInput<'_>),
     ) {
         if !passes.runs(phase) {
             return;
@@ -173,7 +173,10 @@ impl Avbd {
             passes.parts();
         let Features { rotation, friction, .. } = input.features;
         let (increments, bodies) = (motion.velocity_increments(), rows.len() - 1);
-        work(&mut self.descent, &mut Bodies { rows, kept, contacts, increments, bodies, rotation, friction });
+        work(
+            &mut self.descent,
+            &mut DescentInput { rows, kept, contacts, increments, bodies, rotation, friction },
+        );
         // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
         let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);
         clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);

@@ -9,7 +9,9 @@
 //! Two runs of one binary differ as well: by memory placement, clock rate and load. The measurable part widens every
 //! interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the machine; the scatter of
 //! the settings around their common ratio measures placement; and the time that threads waited measures the load.
+//! A change of one solver shows in all its settings, and is found below that noise ([`solvers`]).
 
+pub mod solvers;
 pub mod text;
 
 use crate::engine::world::Order;
@@ -20,6 +22,7 @@ use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::interleave::{Sample, median};
 use serde::Serialize;
+use solvers::SolverChange;
 
 /// Errors below this share of their tolerance are as good as none (1).
 pub const NEGLIGIBLE: f64 = 0.01;
@@ -108,18 +111,21 @@ const FEWEST: usize = 8;
 impl Noise {
     /// Of all pairs: logarithms of their ratios, what the machine did, and the share of waiting.
     ///
-    /// The settings are alike in most, so that their scatter is noise: of the median deviation d of n normal
-    /// numbers, 1.48 d is the standard deviation, and the largest of n is below √(2 ln n) + 1 of these 19 times
-    /// in 20.
+    /// The settings are alike in most, so that their scatter is noise: the largest of n normal numbers is below
+    /// √(2 ln n) + 1 standard deviations 19 times in 20.
     fn of(logs: &[f64], machine: f64, waited: f64) -> Self {
-        let middle = median(logs);
-        let deviations: Vec<f64> = logs.iter().map(|x| (x - middle).abs()).collect();
-        let scatter = if logs.len() < FEWEST { 0.0 } else { 1.4826 * median(&deviations) };
+        let scatter = if logs.len() < FEWEST { 0.0 } else { scatter(logs) };
         let most = (2.0 * (logs.len().max(2) as f64).ln()).sqrt() + 1.0;
         // The loop has no memory and no vectors: half of what it says is not what the settings feel.
         let allowed = PLACEMENT + most * scatter + waited + 0.5 * machine.ln().abs();
         Noise { machine, scatter, waited, allowed }
     }
+}
+
+/// Standard deviation of normal numbers whose median deviation is d: 1.48 d.
+fn scatter(logs: &[f64]) -> f64 {
+    let middle = median(logs);
+    1.4826 * median(&logs.iter().map(|x| (x - middle).abs()).collect::<Vec<_>>())
 }
 
 /// Better, worse, or neither that anybody need act on.
@@ -145,6 +151,11 @@ fn judged(growth: f64, threshold: f64) -> Verdict {
     }
 }
 
+/// The same, of a growth that is known within an interval: [`Verdict::Same`] where that contains 1.
+fn judged_within(growth: f64, [low, high]: [f64; 2], threshold: f64) -> Verdict {
+    if low <= 1.0 && 1.0 <= high { Verdict::Same } else { judged(growth, threshold) }
+}
+
 impl ErrorChange {
     /// Whether a single bit differs.
     pub fn changed(&self) -> bool {
@@ -166,8 +177,7 @@ impl ErrorChange {
 impl TimeChange {
     /// See [`Verdict`]; a difference that cannot be told from noise is none.
     pub fn verdict(&self, threshold: f64) -> Verdict {
-        let [low, high] = self.interval;
-        if low <= 1.0 && 1.0 <= high { Verdict::Same } else { judged(self.ratio, threshold) }
+        judged_within(self.ratio, self.interval, threshold)
     }
 }
 
@@ -195,6 +205,8 @@ pub struct Comparison {
     pub threshold: f64,
     /// Settings that both have.
     pub pairs: Vec<Pair>,
+    /// Solvers against the others.
+    pub solvers: Vec<SolverChange>,
     /// Settings that only the first has, and only the second.
     pub alone: [usize; 2],
     /// Words for what was chosen differently, and where.
@@ -210,6 +222,7 @@ impl Comparison {
                 || p.time.is_some_and(|t| t.verdict(self.threshold) == Verdict::Worse)
         };
         self.pairs.iter().any(worse)
+            || self.solvers.iter().any(|s| s.verdict(self.threshold) == Verdict::Worse)
     }
 }
 
@@ -223,7 +236,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
             pairs.push(pair(one, other));
         }
     }
-    let noise = noise(before, after, &pairs);
+    let (noise, solvers) = (noise(before, after, &pairs), solvers::changes(&pairs));
     for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
         time.ratio /= noise.machine;
         let [low, high] = time.interval.map(|bound| bound / noise.machine);
@@ -244,6 +257,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
         relative: options.relative,
         threshold: options.threshold,
         pairs,
+        solvers,
         alone,
         differences: differences(before, after),
     }

@@ -57,6 +57,16 @@ pub fn text(found: &Comparison, all: bool) -> String {
         (Some(common), true) => format!(": relative to the median, {} times as long", digits(common)),
     };
     text += &section(&format!("Times{common}"), times, all);
+    let changed = found.solvers.iter().filter(|s| s.verdict(found.threshold) != Verdict::Same || all);
+    for s in changed {
+        let [low, high] = s.interval.map(digits);
+        text += &format!(
+            "{}: {} times as long [{low}, {high}], relative to the other solvers on the same scenes ({} settings)\n",
+            s.solver,
+            digits(s.ratio),
+            s.settings
+        );
+    }
     text + if found.regressed() { "regression: yes\n" } else { "regression: no\n" }
 }
 

@@ -39,7 +39,7 @@ use crate::lab::reference::baseline::gauss_seidel_rate;
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::rates;
 use crate::lab::reference::residual::{Summary, Target, contact_residuals, natural_map};
-use replay::{Outcome, Replay, Sequence, Start};
+use replay::{Replay, Replayed, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -293,9 +293,9 @@ fn measure(
     problem: &ContactProblem,
     reference: Option<&Reference>,
     iterations: u32,
-    outcome: &Outcome,
+    outcome: &Replayed,
 ) -> (CurvePoint, bool) {
-    let Outcome { velocities, impulses, .. } = outcome;
+    let Replayed { velocities, impulses, .. } = outcome;
     let unit = problem.impulse_unit();
     let rigid = natural_map(problem, Target::Rigid, velocities, impulses) / unit;
     let mut own_is_rigid = true;

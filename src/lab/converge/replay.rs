@@ -75,7 +75,7 @@ impl fmt::Display for Start {
 
 /// Result of a step.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct Replayed {
     /// v⁺, one per body.
     pub velocities: Vec<Velocity>,
     /// (λn, λt), one per contact point (N·s).
@@ -194,7 +194,7 @@ impl<'a> Replay<'a> {
     }
 
     /// One step of `variant` with `budget`, from the problem's start.
-    pub fn run(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Outcome {
+    pub fn run(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Replayed {
         self.reset(variant, start);
         self.work.observe = true;
         self.work.last_rule = None;
@@ -202,7 +202,7 @@ impl<'a> Replay<'a> {
         let count = self.step(&input, &mut Clock::start(false));
         let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
         let bodies = self.problem.bodies.len();
-        Outcome {
+        Replayed {
             velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
             impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
             sweeps: count.sweeps,

@@ -97,7 +97,7 @@ fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>]) -> [[f64; 2]; 2] {
     [low.map(|x| x - room), high.map(|x| x + room)]
 }
 
-/// Penetration of the darkest color where nothing else is asked for (m): what begins to be seen at a metre.
+/// Penetration of the darkest color where nothing else is asked for (m): what begins to be seen at a meter.
 pub const DARKEST: f64 = 0.01;
 
 /// The picture of a frame, `width` pixels wide, under a title and a line below it. What overlaps by `darkest` (m) or

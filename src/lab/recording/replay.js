@@ -2,13 +2,23 @@
 // Plays the recordings of every `.replay` on the page, all of one replay at the same time.
 // `#t=1.5&play=1&zoom=2` in the address sets the first replay's time (s), whether it plays, and its zoom.
 (() => {
-  const RAMP = [[243, 245, 248], [253, 228, 160], [245, 155, 75], [204, 61, 51], [107, 16, 48]];
+  const LIGHT = {
+    ramp: [[243, 245, 248], [253, 228, 160], [245, 155, 75], [204, 61, 51], [107, 16, 48]],
+    paper: "#fff", ink: "#1f2933", edge: "#52606d", fixed: "#d3d8de", moved: "#d9d2e9", body: "#e3ebf5", grid: "#e4e7eb", force: "#0072b2",
+  };
+  const DARK = {
+    ramp: [[38, 49, 61], [110, 52, 48], [204, 81, 51], [245, 165, 75], [255, 240, 180]],
+    paper: "#14181d", ink: "#e4e7eb", edge: "#9aa5b1", fixed: "#3e4c59", moved: "#3d3557", body: "#26313d", grid: "#323f4b", force: "#7cc4f5",
+  };
+  const isDark = matchMedia("(prefers-color-scheme: dark)");
+  const theme = () => (isDark.matches ? DARK : LIGHT);
   const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 
   const ramp = (share) => {
-    const place = Math.min(Math.max(share, 0), 1) * (RAMP.length - 1);
-    const i = Math.min(Math.floor(place), RAMP.length - 2);
-    const mix = RAMP[i].map((v, k) => Math.round(v + (place - i) * (RAMP[i + 1][k] - v)));
+    const colors = theme().ramp;
+    const place = Math.min(Math.max(share, 0), 1) * (colors.length - 1);
+    const i = Math.min(Math.floor(place), colors.length - 2);
+    const mix = colors[i].map((v, k) => Math.round(v + (place - i) * (colors[i + 1][k] - v)));
     return `rgb(${mix})`;
   };
 
@@ -118,7 +128,7 @@
       recording: recordings[i],
       scene: figure.querySelector(".scene"),
       curves: figure.querySelector(".curves"),
-      color: getComputedStyle(figure).getPropertyValue("--own"),
+      color: getComputedStyle(figure).getPropertyValue("--own").trim(),
     }));
     const end = Math.max(...recordings.map((r) => (r.frames.length - 1) * r.span));
     const tick = Math.min(...recordings.map((r) => r.span));
@@ -218,6 +228,7 @@
     const scaleOf = (w, h) => 0.86 * state.zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), (h - strip) / Math.max(box[3] - box[1], 1e-9));
 
     function drawScene({ recording, scene }) {
+      const { paper, ink, edge, fixed, moved, body: plain, force } = theme();
       const [c, w, h] = fit(scene);
       if (!(w > 0)) return;
       const scale = scaleOf(w, h);
@@ -240,8 +251,8 @@
         const kind = recording.kinds[body];
         // What is too thin for an inside shows its color on its border.
         const bare = kind === "d" && state.depths && deepest > 0;
-        c.strokeStyle = bare && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * depth[body] / deepest) : "#52606d";
-        c.fillStyle = kind === "s" ? "#d3d8de" : kind === "k" ? "#d9d2e9" : state.depths && deepest > 0 ? ramp(depth[body] / deepest) : "#e3ebf5";
+        c.strokeStyle = bare && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * depth[body] / deepest) : edge;
+        c.fillStyle = kind === "s" ? fixed : kind === "k" ? moved : state.depths && deepest > 0 ? ramp(depth[body] / deepest) : plain;
         c.beginPath();
         if (at.length === 1) {
           c.arc(at[0][0], at[0][1], r, 0, 2 * Math.PI);
@@ -272,12 +283,12 @@
           const [dx, dy] = [unit * cut * p.ix, -unit * cut * p.iy];
           const length = Math.hypot(dx, dy);
           const dot = Math.min(Math.max(0.05 * size * scale, 0.6), 3);
-          c.fillStyle = "#1f2933";
+          c.fillStyle = ink;
           c.fillRect(x - dot, y - dot, 2 * dot, 2 * dot);
           if (length < 1.5) continue;
           const head = Math.min(6, 0.5 * length), [u, v] = [dx / length, dy / length];
           const [hx, hy] = [x + dx - head * u, y + dy - head * v];
-          c.strokeStyle = c.fillStyle = "#0072b2";
+          c.strokeStyle = c.fillStyle = force;
           c.lineWidth = Math.min(1.4, 0.6 + 0.02 * size * scale);
           c.beginPath();
           c.moveTo(x, y);
@@ -293,9 +304,9 @@
       // A bar of a round length.
       const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
       const meters = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
-      c.fillStyle = "#fff";
+      c.fillStyle = paper;
       c.fillRect(0, h - strip, w, strip);
-      c.strokeStyle = c.fillStyle = "#1f2933";
+      c.strokeStyle = c.fillStyle = ink;
       c.lineWidth = 1.5;
       c.beginPath();
       c.moveTo(12, h - 14);
@@ -315,6 +326,7 @@
     });
 
     function drawCurves({ recording, curves, color }) {
+      const { ink, grid } = theme();
       const [c, w, h] = fit(curves);
       if (!(w > 0)) return;
       const row = h / Math.max(recording.curves.length, 1), left = 6, right = w - 6;
@@ -324,7 +336,7 @@
       recording.curves.forEach(({ name, unit }, k) => {
         const [low, high] = ranges[k], top = k * row + 16, bottom = (k + 1) * row - 4;
         const up = (v) => bottom - (bottom - top) * Math.log(Math.max(v, low) / low) / Math.log(high / low);
-        c.strokeStyle = "#e4e7eb";
+        c.strokeStyle = grid;
         c.lineWidth = 1;
         c.beginPath();
         for (let d = Math.ceil(Math.log10(low)); d <= Math.log10(high); d++) {
@@ -332,12 +344,13 @@
           c.lineTo(right, up(10 ** d));
         }
         c.stroke();
-        c.strokeStyle = color;
+        // The darkest color of a solver is that of text.
+        c.strokeStyle = color === "#222222" ? ink : color;
         c.lineWidth = 1.6;
         c.beginPath();
         recording.frames.forEach((f, i) => i && (i > 1 ? c.lineTo(across(i * recording.span), up(f.values[k])) : c.moveTo(across(i * recording.span), up(f.values[k]))));
         c.stroke();
-        c.fillStyle = "#1f2933";
+        c.fillStyle = ink;
         c.textAlign = "left";
         c.fillText(name, left, top - 4);
         c.textAlign = "right";
@@ -346,7 +359,7 @@
         c.arc(across(now * recording.span), up(recording.frames[now].values[k]), 3, 0, 7);
         c.fill();
       });
-      c.strokeStyle = "#1f2933";
+      c.strokeStyle = ink;
       c.lineWidth = 1;
       c.beginPath();
       c.moveTo(across(state.time), 0);
@@ -447,6 +460,7 @@
       });
     }
     // On paper the frame is scaled: a canvas of another size would be empty until the next frame.
+    isDark.addEventListener("change", draw);
     new ResizeObserver(() => { if (!matchMedia("print").matches) draw(); }).observe(root);
     draw();
     return { state, seek, step, toggle, draw, end, tick, recordings };

@@ -337,13 +337,17 @@ pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
     found
 }
 
+/// One of these in words.
+pub fn later_line(r: &Record, why: &str) -> String {
+    let order = if r.order == Order::Natural { ", natural order" } else { "" };
+    let time = digits(r.cost_ns() / 1e3);
+    format!("{}: {}, {}{order} ({time} µs) passes its run, then {why}", r.scene, r.solver, r.budget_text)
+}
+
 /// Settings that look good and fail later.
 fn fallen(records: &[Record]) -> String {
     let found = fails_later(records);
-    let lines = found.iter().take(MOST_NOTES).map(|(r, why)| {
-        let time = digits(r.cost_ns() / 1e3);
-        format!("  ! {}: {}, {} ({time} µs) passes its run, then {why}\n", r.scene, r.solver, r.budget_text)
-    });
+    let lines = found.iter().take(MOST_NOTES).map(|(r, why)| format!("  ! {}\n", later_line(r, why)));
     let mut text: String = lines.collect();
     if found.len() > MOST_NOTES {
         text += &format!("  ! and {} more in tables.txt\n", found.len() - MOST_NOTES);

@@ -4,7 +4,7 @@
 //! reference value no distance to it.
 
 /// Version of `study.csv` and `study.json`: it grows with every change that an older program cannot read.
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 
 /// A column.
 #[derive(Clone, Copy, Debug)]
@@ -162,7 +162,7 @@ pub static STUDY: Sheet = Sheet {
             "",
             "whether on the Pareto front of time against the distance to the reference value",
         ),
-        column("holds", "", "yes, or fell, slid, tunnelled or blew up"),
+        column("holds", "", "yes, or fell, slid, tunneled or blew up"),
         column("failed_step", "", "step at which it stopped holding"),
         column("tolerance_penetration_m", "m", "tolerance of penetration_judged_m in a plausible run"),
         column("tolerance_residual", "1", "tolerance of residual_rms_lighter_weights"),

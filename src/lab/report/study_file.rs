@@ -26,14 +26,14 @@ pub struct StudyFile {
     pub missing_scenes: Vec<String>,
     /// Its parts, if it was merged. Times are comparable only within a part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub parts: Vec<Part>,
+    pub parts: Vec<ShardInfo>,
     /// A record per setting, scene by scene.
     pub records: Vec<Record>,
 }
 
 /// A part of a study that was put together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Part {
+pub struct ShardInfo {
     /// Where it ran.
     pub environment: Environment,
     /// Its scenes.
@@ -87,9 +87,9 @@ impl StudyFile {
                 found.push((scene, name));
             }
             match part.parts.is_empty() {
-                true => {
-                    whole.parts.push(Part { environment: part.environment.clone(), scenes: part.scenes() })
-                }
+                true => whole
+                    .parts
+                    .push(ShardInfo { environment: part.environment.clone(), scenes: part.scenes() }),
                 false => whole.parts.extend(part.parts.iter().cloned()),
             }
         }

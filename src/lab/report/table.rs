@@ -12,7 +12,7 @@ budget: substeps; then velocity (vel), relaxation (rel) and position (pos) sweep
 lanes: natural means one contact after the other in natural order; a number means colored order in so many lanes.
 The errors are the same for all lane widths of a budget.
 µs/step: mean over the run, its median and its longest step, ± median deviation of a repeat.  ns/row: time of a sweep per constraint row.
-speed-up: over 1 lane.  holds: yes, or what happened (fell, slid, tunnelled, blew up).
+speed-up: over 1 lane.  holds: yes, or what happened (fell, slid, tunneled, blew up).
 penetration: as judged (99 % of contact points, and the maximum at rest), and maximum.  residual: rms of the
 contact law, in the weight of the lighter body × step, and in the mean weight of a body × step.
 energy, momentum: relative change.  rest speed: rms over the last second.

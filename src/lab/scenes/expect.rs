@@ -16,7 +16,7 @@ pub struct Expect {
     /// Scene of the catalog whose tolerances, and whose observers that nothing else here describes, hold for
     /// this one as long as its bodies are the same.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
-    pub catalogue: Option<String>,
+    pub catalog: Option<String>,
     /// [`Demand::Rests`](super::holds::Demand::Rests)
     #[serde(default, skip_serializing_if = "is_false")]
     pub rests: bool,

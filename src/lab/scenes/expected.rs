@@ -10,7 +10,7 @@ use crate::lab::error::Error;
 impl Expect {
     /// Expectations of a scene of the catalog.
     pub(super) fn of(name: &str, demands: &[Demand], truth: Option<&Truth>, tolerances: &Tolerances) -> Self {
-        let mut expect = Expect { catalogue: Some(name.to_string()), ..Expect::default() };
+        let mut expect = Expect { catalog: Some(name.to_string()), ..Expect::default() };
         for demand in demands {
             match demand {
                 Demand::Rests => expect.rests = true,
@@ -72,7 +72,7 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     let mut demands = expect.demands();
     let mut truth = None;
     let mut tolerances = Tolerances::standard(&scene);
-    if let Some(name) = &expect.catalogue {
+    if let Some(name) = &expect.catalog {
         let (entry, size) = entry_of(name)?;
         let twin = load(name)?.scene;
         if (&twin.bodies, &twin.joints, twin.gravity) == (&scene.bodies, &scene.joints, scene.gravity) {
@@ -89,7 +89,7 @@ pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
     } else if truth.is_none() {
         unchecked.push("a reference value: the file has none".to_string());
     }
-    if demands.is_empty() && expect.catalogue.is_none() {
+    if demands.is_empty() && expect.catalog.is_none() {
         unchecked
             .push("whether it stands, rests or stays inside: the file has no such condition".to_string());
     }

@@ -14,33 +14,35 @@ use glam::DVec2;
 use std::f64::consts::TAU;
 
 /// Why a run does not hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// A body left those it stood on.
     Fell,
     /// A body left its place.
     Slid,
     /// A body went through another.
-    Tunnelled,
+    Tunneled,
     /// Energy came from nowhere.
     BlewUp,
 }
 
 impl Mark {
+    /// All of them.
+    pub const ALL: [Mark; 4] = [Mark::Fell, Mark::Slid, Mark::Tunneled, Mark::BlewUp];
+
     /// For tables.
     pub fn word(self) -> &'static str {
         match self {
             Mark::Fell => "fell",
             Mark::Slid => "slid",
-            Mark::Tunnelled => "tunnelled",
+            Mark::Tunneled => "tunneled",
             Mark::BlewUp => "blew up",
         }
     }
 }
 
 /// The first demand that a run did not meet.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Broken {
     /// The word for it.
     pub mark: Mark,
@@ -101,9 +103,9 @@ impl Demand {
             Demand::Stands => "no body leaves the bodies that it stood on (fell)".to_string(),
             Demand::StaysStacked => "the bodies end up one above the other (fell)".to_string(),
             Demand::StaysWithin(limit) => format!("no body leaves its place by more than {limit} m (slid)"),
-            Demand::Contains(_) => "no body gets out (tunnelled)".to_string(),
+            Demand::Contains(_) => "no body gets out (tunneled)".to_string(),
             Demand::Inside([low, high]) => format!(
-                "no body leaves the box from ({}, {}) to ({}, {}) m (tunnelled)",
+                "no body leaves the box from ({}, {}) to ({}, {}) m (tunneled)",
                 low[0], low[1], high[0], high[1]
             ),
             Demand::Rests => format!("it comes to rest, and stands for {HORIZON} s"),
@@ -115,7 +117,7 @@ impl Demand {
         match self {
             Demand::Stands | Demand::StaysStacked => Mark::Fell,
             Demand::StaysWithin(_) => Mark::Slid,
-            Demand::Contains(_) | Demand::Inside(_) => Mark::Tunnelled,
+            Demand::Contains(_) | Demand::Inside(_) => Mark::Tunneled,
             Demand::Rests | Demand::GainsNoEnergy => Mark::BlewUp,
         }
     }
@@ -199,7 +201,7 @@ impl Watch {
                         .any(|m| m.walls.are_crossed(m.last.inside(from), m.pose(world).inside(to)))
             })
         };
-        let mark = broken.or_else(|| through().then_some(Mark::Tunnelled));
+        let mark = broken.or_else(|| through().then_some(Mark::Tunneled));
         self.broken = mark.map(|mark| Broken { mark, step: world.step_index });
         if self.demands.iter().any(|d| matches!(d, Demand::GainsNoEnergy)) {
             self.energy[1] = self.energy[1].max(energies(world)[0]);
@@ -277,7 +279,7 @@ impl Walls {
             if one.map_or(bodies.kind[i] != BodyKind::Static, |own| own != i) {
                 continue;
             }
-            let frame = if one.is_some() { Frame::default() } else { Frame::of(world, i) };
+            let frame = if one.is_some() { BodyFrame::default() } else { BodyFrame::of(world, i) };
             let place = |v: DVec2| frame.center + frame.rotation.rotate(v);
             let mut corners = Vec::new();
             shape.for_each_vertex(|v| corners.push(place(v.as_dvec2())));
@@ -314,21 +316,21 @@ impl Walls {
 
 /// Center of mass (m) and (cos θ, sin θ) of a body.
 #[derive(Clone, Copy, Debug)]
-struct Frame {
+struct BodyFrame {
     center: DVec2,
     rotation: DVec2,
 }
 
-impl Default for Frame {
+impl Default for BodyFrame {
     fn default() -> Self {
-        Frame { center: DVec2::ZERO, rotation: DVec2::X }
+        BodyFrame { center: DVec2::ZERO, rotation: DVec2::X }
     }
 }
 
-impl Frame {
+impl BodyFrame {
     fn of(world: &World, i: usize) -> Self {
         let center = DVec2::from(world.bodies.center(i));
-        Frame { center, rotation: world.bodies.pose(i).rotation.as_dvec2() }
+        BodyFrame { center, rotation: world.bodies.pose(i).rotation.as_dvec2() }
     }
 
     /// A place of the world in this frame.
@@ -343,19 +345,22 @@ struct MovingWalls {
     body: usize,
     walls: Walls,
     /// After the step before.
-    last: Frame,
+    last: BodyFrame,
 }
 
 impl MovingWalls {
     fn all(world: &World) -> Vec<Self> {
         let kinematic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Kinematic);
-        let of =
-            |body| MovingWalls { body, walls: Walls::of(world, Some(body)), last: Frame::of(world, body) };
+        let of = |body| MovingWalls {
+            body,
+            walls: Walls::of(world, Some(body)),
+            last: BodyFrame::of(world, body),
+        };
         kinematic.map(of).collect()
     }
 
-    fn pose(&self, world: &World) -> Frame {
-        Frame::of(world, self.body)
+    fn pose(&self, world: &World) -> BodyFrame {
+        BodyFrame::of(world, self.body)
     }
 }
 
@@ -399,15 +404,15 @@ mod tests {
         assert_eq!(moved("stack:1", stays, 1, [0.04, 0.5]), None);
         // Half of it below the ground is not through it, its center is.
         assert_eq!(moved("stack:1", &[], 1, [0.0, 0.01]), None);
-        assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunnelled));
-        assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunnelled));
+        assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunneled));
+        assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunneled));
         let yard = &[Demand::Inside([[-1.0, 0.0], [1.0, 2.0]]), Demand::Rests];
         assert_eq!(moved("stack:1", yard, 1, [0.9, 1.9]), None);
-        assert_eq!(moved("stack:1", yard, 1, [0.9, 2.1]), Some(Mark::Tunnelled));
-        assert_eq!(moved("stack:1", yard, 1, [f32::NAN, 1.0]), Some(Mark::Tunnelled));
+        assert_eq!(moved("stack:1", yard, 1, [0.9, 2.1]), Some(Mark::Tunneled));
+        assert_eq!(moved("stack:1", yard, 1, [f32::NAN, 1.0]), Some(Mark::Tunneled));
         // Past the end of the ground.
         let outside = &[Demand::Contains(Outside(|view| usize::from(view.center(1)[0] > 1.0)))];
-        assert_eq!(moved("stack:1", outside, 1, [2.0, 0.5]), Some(Mark::Tunnelled));
+        assert_eq!(moved("stack:1", outside, 1, [2.0, 0.5]), Some(Mark::Tunneled));
     }
 
     #[test]
@@ -460,6 +465,6 @@ mod tests {
         assert_eq!(observe(-3.0, -1.0), None);
         assert_eq!(observe(-1.0, 1.0), None);
         // The ball stands, and the door passes it.
-        assert_eq!(observe(3.0, 1.0), Some(Mark::Tunnelled));
+        assert_eq!(observe(3.0, 1.0), Some(Mark::Tunneled));
     }
 }

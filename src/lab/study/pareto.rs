@@ -11,15 +11,15 @@ use std::cmp::Ordering;
 
 /// What a setting costs and how wrong it is.
 #[derive(Clone, Copy, Debug)]
-pub struct Point<'a> {
+pub struct TimeAndError<'a> {
     /// Times of the setting's fastest lane width.
     pub sample: &'a Sample,
     /// Any error ≥ 0.
     pub error: f64,
 }
 
-impl Point<'_> {
-    fn dominates(&self, other: &Point) -> bool {
+impl TimeAndError<'_> {
+    fn dominates(&self, other: &TimeAndError) -> bool {
         let by_time = compare(self.sample, other.sample);
         (by_time == Ordering::Less && self.error <= other.error)
             || (by_time != Ordering::Greater && self.error < other.error)
@@ -27,7 +27,7 @@ impl Point<'_> {
 }
 
 /// For each point, whether no other dominates it.
-pub fn front(points: &[Point]) -> Vec<bool> {
+pub fn front(points: &[TimeAndError]) -> Vec<bool> {
     points.iter().map(|p| !points.iter().any(|q| q.dominates(p))).collect()
 }
 
@@ -38,7 +38,7 @@ mod tests {
 
     fn fronts(settings: &[(f64, f64)]) -> Vec<bool> {
         let samples: Vec<Sample> = settings.iter().map(|s| sample(vec![vec![s.0; 20]])).collect();
-        let points = samples.iter().zip(settings).map(|(sample, s)| Point { sample, error: s.1 });
+        let points = samples.iter().zip(settings).map(|(sample, s)| TimeAndError { sample, error: s.1 });
         front(&points.collect::<Vec<_>>())
     }
 

@@ -2,7 +2,7 @@
 
 use super::curve::ErrorAxis;
 use super::interleave::Sample;
-use super::pareto::{self, Point};
+use super::pareto::{self, TimeAndError};
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
@@ -56,7 +56,7 @@ pub struct Record {
     /// How wrong the scene may be.
     pub tolerances: Tolerances,
     /// The first demand of the scene that was not met.
-    #[serde(rename = "holds", with = "holding")]
+    #[serde(flatten, with = "holding")]
     pub broken: Option<Broken>,
     /// Conditions that were not checked, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -72,27 +72,29 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
-/// In files `"yes"` if the run holds, otherwise the failure and its step.
+/// In files as in the columns `holds` and `failed_step`.
 mod holding {
-    use super::Broken;
+    use super::{Broken, Mark};
+    use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     #[derive(Serialize, Deserialize)]
-    #[serde(untagged)]
-    enum Holds {
-        Yes(String),
-        No(Broken),
+    struct Words {
+        holds: String,
+        failed_step: Option<u64>,
     }
 
     pub fn serialize<S: Serializer>(broken: &Option<Broken>, serializer: S) -> Result<S::Ok, S::Error> {
-        broken.map_or(Holds::Yes("yes".into()), Holds::No).serialize(serializer)
+        let holds = broken.map_or("yes", |broken| broken.mark.word()).to_string();
+        Words { holds, failed_step: broken.map(|broken| broken.step) }.serialize(serializer)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Broken>, D::Error> {
-        match Holds::deserialize(deserializer)? {
-            Holds::Yes(_) => Ok(None),
-            Holds::No(broken) => Ok(Some(broken)),
-        }
+        let Words { holds, failed_step } = Words::deserialize(deserializer)?;
+        let Some(step) = failed_step else { return Ok(None) };
+        let mark = Mark::ALL.into_iter().find(|mark| mark.word() == holds);
+        let mark = mark.ok_or_else(|| D::Error::custom(format!("'{holds}' is no word of 'holds'")))?;
+        Ok(Some(Broken { mark, step }))
     }
 }
 
@@ -104,7 +106,7 @@ pub struct Later {
     /// The same (s).
     pub seconds: f64,
     /// The first demand that was not met.
-    #[serde(rename = "holds", with = "holding")]
+    #[serde(flatten, with = "holding")]
     pub broken: Option<Broken>,
     /// Root mean square of the speed over the last second (m/s); none where nothing has to rest.
     pub rest_speed_m_s: Option<f64>,
@@ -252,11 +254,11 @@ pub fn mark_fronts(records: &mut [Record]) {
         let fastest: Vec<usize> =
             (0..group.len()).filter(|&i| group[i].holds() && is_fastest(group, i)).collect();
         let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
-            let (indices, points): (Vec<usize>, Vec<Point>) = fastest
+            let (indices, points): (Vec<usize>, Vec<TimeAndError>) = fastest
                 .iter()
                 .filter_map(|&i| {
                     let (sample, error) = (group[i].sample.as_ref()?, error(&group[i])?);
-                    Some((i, Point { sample, error }))
+                    Some((i, TimeAndError { sample, error }))
                 })
                 .unzip();
             let fronts = pareto::front(&points);

@@ -6,7 +6,7 @@ use super::{Case, Failure, Finding, Lab};
 
 pub(super) static CASES: &[Case] = &[
     Case::new(
-        "B15.kilometre",
+        "B15.kilometer",
         "distance of ten boxes at 1 km to their twins at the origin, all steps",
         "m",
         "one rounding of a difference of up to 1 m, 2⁻²⁴ m, per contact",
@@ -17,7 +17,7 @@ pub(super) static CASES: &[Case] = &[
         "B15.far",
         "largest distance from the origin with the same trajectory",
         "m",
-        "1e5 m has to hold, with the tolerance of B15.kilometre",
+        "1e5 m has to hold, with the tolerance of B15.kilometer",
         distance,
         Yes("contacts use differences of positions, taken before rounding"),
     ),

@@ -36,7 +36,7 @@ pub(crate) struct Round {
 
 /// The frame of the moment of touch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct TouchFrame {
     /// Since the beginning of the step (s).
     pub time: f32,
     /// Unit normal from a to b.
@@ -64,7 +64,7 @@ impl Round {
     }
 
     /// The frame in which bodies touch that fly on as they do, if they do so between the times `from` and `to` (s).
-    pub fn frame(&self, [a, b]: [&BodyRow; 2], [from, to]: [f32; 2]) -> Option<Frame> {
+    pub fn frame(&self, [a, b]: [&BodyRow; 2], [from, to]: [f32; 2]) -> Option<TouchFrame> {
         let spins = [a.velocity[2], b.velocity[2]];
         let moved = |k: usize| {
             let (row, c) = ([a, b][k], self.centers[k]);
@@ -94,7 +94,7 @@ impl Round {
             Vec2::new(row.delta[0], row.delta[1]).dot(normal) + sine.mul_add(n, versine * t)
         };
         let separation = -approach * time - (shifted(b, arms[1]) - shifted(a, arms[0]));
-        Some(Frame { time, normal, arms, separation })
+        Some(TouchFrame { time, normal, arms, separation })
     }
 }
 
@@ -102,7 +102,7 @@ fn straight(row: &BodyRow) -> Vec2 {
     Vec2::new(row.velocity[0], row.velocity[1])
 }
 
-impl Frame {
+impl TouchFrame {
     /// Takes the place of the frame in the record of its lane, by `put(vector, value)`.
     pub fn write_record(&self, layout: &Layout, rows: [&BodyRow; 2], mut put: impl FnMut(usize, f32)) {
         let [k_nn, k_tt, _] = couplings(rows, self.arms);

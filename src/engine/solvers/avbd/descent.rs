@@ -72,7 +72,7 @@ pub struct Descent {
 }
 
 /// Further inputs of a pass of block descent.
-pub(crate) struct Bodies<'a> {
+pub(crate) struct DescentInput<'a> {
     pub rows: &'a mut [BodyRow],
     pub kept: &'a mut Kept,
     pub contacts: &'a [Contact],
@@ -117,7 +117,7 @@ impl Descent {
 
     /// Begins a substep of `h` (s): records of all contacts, then bodies go to where they begin, moving for
     /// `motion` (s); of multipliers and penalties remain the shares `keep`.
-    pub(crate) fn begin(&mut self, on: &mut Bodies<'_>, h: f32, motion: f32, keep: [f32; 2]) {
+    pub(crate) fn begin(&mut self, on: &mut DescentInput<'_>, h: f32, motion: f32, keep: [f32; 2]) {
         let Descent { lanes, bodies, ends, contacts } = self;
         at_width!(lanes.width, fill(&lanes.ends, ends, on));
         at_width!(lanes.width, fill(&lanes.contacts, contacts, on));
@@ -148,22 +148,22 @@ impl Descent {
     }
 
     /// Every body takes one step, of errors at the start of the substep the share `alpha` left alone.
-    pub(crate) fn descend(&mut self, on: &mut Bodies<'_>, alpha: f32) {
+    pub(crate) fn descend(&mut self, on: &mut DescentInput<'_>, alpha: f32) {
         at_width!(self.lanes.width, descend(&self.lanes, [&self.bodies, &self.ends], on, alpha));
     }
 
     /// Multipliers take the forces over; penalties of rows within their bounds grow by `beta` (N/m²).
-    pub(crate) fn raise(&mut self, on: &mut Bodies<'_>, alpha: f32, beta: f32) {
+    pub(crate) fn raise(&mut self, on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
         at_width!(self.lanes.width, raise(&self.lanes.contacts, &self.contacts, on, alpha, beta));
     }
 
     /// Points that stick take up how far they have drifted; the others forget it.
-    pub(crate) fn hold(&mut self, on: &mut Bodies<'_>) {
+    pub(crate) fn hold(&mut self, on: &mut DescentInput<'_>) {
         at_width!(self.lanes.width, hold(&self.lanes.contacts, &self.contacts, on));
     }
 
     /// v ← v + (x − y)/h, which is (x − x_begin)/h.
-    pub(crate) fn velocities(&mut self, on: &mut Bodies<'_>, h: f32) {
+    pub(crate) fn velocities(&mut self, on: &mut DescentInput<'_>, h: f32) {
         at_width!(self.lanes.width, velocities(&self.lanes, &self.bodies, on, h));
     }
 }
@@ -183,7 +183,7 @@ fn moved<L: Lanes>(rows: &[BodyRow], index: LaneIndex<L::Index>) -> [L; 4] {
 
 /// The records of contacts, of the places where bodies are.
 #[inline(never)]
-fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut Bodies<'_>) {
+fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut DescentInput<'_>) {
     use quad::*;
     let quads: &[Quad] = bytemuck::cast_slice(on.contacts);
     let kept = on.kept.by_point().map(|points| bytemuck::cast_slice::<f32, Quad>(points));
@@ -238,7 +238,7 @@ fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut Bodies<'_>) {
 
 /// The records of bodies, which are at their inertial place.
 #[inline(never)]
-fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &Bodies<'_>, h: f32) {
+fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &DescentInput<'_>, h: f32) {
     let records: &mut [L] = bytemuck::cast_slice_mut(records);
     let (zero, one, square) = (L::zero(), L::splat(1.0), L::splat(h * h));
     for (record, index) in records.chunks_exact_mut(BODY).zip(lanes.bodies.list().batches()) {
@@ -252,7 +252,7 @@ fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &Bodies<
 }
 
 /// The two rows of a point.
-struct Rows<L> {
+struct BlockRows<L> {
     /// Of the own body, along n and t.
     jacobian: [[L; 3]; 2],
     error: [L; 2],
@@ -261,7 +261,7 @@ struct Rows<L> {
 }
 
 #[inline(always)]
-fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], alpha: L) -> Rows<L> {
+fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], alpha: L) -> BlockRows<L> {
     let n = [record[0], record[1]];
     let t = [n[1], -n[0]];
     let [a_n, a_t, b_n, b_t, separation, first_n, offset, drift, is_there] =
@@ -278,7 +278,7 @@ fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], al
     let normal = is_there.select_positive(normal, L::zero());
     let bound = record[2] * normal;
     let tangent = kept[TANGENT_PENALTY].neg_mul_add(error[1], kept[TANGENT]).max(-bound).min(bound);
-    Rows { jacobian: [[n[0], n[1], a_n], [t[0], t[1], a_t]], error, force: [normal, tangent], bound }
+    BlockRows { jacobian: [[n[0], n[1], a_n], [t[0], t[1], a_t]], error, force: [normal, tangent], bound }
 }
 
 /// The numbers kept at both points of contacts.
@@ -288,7 +288,12 @@ fn kept_of<L: Lanes>([first, second]: [&[Quad]; 2], contact: LaneIndex<L::Index>
 }
 
 #[inline(never)]
-fn descend<L: Lanes>(lanes: &BodyLanes, [bodies, ends]: [&[Block]; 2], on: &mut Bodies<'_>, alpha: f32) {
+fn descend<L: Lanes>(
+    lanes: &BodyLanes,
+    [bodies, ends]: [&[Block]; 2],
+    on: &mut DescentInput<'_>,
+    alpha: f32,
+) {
     let (bodies, ends): (&[L], &[L]) = (bytemuck::cast_slice(bodies), bytemuck::cast_slice(ends));
     let kept = on.kept.by_point().map(|points| bytemuck::cast_slice(points));
     let (contact, other) = (lanes.ends.contact.list(), lanes.ends.other.list());
@@ -350,7 +355,7 @@ fn solve<L: Lanes>([xx, xy, xw, yy, yw, ww]: [L; 6], [fx, fy, fw]: [L; 3]) -> [L
 }
 
 #[inline(never)]
-fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f32, beta: f32) {
+fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
     let records: &[L] = bytemuck::cast_slice(records);
     let [first, second] = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
     let (alpha, beta, most) = (L::splat(alpha), L::splat(beta), L::splat(PENALTY[1]));
@@ -361,7 +366,8 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f
         let new = kept_of::<L>([first, second], contact);
         let new: [[L; 4]; 2] = std::array::from_fn(|p| {
             let [.., normal_penalty, tangent_penalty] = new[p];
-            let Rows { error, force: [normal, tangent], bound, .. } = rows(record, p, x, o, new[p], alpha);
+            let BlockRows { error, force: [normal, tangent], bound, .. } =
+                rows(record, p, x, o, new[p], alpha);
             let grown = |k: L, error: L| beta.mul_add(error.max(-error), k).min(most);
             let slack = bound - tangent.max(-tangent);
             [
@@ -377,7 +383,7 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>, alpha: f
 }
 
 #[inline(never)]
-fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>) {
+fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut DescentInput<'_>) {
     let records: &[L] = bytemuck::cast_slice(records);
     let mut kept = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
     let (zero, reach) = (L::zero(), L::splat(REACH));
@@ -397,7 +403,7 @@ fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut Bodies<'_>) {
 }
 
 #[inline(never)]
-fn velocities<L: Lanes>(lanes: &BodyLanes, records: &[Block], on: &mut Bodies<'_>, h: f32) {
+fn velocities<L: Lanes>(lanes: &BodyLanes, records: &[Block], on: &mut DescentInput<'_>, h: f32) {
     let records: &[L] = bytemuck::cast_slice(records);
     let inv_h = L::splat(1.0 / h);
     for (record, index) in records.chunks_exact(BODY).zip(lanes.bodies.list().batches()) {

@@ -10,7 +10,7 @@ use serde_json::Value;
 #[derive(Debug, Deserialize)]
 pub struct Matrix {
     cases: Vec<Case>,
-    results: Vec<Outcome>,
+    results: Vec<MatrixCell>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -21,7 +21,7 @@ struct Case {
 }
 
 #[derive(Debug, Deserialize)]
-struct Outcome {
+struct MatrixCell {
     case: String,
     solver: String,
     passed: Option<bool>,
@@ -54,7 +54,7 @@ fn shade(margin: f64, passed: bool) -> (String, bool) {
     (format!("#{r:02x}{g:02x}{b:02x}"), light < 130.0)
 }
 
-fn margin_of(outcome: &Outcome) -> f64 {
+fn margin_of(outcome: &MatrixCell) -> f64 {
     outcome.margin.as_f64().unwrap_or(f64::INFINITY)
 }
 

@@ -160,7 +160,7 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         "Scene by scene",
         "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. \
          Beside those of the front stand budget (substeps · sweeps) and lanes. Bars are the quartiles of its blocks of steps. \
-         The grey line is the front: settings that no other beats in time and error. The shaded side is within the \
+         The gray line is the front: settings that no other beats in time and error. The shaded side is within the \
          scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
         by_scene,
     );
@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn the_matrix_is_colored_by_margin() {
         let json = r#"{"cases":[{"case":"A1","what":"slides","required":true}],"results":[
-            {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"truth":1,"tolerance":2},
+            {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"reference":1,"tolerance":2},
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
             {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
         let text = matrix::matrix(&serde_json::from_str(json).unwrap());

@@ -1,7 +1,7 @@
 //! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
 //! tolerances of each scene.
 
-use super::panel::{Band, Frame, Labels, Panel, legend};
+use super::panel::{Band, Labels, Panel, PlotArea, legend};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes};
 use crate::lab::report::style::Style;
@@ -55,7 +55,7 @@ pub fn overview(records: &[Record]) -> String {
     let wrong = |e: &Record| e.worst().map(|x| x.clamp(LEAST, MOST));
     let x = Scale::log(dots.iter().filter_map(|d| wrong(d.entry)).chain([0.1, 10.0]), "");
     let y = Scale::log(dots.iter().map(|d| d.slower).chain([1.0, 3.0]), "×");
-    let frame = Frame {
+    let frame = PlotArea {
         size: [980.0, 560.0],
         title: "",
         names: [

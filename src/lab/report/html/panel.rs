@@ -31,7 +31,7 @@ pub struct Panel {
 }
 
 /// What a panel looks like.
-pub struct Frame<'a> {
+pub struct PlotArea<'a> {
     /// Width and height (pixels).
     pub size: [f64; 2],
     /// Over it.
@@ -44,7 +44,7 @@ pub struct Frame<'a> {
 
 impl Panel {
     /// Draws the frame.
-    pub fn new(frame: &Frame, x: Scale, y: Scale) -> Panel {
+    pub fn new(frame: &PlotArea, x: Scale, y: Scale) -> Panel {
         let [width, height] = frame.size;
         let in_band = |side: Band| if frame.band == side { BAND } else { 0.0 };
         let head = if frame.title.is_empty() { 10.0 } else { 30.0 };

@@ -1,6 +1,6 @@
 //! Work-precision plots: time against three errors, scene by scene, with every number in a table.
 
-use super::panel::{Band, Frame, Labels, Panel};
+use super::panel::{Band, Labels, Panel, PlotArea};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest};
 use crate::engine::constraints::Impacts;
@@ -46,7 +46,8 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
     let tolerance = settings.first().and_then(|e| e.tolerance(axis));
     let xs = held().map(|e| error(e)).chain(tolerance);
     let ys = settings.iter().filter_map(|e| e.time());
-    let frame = Frame { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: Band::Right };
+    let frame =
+        PlotArea { size: [420.0, 330.0], title: "", names: [name, "time of a step"], band: Band::Right };
     let mut panel = Panel::new(&frame, Scale::log(xs, unit), Scale::log(ys, "s"));
     if let Some(tolerance) = tolerance {
         panel.shade_left(tolerance);

@@ -1,6 +1,6 @@
 //! Profiles, lanes, phases and iterations.
 
-use super::panel::{Band, Frame, Panel};
+use super::panel::{Band, Panel, PlotArea};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes, standard};
 use crate::engine::clock::Phase;
@@ -19,7 +19,7 @@ pub fn profiles(records: &[Record]) -> String {
         let title = format!("{} within tolerance", profile.axis.name());
         let share = format!("share of {} scenes", profile.scenes);
         let names = ["time relative to the fastest solver", share.as_str()];
-        let frame = Frame { size: [420.0, 310.0], title: &title, names, band: Band::None };
+        let frame = PlotArea { size: [420.0, 310.0], title: &title, names, band: Band::None };
         let mut x = Scale::log([1.0, most], "×");
         x.low = 0.95;
         x.ticks.retain(|t| t.0 >= 1.0);
@@ -83,7 +83,7 @@ pub fn lanes(records: &[Record]) -> String {
         };
         let title = format!("{} · {colors}", scene[0].scene);
         let panel = |size, title: &str, names, y| {
-            Panel::new(&Frame { size, title, names, band: Band::None }, Scale::steps(&widths), y)
+            Panel::new(&PlotArea { size, title, names, band: Band::None }, Scale::steps(&widths), y)
         };
         let mut speed =
             panel([300.0, 250.0], &title, ["lanes", "speed-up over 1 lane"], Scale::linear(most, "×"));
@@ -203,7 +203,7 @@ pub fn iterations(records: &[Record]) -> String {
                 .filter(|e| e.broke().is_none() && !e.is_natural())
                 .filter_map(|e| Some((e, e.sample.as_ref()?.load.sweeps.max(0.5), e.drawn(axis)?)))
                 .collect();
-            let frame = Frame {
+            let frame = PlotArea {
                 size: [300.0, 230.0],
                 title: &scene[0].scene,
                 names: ["sweeps of a step", name],

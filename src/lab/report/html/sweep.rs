@@ -1,6 +1,6 @@
 //! A sweep in plots: time and errors against the swept value, a curve per solver.
 
-use super::panel::{Band, Frame, Panel, legend};
+use super::panel::{Band, Panel, PlotArea, legend};
 use super::precision::{name, shown};
 use super::scale::{Scale, number};
 use super::setting::{Setting, fastest, scenes};
@@ -71,7 +71,7 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
         Shown::Time => None,
     };
     let ys = held().filter_map(|r| what.of(r)).chain(tolerance);
-    let frame = Frame { size: SIZE, title: "", names: [swept.name, name], band: Band::Top };
+    let frame = PlotArea { size: SIZE, title: "", names: [swept.name, name], band: Band::Top };
     let mut panel = Panel::new(&frame, Scale::at(&values(scene), swept.unit), Scale::log(ys, unit));
     // Tolerances of some scenes change with the value.
     let same = settings.iter().all(|r| match what {

@@ -4,7 +4,7 @@ use super::precision::shown;
 use super::scale::number;
 use super::setting::{Setting, scenes};
 use crate::lab::picture::svg::escaped;
-use crate::lab::report::answer::{fails_later, recommendation, warnings};
+use crate::lab::report::answer::{fails_later, later_line, recommendation, warnings};
 use crate::lab::report::style::Style;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::Record;
@@ -77,11 +77,7 @@ fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: O
 
 /// Who looks good and fails later.
 fn later_lines(records: &[Record]) -> Vec<String> {
-    let found = fails_later(records);
-    let line = |(r, why): &(&Record, String)| {
-        format!("{}: {}, {} passes its run, then {why}.", r.scene, r.solver, r.budget_text)
-    };
-    found.iter().map(line).collect()
+    fails_later(records).iter().map(|(r, why)| later_line(r, why) + ".").collect()
 }
 
 fn row(answer: &Answer, records: &[Record]) -> String {

@@ -1,9 +1,9 @@
-//! Which contacts are hit in the coming step.
+//! Contacts that are hit in the coming step.
 //!
-//! A point is hit if it closes its gap within the step, and comes in faster than what rests can. Forces alone make a speed of
-//! dt |a| in a step. What is to bounce exceeds dt (|n·a_a| + |n·a_b|), and leaves faster than a tenth of that. What is to stop exceeds
-//! twice as much: between two bodies that others push as well, in any direction, 2 dt (|a_a| + |a_b|); against one that nothing
-//! pushes, 2 dt |n·a_b|, so that a wall that moves with a jolt is seen.
+//! A point is hit if it closes its gap within the step and approaches faster than resting bodies can. Forces alone give a speed of
+//! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|) and leave faster than a tenth of that. A
+//! point that only stops has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
+//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen.
 
 use super::{AHEAD, BOUNCES};
 use crate::engine::constraints::Workspace;
@@ -13,17 +13,17 @@ use crate::engine::constraints::records::features::{KernelFeatures, Layout, Oppo
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 
-/// Looks for what is hit; see the [module](self).
+/// Finds contacts that are hit; see the [module](self).
 pub(crate) struct Find<'a> {
     /// Substep (s).
     pub h: f32,
     /// Step (s).
     pub dt: f32,
-    /// Least that forces add to the speed of a dynamic body in a step (m/s).
+    /// Smallest speed that forces add to a dynamic body in a step (m/s).
     pub least_gain: f32,
-    /// No point of a body is faster (m/s).
+    /// Upper bound of the speed of all points (m/s).
     pub fastest: f32,
-    /// Contacts may bounce, and what does not bounce is stopped.
+    /// Whether contacts may bounce, and whether points that do not bounce are stopped.
     pub bounces: bool,
     pub stops: bool,
     /// Lanes of the contacts that are hit, in order.
@@ -45,11 +45,11 @@ impl Pass for Find<'_> {
     }
 }
 
-/// How much faster than what forces make in a step something comes in that is stopped (1). Slower impacts are left to soft contacts, as
-/// loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
+/// Slowest approach that is stopped, as a multiple of the speed that forces give in a step (1). Slower ones are left to soft
+/// contacts, as loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
 const FASTER: f32 = 2.0;
 
-/// Part of what forces make in a step that nothing rests with, in any direction (1).
+/// Speed that no resting body has in any direction, as a multiple of the speed that forces give in a step (1).
 const SLOW: f32 = 0.01;
 
 #[inline(never)]
@@ -128,8 +128,8 @@ fn find<L: Lanes>(
     }
 }
 
-/// The least that forces add to the speed of a dynamic body in a step, and a speed that no point of a body exceeds (m/s); none if
-/// that is slower than any impact.
+/// The smallest speed that forces add to a dynamic body in a step, and an upper bound of the speed of all points (m/s); none if
+/// the bound is slower than any impact.
 pub(crate) fn impact_speeds(work: &Workspace, h: f32, dt: f32) -> Option<[f32; 2]> {
     /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
     const REACH: f32 = 3.0;

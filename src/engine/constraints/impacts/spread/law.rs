@@ -2,8 +2,8 @@
 //!
 //! # Newton and Coulomb
 //!
-//! A point that comes in at the normal velocity v < 0 shall leave at v⁺. Its impulses N along n and T along t
-//! are those of the whole impact, so that friction is bounded by all of N:
+//! A point approaches at the normal velocity v < 0 and has to leave at v⁺. Its impulses N along n and T along t
+//! are those of the whole impact, so all of N bounds friction:
 //!
 //! ```text
 //! k_nn N + k_nt T = v⁺ − v_n       k_nt = I_a⁻¹ (r_a × n)(r_a × t) + I_b⁻¹ (r_b × n)(r_b × t)
@@ -15,22 +15,22 @@
 //!
 //! # Friction takes energy
 //!
-//! Both laws together may make energy: a rod at 45° that comes in along its normal is turned so that its end would slip back, and the
-//! impulse that keeps it from slipping pushes it off (Kane). The work of a point's impulses, from v⁻ before the wave to v⁺ after it, is
+//! Both laws together may create energy (Kane): a rod at 45° that lands on its end is turned so that the end would slip back, and
+//! the impulse that keeps it from slipping pushes the rod off. The work of a point's impulses, from v⁻ before the wave to v⁺ after it, is
 //!
 //! ```text
 //! W = ½ N (v_n⁻ + v_n⁺) + ½ T (v_t⁻ + v_t⁺),      Σ W = K⁺ − K⁻
 //! ```
 //!
-//! so that a wave makes none if W ≤ 0 at each of its points. The first part is −½ N L with L = |v_n⁻| − v⁺, or what height makes of it.
-//! With v_n⁺ as Newton has it, W is a convex function of T, and T = 0 is no gain. So T is bounded to where W ≤ 0, between both roots of
+//! so a wave creates none if W ≤ 0 at each of its points. The first part is −½ N L with L = |v_n⁻| − v⁺, corrected for height.
+//! With v_n⁺ of Newton's law, W is a convex function of T, and T = 0 gains nothing. So T is bounded to W ≤ 0, between the roots of
 //!
 //! ```text
 //! d T² + (k_nn (v_t⁻ + u) + L k_nt) T − L w ≤ 0,      d = k_nn k_tt − k_nt²
 //! ```
 //!
-//! with w the v_n that the point has to gain from neither of its impulses, and u the v_t that it leaves at with T = 0. Impulses stay within the
-//! cone, which is convex. Where Newton and Coulomb take energy, they stay as they are.
+//! with w the v_n that the point has to gain without its impulses, and u the v_t at which it leaves with T = 0. Impulses stay within
+//! the cone, which is convex. Where Newton and Coulomb lose energy, they are not changed.
 
 /// Accumulated impulses along n and t (N·s) after which a point has gained `wanted` (m/s), or as much of it along t
 /// as friction lets it; see the [module](self). `k`: k_nn, k_tt, k_nt (1/kg); `old`: those so far.
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn impulses_so_far_are_part_of_the_whole() {
-        // What (2.6, −1.2) has made is done: nothing is left to gain.
+        // (2.6, −1.2) has given all: nothing is left to gain.
         let [n, t] = rough_impulses([2.0, 3.0, 1.0], 1.0, [2.6, -1.2], [0.0, 0.0]);
         assert!((n - 2.6).abs() < 1e-6 && (t + 1.2).abs() < 1e-6, "{n} {t}");
         // Points that leave by themselves take all of it back.

@@ -1,41 +1,42 @@
-//! Impacts that spread: bodies that are about to hit each other, or have, bounce or stop before the step is solved.
+//! Impacts that spread from body to body, solved before the step.
 //!
 //! # The law
 //!
-//! That of one point is in [`law`]. Which points bounce, and how fast, is decided at the beginning of a *wave*: those that come in. All of them
-//! are solved together, by Gauss–Seidel on accumulated impulses, so that a box that lands flat bounces flat. What comes in then makes the
-//! next wave: through a row of balls an impact runs ball by ball. A point whose rebound is slower than a tenth of what forces make
-//! of rest in a step does not bounce: it *stops* what comes in, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all that
-//! follow. So restitution of zero is the limit of a small one.
+//! [`law`] has that of one point. An impact proceeds in *waves*. At the beginning of a wave all points that approach are found, and
+//! the velocity at which each has to leave is fixed. They are solved together by Gauss–Seidel on accumulated impulses, so a box that
+//! lands flat bounces flat. Points that approach afterwards make the next wave: an impact runs through a row of balls ball by ball.
 //!
-//! Where a body is pushed, its other points are looked at next, until nothing comes in by more than a ten-thousandth of what came in
-//! first. What nothing hits costs nothing.
+//! Let dv be the speed that forces give a resting body in a step. A point whose rebound would be slower than dv/10 does not bounce.
+//! It *stops* the approach, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all later ones. So zero restitution is
+//! the limit of a small one.
 //!
-//! # When in the step
+//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻⁴ of the first. Bodies that nothing hits
+//! cost nothing.
 //!
-//! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 in the place of v. From the gap s it is at the surface
-//! after t, with the speed w₁, bounces, and is from then on on the parabola that has at the beginning of the step
+//! # Time of the impact within the step
+//!
+//! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 instead of v. A point with gap s reaches the surface at the time
+//! t with the speed w₁ and bounces. Its new parabola has these values at the beginning of the step:
 //!
 //! ```text
 //! w₁ = √(w² + 2 a s)   t = 2 s/(w₁ − w)   v⁺ = e w₁ + a t + a h/2   s⁺ = s − t (v⁺ − v)
 //! ```
 //!
-//! So bodies that are given v⁺ and put back by t Δv fly as if hit at t, in the coming step or (t < 0, an overlap) in the
-//! last one. Beyond the end of the step, and deeper than a step, it is at the end and at the beginning, with as much of the energy of
-//! height. What stops touches from t = s/|v| on. One that is pushed again by a body that was hit at t′ is so at the later of both times.
-//! Solvers that find velocities from positions, or that are rivals, bounce at the beginning: not `timed`.
+//! So a body that gets the velocity v⁺ and is moved by −t Δv flies as if it had been hit at t: in the coming step, or, for an overlap
+//! (t < 0), in the last one. Times before the last step or after the coming one are clamped, and v⁺ keeps the energy of height. A point
+//! that stops touches from t = s/|v| on. A point that is pushed again by a body that was hit at t′ takes the later of both times.
+//! Solvers that derive velocities from positions, and those of other engines, bounce at the beginning of the step: not `timed`.
 //!
-//! When the two centers are displaced by D against each other at the time of the impulse, it adds D × λ to angular
-//! momentum with the arms of the step's beginning. So arms end at a point of both bodies then, r_a + D/2 and r_b − D/2;
-//! round shapes have the frame of that moment (`touch.rs`). In the rows themselves and not beside them: what an
-//! impulse does that its row does not know of may add energy, and has shot bodies out of piles.
+//! At the time of the impulse the centers have moved against each other by D. With the arms of the step's beginning the impulse would
+//! add D × λ to the angular momentum. So both arms end at one point at that time, r_a + D/2 and r_b − D/2, and round shapes have
+//! the frame of that time (`touch.rs`). The rows themselves contain this: an impulse with an effect that its row does not know may add
+//! energy, and has shot bodies out of piles.
 //!
 //! # A bound for each island
 //!
-//! Bodies that contacts connect are an island. Impacts of one are solved without a look at the others, so that a scene behaves alike
-//! beside another. Each has 32 waves, in the last 4 of which nothing bounces, and 256 visits of points, 8 for each of the first 64 points that have been
-//! looked at, and 2 for each of the others: what an impact takes grows with what it hits. What comes in even then is stopped by the solver, and no body of the
-//! island is displaced: one might be into a third that nobody has looked at.
+//! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
+//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
+//! solver stops what still approaches then, and bodies of such an island are not moved: they might end up in a body that was not visited.
 
 mod find;
 mod law;
@@ -44,41 +45,41 @@ mod point;
 use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
-use point::{Body, Point, Role, STILL};
+use point::{Body, HitPoint, Role, STILL};
 pub(crate) use point::{Leads, On};
 use std::collections::VecDeque;
 
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
 
-/// Impacts spread until nothing comes in faster than this part of the fastest (1).
+/// Impacts spread until no approach is faster than this share of the fastest (1).
 const TOLERANCE: f32 = 1e-4;
 
-/// The same part over that, where something bounces: what a flat box is turned by in a bounce, the next one multiplies.
+/// Factor on it where something bounces (1): the spin that an error gives to a flat box grows with each bounce.
 const FINER: f32 = 1e-2;
 
-/// A point is looked at for a tenth of its way further than it gets in the step (1).
+/// How far a point is followed, as a multiple of its way in the step (1).
 const AHEAD: f32 = 1.1;
 
-/// Round shapes that come in along the normal of the beginning, but touch later, have the frame of then up to so many steps (1).
+/// Round shapes that touch within so many steps have the frame of that time (1).
 const TURNED: f32 = 2.0;
 
-/// Least rebound over what forces make of rest in a step (1).
+/// Slowest rebound, as a multiple of the speed that forces give a resting body in a step (1).
 const BOUNCES: f32 = 0.1;
 
-/// Part of v⁺ that friction may gain by rounding (1).
+/// Share of v⁺ that friction may gain by rounding (1).
 const ROUNDING: f32 = 1e-6;
 
-/// Waves of an island, and how many of these nothing bounces in, at the end.
+/// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Visits of an island, for each of its first [`FEW`] points that were looked at, and for each of the others.
+/// Greatest number of visits of an island: a constant, more for each of its first [`FEW`] points, and for each further point.
 const VISITS: [usize; 3] = [256, 8, 2];
 
-/// Points of impacts that are followed to their end (1): a crowd's are finished by the sweeps of the step.
+/// Impacts of so many points are followed to their end (1); those of more are finished by the sweeps of the step.
 const FEW: usize = 64;
 
-/// Spreads impacts; keeps its memory from step to step.
+/// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Spread {
     /// Lanes that are hit, of the colored batches and of the serial ones, then of both by island.
@@ -94,7 +95,7 @@ pub struct Spread {
     /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
     listed: Vec<u32>,
     /// In pairs; a point that is not there has no mass.
-    points: Vec<Point>,
+    points: Vec<HitPoint>,
     /// Bodies that were pushed since their points were looked at.
     queue: VecDeque<u32>,
     /// Bodies of the island that were pushed.
@@ -103,7 +104,7 @@ pub struct Spread {
     first: usize,
     /// How often its points were solved.
     visits: usize,
-    /// Slower is solved (m/s).
+    /// Slower approaches count as solved (m/s).
     slowest: f32,
 }
 
@@ -124,7 +125,8 @@ impl Spread {
         &mut self.found
     }
 
-    /// Lets impacts spread from the lanes that were found, island by island; whether there were any, and how many islands were cut off.
+    /// Solves the impacts of the lanes that were found, island by island. Returns how many islands reached their bound; none
+    /// without impacts.
     pub(crate) fn run(&mut self, on: &mut On<'_>) -> Option<usize> {
         if self.found.iter().all(Vec::is_empty) {
             return None;
@@ -161,7 +163,7 @@ impl Spread {
         Some(cut)
     }
 
-    /// Lets the impacts of an island spread; whether all of them could.
+    /// Solves the impacts of an island; false if it reached its bound.
     fn island(&mut self, on: &mut On<'_>, hit: std::ops::Range<usize>) -> bool {
         (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
@@ -226,7 +228,7 @@ impl Spread {
                     let mut turned = *point;
                     turned.turn(&frame, on.rows);
                     on.fall(&mut turned);
-                    // What passes by then is stopped by its row of the beginning in any case: it bounces on that.
+                    // A point that would pass by then is stopped by its row of the beginning in any case, so it bounces on that.
                     if let Some(then) = rebounds(&turned, on, is_first) {
                         turned.round = None;
                         on.turn(&turned, &frame);
@@ -243,7 +245,7 @@ impl Spread {
         any
     }
 
-    /// Gives bodies what has borne them until they were hit, by points that the impact releases; whether there are any.
+    /// Applies the loads that points carried until the impact released them; whether there are any.
     ///
     /// A block that rocks stands on one corner until the other one is hit. Its load F of the step before belongs to the first
     /// corner until t, and in the step that is solved from its beginning on, all of it goes to the second: an error of F t
@@ -287,7 +289,7 @@ impl Spread {
         }
     }
 
-    /// Visits the points of bodies that were pushed, until none is left, or visits are spent; whether it is done.
+    /// Visits the points of bodies that were pushed, until none is left or the bound is reached; whether none is left.
     fn spread(&mut self, on: &mut On<'_>, bounces: bool) -> bool {
         let mut is_done = true;
         while let Some(body) = self.queue.pop_front() {
@@ -310,7 +312,7 @@ impl Spread {
         is_done
     }
 
-    /// Solves a point, if it comes in faster than is solved or has been hit.
+    /// Solves a point, if it approaches fast enough or was hit before.
     fn visit(&mut self, on: &mut On<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
         if point.mass <= 0.0 || point.role == Role::Left && bounces {
@@ -420,7 +422,7 @@ impl Spread {
         }
     }
 
-    /// What stands for the island of a lane.
+    /// The body that stands for the island of a lane.
     fn island_of(&mut self, on: &On<'_>, lane: u32) -> u32 {
         let (lane, lanes) = (lane as usize, on.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
@@ -447,7 +449,7 @@ impl Spread {
     }
 }
 
-/// What stands for the island of a body; paths are halved on the way.
+/// The body that stands for the island of a body; paths are halved on the way.
 fn root(parent: &mut [u32], mut body: u32) -> u32 {
     while parent[body as usize] != body {
         let above = parent[body as usize];
@@ -458,25 +460,25 @@ fn root(parent: &mut [u32], mut body: u32) -> u32 {
 }
 
 /// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
-fn arrival(point: &Point, on: &On<'_>, slowest: f32) -> Option<f32> {
+fn arrival(point: &HitPoint, on: &On<'_>, slowest: f32) -> Option<f32> {
     let ([vn, _], gap) = (point.velocity(on.rows), point.gap(on.rows));
     (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
 }
 
-/// It comes in fast enough to bounce.
-fn will_bounce(point: &Point, on: &On<'_>) -> bool {
+/// Whether it approaches fast enough to bounce.
+fn will_bounce(point: &HitPoint, on: &On<'_>) -> bool {
     let speed = -point.velocity(on.rows)[0];
     point.restitution > 0.0 && speed > point.slow && point.restitution * speed > BOUNCES * point.slow
 }
 
-/// How fast a point that comes in shall leave (m/s), and when it is hit (s); see the [module](self).
-fn rebounds(point: &Point, on: &On<'_>, is_first: bool) -> Option<[f32; 2]> {
+/// Velocity at which an approaching point has to leave (m/s), and the time of its impact (s); see the [module](self).
+fn rebounds(point: &HitPoint, on: &On<'_>, is_first: bool) -> Option<[f32; 2]> {
     if !will_bounce(point, on) {
         return None;
     }
     let (v, s, a, e) = (point.velocity(on.rows)[0], point.gap(on.rows), point.falls, point.restitution);
     let (dt, h) = (on.dt, on.h);
-    // Where it would be at the end of the step, and further.
+    // Its gap at the end of the step and after it.
     if (v - a * 0.5 * (dt + h)).mul_add(AHEAD * dt, s) >= 0.0 {
         return None;
     }
@@ -484,7 +486,7 @@ fn rebounds(point: &Point, on: &On<'_>, is_first: bool) -> Option<[f32; 2]> {
         let w = v - 0.5 * a * h;
         let square = w.mul_add(w, 2.0 * a * s);
         let touch = 2.0 * s / (square.max(0.0).sqrt() - w);
-        // What is deeper has been so before, or is hit because another was.
+        // A deeper point was so before, or is hit because another one was.
         let earliest = if is_first { -dt } else { 0.0 };
         let time = if square > 0.0 && touch > earliest { touch.min(dt) } else { 0.0 };
         if time != 0.0 {

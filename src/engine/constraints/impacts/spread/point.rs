@@ -1,7 +1,7 @@
-//! Contact points that may be hit, and the rows and records that they are of.
+//! Contact points that may be hit, with their rows and records.
 
 use super::NONE;
-use crate::engine::constraints::impacts::touch::{Frame, Round, couplings, write_arms};
+use crate::engine::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
 use crate::engine::constraints::kernels::frame::turn;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::features::{Features, Layout};
@@ -9,17 +9,17 @@ use crate::engine::constraints::records::segment::Segment;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes};
 
-/// What is known of a body.
+/// State of a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Body {
     /// Its first end; see `next`.
     pub first: u32,
-    /// When it was last pushed (s); −∞ for never.
+    /// Time of the last push (s); −∞ without one.
     pub time: f32,
     pub is_queued: bool,
     /// Its velocity before anything pushed it (m/s, m/s, rad/s).
     pub flown: [f32; 3],
-    /// What rounding has taken from its velocity, to be added next (m/s, m/s, rad/s): there may be very many pushes.
+    /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): there may be very many.
     pub rounded: [f32; 3],
 }
 
@@ -27,15 +27,15 @@ pub(super) struct Body {
 pub(super) const STILL: Body =
     Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 3], rounded: [0.0; 3] };
 
-/// What a point does.
+/// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Role {
     /// Nothing has hit it.
     #[default]
     Open,
-    /// It stops what comes in, from now on.
+    /// It stops any approach from now on.
     Stops,
-    /// It leaves at its target in this wave.
+    /// It leaves at its target velocity in this wave.
     Bounces,
     /// It has bounced in a wave before.
     Left,
@@ -43,7 +43,7 @@ pub(super) enum Role {
 
 /// A contact point that may be hit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Point {
+pub(super) struct HitPoint {
     pub lane: u32,
     pub index: u32,
     pub contact: u32,
@@ -63,17 +63,17 @@ pub(super) struct Point {
     /// Coefficient of restitution (1).
     pub restitution: f32,
     pub role: Role,
-    /// At which it shall leave in this wave (m/s).
+    /// Target of v_n in this wave (m/s).
     pub target: f32,
     /// v_t before the wave, and what of |v_n| it shall lose (m/s).
     pub slip: f32,
     pub lost: f32,
-    /// Acceleration of approach, and the speed that forces make in a step between both bodies (m/s², m/s).
+    /// Acceleration of approach, and the relative speed that forces give in a step (m/s², m/s).
     pub falls: f32,
     pub slow: f32,
-    /// At the beginning of the step (m).
+    /// Gap at the beginning of the step (m).
     pub separation: f32,
-    /// Impulses along n and t that are not final (N·s), those when the wave began, and what earlier waves gave.
+    /// Impulses along n and t so far (N·s), those at the beginning of the wave, and those of earlier waves.
     pub impulse: [f32; 2],
     pub begun: [f32; 2],
     pub given: [f32; 2],
@@ -83,20 +83,20 @@ pub(super) struct Point {
     pub time: f32,
     /// From a to b, as far as they have moved against each other when arms end at one point (m).
     pub apart: [f32; 2],
-    /// What is round, until it is hit.
+    /// Its round shapes, until it is hit.
     pub round: Option<Round>,
-    /// It is of a round shape.
+    /// Whether a shape is round.
     pub is_round: bool,
 }
 
-/// What [`super::Spread::run`] works on.
+/// The data that [`super::Spread::run`] works on.
 pub(crate) struct On<'a> {
     pub rows: &'a mut [BodyRow],
     /// Colored batches, serial ones.
     pub batches: [&'a mut Batches; 2],
     pub contacts: &'a mut [Contact],
     pub features: &'a Features,
-    /// What forces add to the velocities of rows in a substep (m/s).
+    /// Changes of velocity by forces in a substep (m/s).
     pub increments: &'a [[f32; 4]],
     /// Times of the frames that contacts have (s), and at which place of how many numbers each: see [`Leads`].
     pub leads: Leads<'a>,
@@ -112,7 +112,7 @@ pub(crate) struct On<'a> {
     pub bounces: bool,
 }
 
-/// Since when in a step contacts have the frames of their records.
+/// Times within the step at which contacts have the frames of their records.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leads<'a> {
     /// What a solver keeps per contact; empty if all frames are of the beginning.
@@ -135,7 +135,7 @@ impl Leads<'_> {
 }
 
 /// Where the record of a lane is.
-pub(super) struct Place {
+pub(super) struct LanePlace {
     /// Which batches.
     pub part: usize,
     /// Its lane in these, and how many there are in a batch.
@@ -148,7 +148,7 @@ pub(super) struct Place {
 }
 
 impl On<'_> {
-    pub(super) fn place(&self, lane: u32) -> Place {
+    pub(super) fn place(&self, lane: u32) -> LanePlace {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         let (batches, width) = (&self.batches[part], self.batches[part].width());
@@ -157,7 +157,7 @@ impl On<'_> {
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
         let layout = Layout::for_features(self.features, segment.opposite);
-        Place {
+        LanePlace {
             part,
             of,
             width,
@@ -168,32 +168,32 @@ impl On<'_> {
     }
 
     /// A point has the frame of the moment of touch.
-    pub(super) fn turn(&mut self, point: &Point, frame: &Frame) {
-        let Place { part, width, first, layout, .. } = self.place(point.lane);
+    pub(super) fn turn(&mut self, point: &HitPoint, frame: &TouchFrame) {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let rows = point.rows.map(|row| &self.rows[row as usize]);
         frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
     }
 
     /// What is left of the step is solved with the arms of the impact.
-    pub(super) fn put(&mut self, point: &Point) {
-        let Place { part, width, first, layout, .. } = self.place(point.lane);
+    pub(super) fn put(&mut self, point: &HitPoint) {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let put = |vector: usize, value: f32| floats[first + vector * width] = value;
         write_arms(&layout, point.index as usize, point.arms, [point.mass, 1.0 / point.k[1]], put);
     }
 
     /// A point that has bounced leaves by itself: it is not pushed out as well.
-    pub(super) fn leave(&mut self, point: &Point) {
+    pub(super) fn leave(&mut self, point: &HitPoint) {
         let raised = point.gap(self.rows).min(0.0);
-        let Place { part, width, first, layout, .. } = self.place(point.lane);
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         floats[first + layout.at(point.index as usize, layout.separation) * width] -= raised;
     }
 
-    /// A point bears no load any more.
-    pub(super) fn release(&mut self, point: &Point) {
-        let Place { part, width, first, layout, .. } = self.place(point.lane);
+    /// Removes a point's load.
+    pub(super) fn release(&mut self, point: &HitPoint) {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let mut forget = |of: usize| floats[first + layout.at(point.index as usize, of) * width] = 0.0;
         forget(layout.normal_impulse);
@@ -202,8 +202,8 @@ impl On<'_> {
         }
     }
 
-    /// Finds what forces make of both bodies of a point.
-    pub(super) fn fall(&self, point: &mut Point) {
+    /// Computes the effect of forces on both bodies of a point.
+    pub(super) fn fall(&self, point: &mut HitPoint) {
         let [a, b] = point.rows.map(|row| {
             let [x, y, ..] = self.increments[row as usize];
             (point.normal[0].mul_add(x, point.normal[1] * y)) / self.h
@@ -212,8 +212,8 @@ impl On<'_> {
     }
 
     /// The points of a lane.
-    pub(super) fn points(&self, lane: u32) -> [Point; 2] {
-        let Place { part, of, width, first, layout, pushes_a } = self.place(lane);
+    pub(super) fn points(&self, lane: u32) -> [HitPoint; 2] {
+        let LanePlace { part, of, width, first, layout, pushes_a } = self.place(lane);
         let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
         let contact = batches.contact()[of];
@@ -224,7 +224,7 @@ impl On<'_> {
             let is_there = p < layout.points;
             let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
             let mut point =
-                Point { lane, contact, rows, pushes_a, mass, index: p as u32, ..Point::default() };
+                HitPoint { lane, contact, rows, pushes_a, mass, index: p as u32, ..HitPoint::default() };
             if mass <= 0.0 {
                 return point;
             }
@@ -251,7 +251,7 @@ impl On<'_> {
     }
 }
 
-impl Point {
+impl HitPoint {
     /// Velocity of b against a along n and t (m/s).
     pub fn velocity(&self, rows: &[BodyRow]) -> [f32; 2] {
         let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].velocity), self.normal);
@@ -295,7 +295,7 @@ impl Point {
     }
 
     /// Has the frame of the moment of touch from now on.
-    pub(super) fn turn(&mut self, frame: &Frame, rows: &[BodyRow]) {
+    pub(super) fn turn(&mut self, frame: &TouchFrame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
         (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
