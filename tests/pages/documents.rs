@@ -5,11 +5,12 @@ use clap::Parser;
 use simpulse::cli::args::Cli;
 use std::path::{Path, PathBuf};
 
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "papers/README.md",
     "papers/claims.md",
     "papers/contest.md",
+    "papers/joints.md",
     "papers/peers.md",
     "papers/shim.md",
     "papers/solver2d.md",
