@@ -49,7 +49,7 @@ fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let table: &[(&[&str], &[&str])] = &[
-        (&["run", "staack"], &["unknown scene 'staack'", "'stack'", "arch, "]),
+        (&["run", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:x"], &["'x'", "stack"]),
         (&["run", "stack:0"], &["'0'"]),
         (&["scene", "arhc", "--json"], &["'arch'"]),

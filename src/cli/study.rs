@@ -227,10 +227,10 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     }
     plan.check()?;
     let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
+    let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
-    let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
     note(&(without + &not_held + &cost));
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
