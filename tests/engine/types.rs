@@ -353,6 +353,8 @@ fn position_sweeps_move_bodies_of_other_types_and_leave_velocities() {
 fn solvers_that_forget_impulses_forget_those_of_other_types() {
     for (solver, forgets) in [("projection", true), ("tgs_sticky", true), ("pgs", false)] {
         let (mut world, impulses) = pair(solver, LaneWidth::W8, 0.0, 1.0);
+        // Where substeps start cold, a second one would have nothing to do.
+        world.settings.budget.substeps = 1;
         world.step().unwrap();
         let first = impulses.lock().unwrap()[0];
         assert!(first < -0.1, "{solver}: {first}");

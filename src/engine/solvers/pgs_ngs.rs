@@ -4,7 +4,7 @@
 //! **Source.** `catto2024solver2d`, `solve_pgs_ngs`.
 //!
 //! **Departures.** Gaps are closed and no more (speculative contacts), which the source's rigid rows do
-//! not know. Normal rows come before friction rows, as in [`super::pgs`]; the source has them the
+//! not know. A joint is corrected by 0.2 m at most in a sweep, as a contact is. Normal rows come before friction rows, as in [`super::pgs`]; the source has them the
 //! other way round.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and

@@ -40,6 +40,7 @@ fn step(passes: &mut Passes<'_>) {
     for substep in 0..budget.substeps {
         passes.forget_impulses();
         passes.integrate_velocities();
+        passes.drive_joints();
         passes.integrate_positions();
         for _ in 0..budget.position_iterations {
             passes.position_sweep(positions);

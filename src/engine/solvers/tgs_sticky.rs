@@ -79,6 +79,9 @@ impl Solver for TgsSticky {
         self.load(passes);
         for substep in 0..budget.substeps {
             passes.integrate_velocities();
+            if substep > 0 {
+                passes.restart_joints();
+            }
             for _ in 0..budget.velocity_iterations {
                 self.sweep(passes, Phase::Solve, Sticky { h, fraction, push_speed, stick, reach: REACH });
                 passes.iteration_done();

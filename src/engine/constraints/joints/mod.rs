@@ -320,15 +320,16 @@ impl<T: JointType> ConstraintType for Joints<T> {
             (Phase::Prepare, _) => return at_width!(width, Self::fill(self, on)),
             (Phase::Store, _) => return at_width!(width, Self::store(self, on)),
             (Phase::WarmStart, _) => Task::WarmStart { driving: false },
-            (_, PassMode::Position { fraction, max_correction, impulses }) => Task::Position {
-                fraction,
-                max_correction,
-                inv_h: if impulses.is_some() { inv_h } else { 0.0 },
-                first: impulses == Some(true),
-            },
+            (_, PassMode::Position { max_correction, impulses }) => {
+                Task::Position { max_correction, inv_h: if impulses { inv_h } else { 0.0 } }
+            }
             (Phase::Position, _) => Task::Push { law: on.law },
             (Phase::Solve | Phase::Relax, mode) => Task::Velocity {
                 law: on.law,
+                acts: match mode {
+                    PassMode::Drive => [false, true],
+                    _ => [true, !on.driven],
+                },
                 relaxing: on.phase == Phase::Relax,
                 relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
                 inv_h,

@@ -147,6 +147,8 @@ pub(crate) enum Task {
         law: Softness,
         /// Whether bodies have moved since springs were read.
         relaxing: bool,
+        /// Whether rigid rows and limits act, and whether springs and motors do.
+        acts: [bool; 2],
         /// Factor on increments of impulses (1).
         relaxation: f32,
         /// 1/h (1/s)
@@ -159,14 +161,10 @@ pub(crate) enum Task {
     },
     /// Moves bodies until errors are gone.
     Position {
-        /// Share of the error that is removed.
-        fraction: f32,
         /// Largest correction (m or rad).
         max_correction: f32,
         /// 1/h, where displacements are impulses (1/s); else 0.
         inv_h: f32,
-        /// Impulses begin at zero.
-        first: bool,
     },
 }
 
@@ -329,7 +327,11 @@ impl<L: Lanes> JointPass<L> {
                     self.apply(j, impulse, VELOCITY);
                 }
             }
-            Task::Velocity { law: solver, relaxing, relaxation, inv_h } => {
+            Task::Velocity { law: solver, relaxing, relaxation, inv_h, acts } => {
+                let drives = matches!(law, RowLaw::Motor { .. } | RowLaw::Spring { .. });
+                if !acts[usize::from(drives)] {
+                    return;
+                }
                 let one = L::splat(1.0);
                 let mut error = error;
                 let mut speed = L::zero();
@@ -405,10 +407,7 @@ impl<L: Lanes> JointPass<L> {
                     self.apply(&j[i], x[i], VELOCITY);
                 }
             }
-            Task::Position { fraction, max_correction, inv_h, first } => {
-                if first {
-                    impulse.fill(L::zero());
-                }
+            Task::Position { max_correction, inv_h } => {
                 let mut x = error;
                 match law {
                     RowLaw::Rigid => {}
@@ -416,7 +415,7 @@ impl<L: Lanes> JointPass<L> {
                     RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
                 }
                 let bound = L::splat(max_correction);
-                let x = self.solved(&j, x.map(|x| -(L::splat(fraction) * x).min(bound).max(-bound)));
+                let x = self.solved(&j, x.map(|x| (-x).min(bound).max(-bound)));
                 for i in 0..N {
                     self.apply(&j[i], x[i], [DX, DY, TURN]);
                     impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);

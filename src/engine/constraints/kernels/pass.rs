@@ -75,13 +75,13 @@ pub enum PassMode {
     Masses,
     /// Bodies are moved until errors are gone.
     Position {
-        /// Share of an error that is removed (1).
-        fraction: f32,
-        /// Largest correction (m).
+        /// Largest correction (m or rad).
         max_correction: f32,
-        /// Displacements count as impulses of h; these begin at zero in the first sweep of a substep.
-        impulses: Option<bool>,
+        /// Whether displacements count as impulses of h.
+        impulses: bool,
     },
+    /// Only springs and motors act.
+    Drive,
     /// Accumulated impulses are added to those of the step, for metrics.
     Book,
     /// The solver does not start warm: only accumulated impulses are set to zero.

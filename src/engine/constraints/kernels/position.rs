@@ -53,8 +53,7 @@ impl Pass for PositionSweep {
     }
 
     fn mode(&self) -> PassMode {
-        let PositionSweep { fraction, max_correction, .. } = *self;
-        PassMode::Position { fraction, max_correction, impulses: None }
+        PassMode::Position { max_correction: self.max_correction, impulses: false }
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {

@@ -32,6 +32,8 @@ pub struct TypeInput<'a> {
     pub mode: PassMode,
     /// What the pass makes of errors: its rule, for rows that are held both ways.
     pub law: Softness,
+    /// Springs and motors have acted in this substep, in a pass of [`PassMode::Drive`]: they rest.
+    pub driven: bool,
     /// Substep (s).
     pub h: f32,
     /// Lanes that the pass runs at.

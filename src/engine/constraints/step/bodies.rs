@@ -24,6 +24,7 @@ impl Passes<'_> {
 
     /// Body pass: v ← damped v + h a.
     pub fn integrate_velocities(&mut self) {
+        self.driven = false;
         self.over_bodies(Phase::Integrate, |rows, motion| motion.integrate_velocities(rows));
     }
 

@@ -46,6 +46,8 @@ pub struct Passes<'a> {
     bounces: bool,
     /// Rows ask for rebounds.
     biased: bool,
+    /// Springs and motors of joints have acted in this substep.
+    driven: bool,
 }
 
 /// What a solver's own passes over bodies and contacts work on.
@@ -78,8 +80,19 @@ impl<'a> Passes<'a> {
         // A phase that is repeated finds the side records of the step before it.
         let are_prepared = work.impacts.bounces[0].are_prepared();
         let (bounces, biased) = (are_prepared, are_prepared);
-        let mut passes =
-            Passes { work, contacts, clock, input, width, count, iterations: 0, order, bounces, biased };
+        let mut passes = Passes {
+            work,
+            contacts,
+            clock,
+            input,
+            width,
+            count,
+            iterations: 0,
+            order,
+            bounces,
+            biased,
+            driven: false,
+        };
         passes.bounces &= passes.law() != ImpactLaw::Bias;
         passes.biased &= passes.law() == ImpactLaw::Bias;
         passes.set_order(SweepOrder::Forward);
@@ -241,14 +254,24 @@ impl<'a> Passes<'a> {
 
     /// Constraints of other types that come at this rank.
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
-        let (width, mode, law) = (self.width_of(part), pass.mode_of(), pass.law_of());
+        let (width, mode, law, driven) = (self.width_of(part), pass.mode_of(), pass.law_of(), self.driven);
         let Workspace { rows, types, poses, .. } = &mut *self.work;
         for Joined { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
                 let rows = TypeRows::new(rows, pass.sums_of(), mode);
-                kind.run(TypeInput { phase, mode, law, h: self.input.h, width, rows, poses, batches });
+                kind.run(TypeInput {
+                    phase,
+                    mode,
+                    law,
+                    driven,
+                    h: self.input.h,
+                    width,
+                    rows,
+                    poses,
+                    batches,
+                });
             }
         }
     }
@@ -264,6 +287,7 @@ impl<'a> Passes<'a> {
                     phase,
                     mode,
                     law: Softness::RIGID,
+                    driven: self.driven,
                     h: self.input.h,
                     width,
                     rows,

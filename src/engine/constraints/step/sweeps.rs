@@ -26,6 +26,29 @@ impl Passes<'_> {
         self.clock.lap(Phase::Prepare);
     }
 
+    /// Pass over joints alone: their impulses begin at zero, and springs and motors act. For solvers that move bodies
+    /// before they solve: a spring's law is one of velocities that have not moved bodies yet.
+    pub fn drive_joints(&mut self) {
+        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            self.over_types_alone(Phase::Prepare, PassMode::Forget);
+            self.over_types_alone(Phase::Solve, PassMode::Drive);
+            self.driven = true;
+            self.clock.lap(Phase::Solve);
+        }
+    }
+
+    /// Pass over joints alone: books their impulses, which begin at zero again. For solvers whose contacts add up their
+    /// impulses over a step that has several substeps.
+    pub fn restart_joints(&mut self) {
+        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            if self.input.record_impulses {
+                self.over_types_alone(Phase::Store, PassMode::Book);
+            }
+            self.over_types_alone(Phase::Prepare, PassMode::Forget);
+            self.clock.lap(Phase::Solve);
+        }
+    }
+
     /// Constraint pass: applies the accumulated impulses.
     pub fn warm_start(&mut self) {
         self.run(Phase::WarmStart, &mut WarmStart { turned: false });

@@ -107,11 +107,7 @@ impl Pass for Displace<'_> {
     }
 
     fn mode(&self) -> PassMode {
-        PassMode::Position {
-            fraction: 1.0,
-            max_correction: self.push_speed * self.h,
-            impulses: Some(self.first),
-        }
+        PassMode::Position { max_correction: f32::INFINITY, impulses: true }
     }
 
     #[inline(never)]
