@@ -107,6 +107,7 @@ fn fast_bodies_stay_in_their_rooms() {
     assert_eq!(escapes(&on(soft_step)), 0);
     // Else the scenes would be too easy.
     assert!(escapes(&settings(soft_step)) > 20);
+    assert_eq!(escapes(&settings(find("shim").unwrap())), 0);
 }
 
 /// A box between a wall of 2 m and a door that comes at it with 1 m/s and goes on into the wall.
@@ -124,12 +125,29 @@ fn what_a_door_presses_does_not_leave_through_the_wall() {
             door.moving([1.0, 0.0], 0.0),
         ],
     );
-    for variant in ["soft_step", "pgs", "pgs_soft", "box2d", "rapier"] {
+    for variant in ["shim", "soft_step", "pgs", "pgs_soft", "box2d", "rapier"] {
         let mut world = scene.build(on(find(variant).unwrap())).unwrap();
         for step in 0..400 {
             world.step().unwrap();
             let [x, y] = world.bodies.center(2);
             assert!(x < 6.01 && y > -0.01, "{variant} at step {step}: ({x}, {y})");
         }
+    }
+}
+
+/// A rod on its tip, with another body on it, tips over: it is not held where it is while its speed grows.
+#[test]
+fn what_stands_on_its_tip_tips_over() {
+    let case = family("drops").unwrap().case(1, 19);
+    assert!(!run_solver(&case, &on(find("shim").unwrap())).unwrap().has(Verdict::Sunk));
+}
+
+#[test]
+fn where_pistons_leave_no_room_nothing_is_flung_and_nothing_leaves() {
+    let shim = settings(find("shim").unwrap());
+    assert!(shim.continuous);
+    for number in 0..60 {
+        let outcome = run_solver(&family("driven").unwrap().case(1, number), &shim).unwrap();
+        assert!(!outcome.fails(), "driven:{number}: {:?}", outcome.faults);
     }
 }

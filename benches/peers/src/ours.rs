@@ -20,7 +20,8 @@ impl Simpulse {
         broadphase: BroadPhaseKind,
     ) -> Result<Self, String> {
         let solver = solvers::find("soft_step").map_err(|e| e.to_string())?;
-        let mut settings = Settings { broadphase, ..Settings::new(solver).exactly(width) };
+        let continuous = contender.continuous;
+        let mut settings = Settings { broadphase, continuous, ..Settings::new(solver).exactly(width) };
         let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
         set.map_err(|e| e.to_string())?;
         settings.budget.substeps = contender.substeps;
@@ -30,7 +31,8 @@ impl Simpulse {
     /// Another solver at the widest lanes and its own parameters. Errors: as above.
     pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
-        let mut settings = Settings::new(solver).exactly(LaneWidth::W16);
+        let own = Settings::new(solver).exactly(LaneWidth::W16);
+        let mut settings = Settings { continuous: contender.continuous, ..own };
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }

@@ -18,6 +18,16 @@
 //!
 //! it does not get through, and the rest is a matter of contacts: a body that slides along a floor does not stop where
 //! the floor's next segment begins.
+//!
+//! A body that touches at the start, d ≤ δ, has a contact there. With m the distance of its middle from the surface
+//! along n, it moves on until half of its half width is left of it,
+//!
+//! ```text
+//! t = (m − w/2)/(−v·n)                                                             (3)
+//! ```
+//!
+//! so a rod whose tip stands on a floor tips over instead of standing still while its speed grows. What is in deeper is
+//! a matter of [`super::press`].
 
 use crate::engine::narrowphase::collide;
 use crate::engine::params::LINEAR_SLOP;
@@ -65,8 +75,8 @@ pub fn reach(shape: &Shape) -> f32 {
     reach + shape.radius()
 }
 
-/// The part of the step at which `b` is as near to `a` as a contact, if its middle would get through it afterward and
-/// that is before `limit`; else `limit`.
+/// The part of the step at which `b` is as near to `a` as a contact, or by (3) if it is so at the start, if its middle
+/// would get through it afterward and that is before `limit`; else `limit`.
 pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
     let width = b.shape.min_half_extent().min(reach(b.shape));
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
@@ -83,6 +93,12 @@ pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
             return limit;
         }
         if distance <= near {
+            if part == 0.0 {
+                let middles =
+                    manifold.points().iter().map(|p| 0.5 * p.separation - manifold.normal.dot(p.anchor_b));
+                let room = middles.fold(f32::INFINITY, f32::min) - 0.5 * width;
+                return if room > 0.0 { limit.min(room / approach) } else { limit };
+            }
             break;
         }
         part += (distance - 0.5 * near) / (approach.max(0.0) + swing);
@@ -134,6 +150,19 @@ mod tests {
         // Against its side it is.
         let low = mover(&small, 0.0, -0.3, [5.0, 0.0], 0.0);
         assert!((impact(&next, &low, 1.0) - 1.9 / 5.0).abs() < 0.002);
+    }
+
+    #[test]
+    fn what_touches_at_the_start_moves_on_until_its_middle_would_be_in_the_surface() {
+        let (floor, rod) = (rectangle(1.0, 0.5), rectangle(0.02, 0.4));
+        let fixed = mover(&floor, 0.0, -0.5, [0.0; 2], 0.0);
+        // 0.1 mm above the floor, and 1 mm in it, with a way of 0.5 m through it.
+        for height in [1e-4, -1e-3] {
+            let part = impact(&fixed, &mover(&rod, 0.0, 0.4 + height, [0.3, -0.5], 1.0), 1.0);
+            assert!((0.5 * part - (height + 0.39)).abs() < 1e-5, "{height}: {part}");
+        }
+        // In to its middle it is free.
+        assert_eq!(impact(&fixed, &mover(&rod, 0.0, 0.005, [0.3, -0.5], 1.0), 1.0), 1.0);
     }
 
     #[test]

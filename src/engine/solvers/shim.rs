@@ -7,7 +7,7 @@
 //! What goes beyond [`super::soft_step`], in `shim/`:
 //!
 //! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
-//! * `jams.rs`: two bodies that are caught in each other at several shapes begin without impulses;
+//! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
@@ -73,6 +73,7 @@ pub static SOLVER: Variant = Variant {
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
     kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
+    continuous: true,
     make: || Box::new(Shim::default()),
     ..Variant::BASE
 };
@@ -157,7 +158,7 @@ const MECHANISMS: [Mechanism; 11] = [
     },
     Mechanism {
         name: "jams",
-        meaning: "contacts of two bodies that push against each other begin without impulses",
+        meaning: "contacts that push against each other on what is caught or squeezed begin without impulses",
         case: "plastic::a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends",
         lines: lines_of(include_str!("shim/jams.rs")),
     },
@@ -196,7 +197,7 @@ impl Solver for Shim {
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         if !scene.without.leaves_out(part::JAMS) {
-            self.jams.release(scene.contacts);
+            self.jams.release(scene.contacts, &scene.bodies.kind);
         }
         self.place(scene);
         if scene.contacts_changed || scene.gravity != self.gravity {
