@@ -55,6 +55,8 @@ pub struct Moving<'w> {
     pub proxies: &'w [Proxy],
     /// Of the step.
     pub contacts: &'w [Contact],
+    /// Whether two bodies do not collide.
+    pub apart: &'w dyn Fn([u32; 2]) -> bool,
 }
 
 impl Continuous {
@@ -117,7 +119,8 @@ impl Continuous {
                 let proxy = &moving.proxies[other as usize];
                 let [x, y, ..] = rows[proxy.body as usize].delta;
                 let near = overlap(&proxy.aabb.grown(x.abs().max(y.abs())), &swept);
-                if near && proxy.may_meet(&moving.proxies[shape as usize]) {
+                let may_meet = proxy.may_meet(&moving.proxies[shape as usize]);
+                if near && may_meet && !(moving.apart)([proxy.body, body as u32]) {
                     part = part.min(pair(moving, rows, [other, shape], part));
                 }
             }
@@ -135,7 +138,7 @@ impl Continuous {
                 if !proxy.dynamic || proxy.body == body || !proxy.may_meet(mine) {
                     continue;
                 }
-                if !overlap(&swept(moving, rows, other), &own) {
+                if !overlap(&swept(moving, rows, other), &own) || (moving.apart)([proxy.body, body]) {
                     continue;
                 }
                 let part = pair(moving, rows, [other as u32, shape], 1.0);

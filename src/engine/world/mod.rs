@@ -209,7 +209,7 @@ impl World {
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
-            let World { bodies, shapes, proxies, contacts, slots, .. } = self;
+            let World { bodies, shapes, proxies, contacts, slots, joints, .. } = self;
             if std::mem::take(&mut self.continuous_is_stale) {
                 let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes).enumerate();
                 let each = lives.map(|(i, ((&lives, &first), &count))| {
@@ -217,7 +217,8 @@ impl World {
                 });
                 self.continuous.build(each, shapes);
             }
-            let moving = Moving { bodies, shapes, proxies, contacts };
+            let apart = &|pair| joints.keeps_apart(pair);
+            let moving = Moving { bodies, shapes, proxies, contacts, apart };
             self.counts.fast = self.continuous.shorten(moving, &mut self.work.rows);
         }
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);

@@ -19,8 +19,8 @@
 //! The same holds where a kinematic body leaves others no room: with the overlap s that remains and the frequency ω of
 //! the springs, impulses grow to m ω² s h, which moves a body at ω² s h in one substep as soon as the squeeze ends
 //! (800 m/s at 0.25 m). So for a body in a squeeze, contacts count as of one pair whatever they are with. A body is in a
-//! squeeze if contacts deeper than the slop connect it with a kinematic body. Bodies under a heavy one, which are as
-//! deep in each other, keep their impulses.
+//! squeeze if it touches a kinematic body, or contacts deeper than the slop connect it with one that does. Bodies under a
+//! heavy one, which are as deep in each other, keep their impulses.
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::Contact;
@@ -35,6 +35,8 @@ const OPPOSED: f32 = -0.5;
 pub(super) struct Jams {
     /// Deep contacts: bodies that have to be the same, index, and whether its normal counts as it is.
     deep: Vec<([u32; 2], u32, bool)>,
+    /// Bodies that touch a kinematic one.
+    pressed: Vec<u32>,
     /// Whether a body is in a squeeze.
     squeezed: Vec<bool>,
 }
@@ -43,9 +45,15 @@ impl Jams {
     /// Zeroes the impulses of contacts that push against each other. `kinds`: of the bodies.
     pub fn release(&mut self, contacts: &mut [Contact], kinds: &[BodyKind]) {
         self.deep.clear();
+        self.pressed.clear();
         for (i, contact) in contacts.iter().enumerate() {
             if contact.manifold.points().iter().any(|point| point.separation < -LINEAR_SLOP) {
                 self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
+            }
+            for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
+                if kinds[by as usize] == BodyKind::Kinematic {
+                    self.pressed.push(of);
+                }
             }
         }
         self.squeeze(kinds);
@@ -68,13 +76,15 @@ impl Jams {
 
     /// Lists the contacts of bodies in a squeeze once more, by body.
     fn squeeze(&mut self, kinds: &[BodyKind]) {
-        let is = |body: u32, kind| kinds[body as usize] == kind;
-        let presses = |[a, b]: [u32; 2]| is(a, BodyKind::Kinematic) || is(b, BodyKind::Kinematic);
-        if !self.deep.iter().any(|(bodies, ..)| presses(*bodies)) {
+        if self.deep.is_empty() || self.pressed.is_empty() {
             return;
         }
+        let is = |body: u32, kind| kinds[body as usize] == kind;
         self.squeezed.clear();
-        self.squeezed.extend(kinds.iter().map(|kind| *kind == BodyKind::Kinematic));
+        self.squeezed.resize(kinds.len(), false);
+        for &body in &self.pressed {
+            self.squeezed[body as usize] = true;
+        }
         let mut grows = true;
         while grows {
             grows = false;
@@ -101,6 +111,6 @@ impl Jams {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        held(&self.deep) + held(&self.squeezed)
+        held(&self.deep) + held(&self.pressed) + held(&self.squeezed)
     }
 }
