@@ -193,6 +193,18 @@ fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
 }
 
 #[test]
+fn the_start_is_not_the_smallest_residual() {
+    // The relaxation lifts off while sliding: every iterate is farther from the rigid law than no impulse at all.
+    let file = frozen_files().into_iter().find(|f| f.ends_with("sliding-box.frozen")).unwrap();
+    let Frozen { problem, reference } = Frozen::read(&file).unwrap();
+    let report = converge(&problem, reference.as_ref(), &options(&["apgd"])).unwrap();
+    let curve = report.curves.iter().find(|c| c.solver == "apgd" && c.start == Start::Cold).unwrap();
+    let least = curve.points[1..].iter().map(|p| p.rigid).fold(f64::INFINITY, f64::min);
+    assert_eq!((curve.points[0].iterations, curve.rigid.smallest), (0, least));
+    assert!(least > 2.0 * curve.points[0].rigid, "{least} {}", curve.points[0].rigid);
+}
+
+#[test]
 fn every_solver_reaches_its_own_law_on_a_pyramid() {
     let file = frozen_files().into_iter().find(|f| f.ends_with("box-pyramid-5.frozen")).unwrap();
     let Frozen { problem, reference } = Frozen::read(&file).unwrap();
