@@ -113,7 +113,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
 const WIDTH: usize = 150;
 
 /// The same with lines of [`WIDTH`] at most.
-fn wrapped(text: &str) -> String {
+pub fn wrapped(text: &str) -> String {
     let mut wrapped = String::new();
     for line in text.lines() {
         let mut length = 0;

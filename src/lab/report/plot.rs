@@ -58,7 +58,8 @@ fn draw(records: &[Record], text: &mut String) -> Drawn {
 fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
     write(area, "Time of a step against error: lower left is better", (8, 18), 18, HPos::Left)?;
     let mut x = solver_legend(area, solvers, 12, 44)?;
-    let budgets = solvers.iter().map(|s| budgets_of(records, s).len()).max().unwrap_or(0);
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene);
+    let budgets = scenes.flat_map(|own| solvers.iter().map(|s| budgets_of(own, s).len())).max().unwrap_or(0);
     for budget in 0..budgets.min(4) {
         marker(area, (x + 6, 44), budget, &INK)?;
         x += 20;

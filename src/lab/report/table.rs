@@ -80,7 +80,7 @@ pub fn scene_table(records: &[Record]) -> String {
     let mut previous: Option<&Record> = None;
     for record in records {
         rows.add_row(row(record));
-        let key = |r: &Record| (r.solver, r.budget, r.order);
+        let key = |r: &Record| (r.solver, r.budget_text.clone(), r.order);
         let same_order = previous.is_some_and(|p| key(p) == key(record));
         if let (Some(failure), false) = (record.failure, same_order) {
             notes += &format!(

@@ -1,6 +1,8 @@
 //! What a study will take, from its plan alone.
 
+use super::found::Candidate;
 use super::{StudyPlan, is_path};
+use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
@@ -45,7 +47,7 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             bodies = scene.bodies.max(bodies);
             let mut work = (0.0, 0.0);
             for solver in &plan.solvers {
-                for budget in plan.budgets(solver, point)? {
+                for Candidate { budget, .. } in plan.candidates(&scene.name, solver, Impacts::Own, point)? {
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {
                         let widths: Vec<usize> = match order {
