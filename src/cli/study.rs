@@ -13,7 +13,7 @@ use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::Override;
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer, html, sweep};
+use crate::lab::report::{self, answer, html, orders, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::sweep::Sweep;
@@ -42,7 +42,8 @@ Examples:
   simpulse study --scenes stack:10,arch --sweep contact-hertz=15,30,60 --out results/hertz
   simpulse study --scenes mass_ratio --sweep mass-ratio=1,10,100,1000 --out results/ratio
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
-  simpulse study --scenes my.json --solvers all --thorough --out results/my";
+  simpulse study --scenes my.json --solvers all --thorough --out results/my
+  simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
@@ -57,7 +58,7 @@ pub struct StudyArgs {
     /// wider ones are emulated]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
     pub lanes: Vec<LaneWidth>,
-    /// Constraint orders [default: both]
+    /// Constraint orders [default: natural,colored]
     #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
     /// Impact laws: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off.
@@ -105,6 +106,9 @@ pub struct StudyArgs {
     /// for all solvers. Writes them to budgets.csv in the folder
     #[arg(long, conflicts_with_all = ["sweep", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
     pub thorough: bool,
+    /// Each solver at half, once and twice its standard budget, whatever was found
+    #[arg(long, conflicts_with = "thorough")]
+    pub standard: bool,
     /// Print the tables of every scene after the answer
     #[arg(long)]
     pub verbose: bool,
@@ -146,7 +150,7 @@ impl StudyArgs {
             },
             overrides: self.set.clone(),
             sweep: self.sweep.clone(),
-            found: base.found,
+            found: if self.standard { Arc::default() } else { base.found },
             tolerances: tolerances(&self.tolerance)?,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
@@ -296,7 +300,8 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
         true => sweep::text(&study.records, &study.environment),
         false => answer::text(&study.records, &study.environment, steps),
     };
-    let mut text = study.caution() + &answer + &answer::wrapped(&study.budgets());
+    let mut text =
+        study.caution() + &answer + &answer::wrapped(&study.budgets()) + &orders::text(&study.records);
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &format!("\nwrote {} in {}\n", names.join(", "), out.display());

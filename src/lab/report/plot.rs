@@ -10,7 +10,6 @@ use super::axes::{
     write_upwards,
 };
 use super::units::si_short;
-use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::study::Record;
 use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of};
@@ -105,7 +104,7 @@ fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64
     for sample in &curve.samples {
         let place = at(sample.time, sample.error);
         marker(area, place, sample.budget, color)?;
-        if sample.record.order == Order::Natural {
+        if sample.record.order.is_serial() {
             area.draw(&Circle::new(place, 2, WHITE.filled()))?;
         }
     }

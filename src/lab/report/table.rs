@@ -105,9 +105,9 @@ pub fn scene_table(records: &[Record]) -> String {
 
 fn lanes(record: &Record) -> String {
     match record.order {
-        Order::Natural => "natural".to_string(),
         Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
         Order::Colored => record.lanes.to_string(),
+        order => order.name().to_string(),
     }
 }
 

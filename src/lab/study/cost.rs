@@ -51,8 +51,8 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {
                         let widths: Vec<usize> = match order {
-                            Order::Natural => vec![1],
                             Order::Colored => plan.widths.iter().map(|w| w.lanes()).collect(),
+                            _ => vec![1],
                         };
                         let widest = widths.iter().copied().max().unwrap_or(1);
                         let observed = one(widest) + estimate::errors(scene.bodies);

@@ -128,7 +128,7 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
         let own = || records.iter().filter(|r| r.solver == solver);
         let mut samples: Vec<Sample> = Vec::new();
         for (budget, value) in budgets_of(records, solver).iter().enumerate() {
-            for order in [Order::Natural, Order::Colored] {
+            for order in Order::ALL {
                 let same = |r: &&Record| (r.budget, r.parameters.as_str()) == *value && r.order == order;
                 let widths = own().filter(same);
                 let timed = widths.filter(|r| r.holds()).filter_map(|record| {

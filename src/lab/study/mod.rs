@@ -104,7 +104,7 @@ pub struct StudyPlan {
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,
-    /// Constraint orders; natural order has one lane.
+    /// Constraint orders; only colored order has lanes.
     pub orders: Vec<Order>,
     /// Impact laws; scenes where nothing bounces run only the first.
     pub impacts: Vec<Impacts>,
@@ -519,8 +519,8 @@ fn error_runs(
 fn error_run(plan: &StudyPlan, cell: &Cell, order: Order, timed: u32) -> Result<Outcome, Error> {
     let loaded = plan.open_at(cell.name, cell.swept)?;
     let width = match order {
-        Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
+        _ => LaneWidth::W1,
     };
     observe(loaded, settings(plan, cell, order, width), timed)
 }
@@ -595,8 +595,8 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
     let mut rows = Vec::new();
     for (&order, outcome) in plan.orders.iter().zip(outcomes) {
         let widths: &[LaneWidth] = match order {
-            Order::Natural => &[LaneWidth::W1],
             Order::Colored => &plan.widths,
+            _ => &[LaneWidth::W1],
         };
         rows.extend(widths.iter().map(|&width| Row { cell, order, width, outcome }));
     }

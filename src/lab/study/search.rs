@@ -231,7 +231,7 @@ impl Job<'_> {
     /// Colored order at any width gives the same bits; the plan may have natural order alone.
     fn order(&self) -> (Order, LaneWidth) {
         match self.plan.orders[..] {
-            [Order::Natural] => (Order::Natural, LaneWidth::W1),
+            [order] if order.is_serial() => (order, LaneWidth::W1),
             _ => (Order::Colored, native_width()),
         }
     }
