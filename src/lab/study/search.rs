@@ -5,13 +5,14 @@
 //! [`MOST`] in all. They are judged by errors alone, so no clock is read and all cores may work:
 //!
 //! ```text
-//! 81 candidates ─ ⅛ of the run ─► half ─ ¼ ─► half ─ ½ ─► half ─ whole run ─► at most 3, which a study times
+//! 54 candidates ─ 1/16 of the run ─► a quarter ─ 1/4 of the run ─► 6 ─ whole run ─► at most 3, which a study times
 //! ```
 //!
 //! A candidate has an excess over the tolerances of the scene and a *work*: sweeps and substeps of a mean step, as the
-//! solver counts them. The half that stays has those first that no other one beats in both (successive halving of
-//! Jamieson and Talwalkar, "Non-stochastic best arm identification and hyperparameter optimization", 2016, by
-//! non-dominated fronts instead of one loss). Of the last ones a study times the least work that is plausible, that is
+//! solver counts them. Those stay first that no other one beats with as little work and less excess, then those that only
+//! these beat (successive halving of Jamieson and Talwalkar, "Non-stochastic best arm identification and hyperparameter
+//! optimization", 2016, by non-dominated fronts instead of one loss). Nobody is dropped who is not beaten: where nothing
+//! has touched yet, short runs tell nothing. Of the last ones a study times the least work that is plausible, that is
 //! tight and that is exact, each of which has to stand for a minute where the scene rests, and, where these are fewer
 //! than three, the next ones that are plausible. Where none of the last is plausible, the dropped ones run whole as
 //! well, until one is: no solver fails on a scene by a candidate that only short runs have seen.
@@ -39,7 +40,7 @@ pub const SWEEPS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// Most of them in a step.
 pub const MOST_SWEEPS: u32 = 128;
 /// Most candidates of a solver.
-pub const MOST: usize = 81;
+pub const MOST: usize = 54;
 /// Values of stiffness to try beside the standard one, where the solver's row lists none.
 pub const STIFFNESS: [(&str, &[f32]); 4] = [
     ("baumgarte", &[0.1, 0.8]),
@@ -48,10 +49,10 @@ pub const STIFFNESS: [(&str, &[f32]); 4] = [
     ("beta", &[1e4, 1e6]),
 ];
 
-/// Parts of a run after which half is dropped.
-const PARTS: [u32; 3] = [8, 4, 2];
-/// Candidates that run whole, and settings of them that are timed.
-const LAST: usize = 9;
+/// Parts of a run after which a quarter stays.
+const PARTS: [u32; 2] = [16, 4];
+/// Candidates that run whole at least, and settings of them that are timed.
+const LAST: usize = 6;
 const TIMED: usize = 3;
 
 /// The rule in a sentence, for pages.
@@ -190,10 +191,12 @@ impl Job<'_> {
         for part in PARTS {
             let trials = self.judged(&left, Some((scene.steps / part).max(1)))?;
             let points: Vec<[f64; 2]> = trials.iter().map(|t| [t.work, t.excess()]).collect();
-            let order = by_fronts(&points);
-            let kept = left.len().div_ceil(2).max(LAST).min(left.len());
-            dropped.splice(0..0, order[kept..].iter().map(|&i| left[i]));
-            left = order[..kept].iter().map(|&i| left[i]).collect();
+            let fronts = by_fronts(&points);
+            let unbeaten = fronts.first().map_or(0, Vec::len);
+            let kept = left.len().div_ceil(4).max(LAST).max(unbeaten).min(left.len());
+            let order: Vec<Candidate> = fronts.into_iter().flatten().map(|i| left[i]).collect();
+            dropped.splice(0..0, order[kept..].iter().copied());
+            left = order[..kept].to_vec();
         }
         let mut trials = self.judged(&left, self.plan.steps)?;
         let mut dropped = dropped.into_iter();
@@ -284,30 +287,29 @@ fn choose(trials: &[Trial]) -> Vec<usize> {
     sorted
 }
 
-/// Places of points (work, excess): those first that no other one beats in both, then those that only these beat, and
-/// so on; of one front the least excess first. Infinite ones come last, by their work.
-fn by_fronts(points: &[[f64; 2]]) -> Vec<usize> {
+/// Places of points (work, excess): those that no other one beats with as little work and less excess, then those that
+/// only these beat, and so on; of one front the least excess first. Infinite ones come last, by their work.
+fn by_fronts(points: &[[f64; 2]]) -> Vec<Vec<usize>> {
     let (mut left, mut failed): (Vec<usize>, Vec<usize>) =
         (0..points.len()).partition(|&i| points[i][1].is_finite());
-    let less = |a: &usize, b: &usize, by: [usize; 2]| {
-        by.iter()
-            .fold(std::cmp::Ordering::Equal, |found, &k| found.then(points[*a][k].total_cmp(&points[*b][k])))
-    };
-    let beats = |a: usize, b: usize| {
-        let ([w, e], [x, f]) = (points[a], points[b]);
-        w <= x && e <= f && (w < x || e < f)
-    };
-    let mut order = Vec::new();
+    let key = |&i: &usize, by: [usize; 2]| by.map(|k| points[i][k]);
+    let order = |a: [f64; 2], b: [f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+    let beats = |a: usize, b: usize| points[a][0] <= points[b][0] && points[a][1] < points[b][1];
+    let mut fronts = Vec::new();
     while !left.is_empty() {
         let (mut front, rest): (Vec<usize>, Vec<usize>) =
             left.iter().partition(|&&i| !left.iter().any(|&j| beats(j, i)));
-        front.sort_by(|a, b| less(a, b, [1, 0]));
-        order.extend(front);
+        front.sort_by(|a, b| order(key(a, [1, 0]), key(b, [1, 0])));
+        fronts.push(front);
         left = rest;
     }
-    failed.sort_by(|a, b| less(a, b, [0, 1]));
-    order.extend(failed);
-    order
+    failed.sort_by(|a, b| order(key(a, [0, 1]), key(b, [0, 1])));
+    // All alike, and beaten by whatever holds.
+    fronts.extend((!fronts.is_empty() && !failed.is_empty()).then_some(failed.clone()));
+    if fronts.is_empty() {
+        fronts = failed.into_iter().map(|i| vec![i]).collect();
+    }
+    fronts
 }
 
 #[cfg(test)]
@@ -356,7 +358,9 @@ mod tests {
         let infinite = f64::INFINITY;
         let points =
             [[1.0, 9.0], [2.0, 9.0], [3.0, 2.0], [1.0, infinite], [4.0, 3.0], [9.0, 1.0], [0.5, infinite]];
-        assert_eq!(by_fronts(&points), [5, 2, 0, 4, 1, 6, 3]);
+        // 1 has more work than 0 and no less excess, but no more either.
+        assert_eq!(by_fronts(&points), [vec![5, 2, 0, 1], vec![4], vec![6, 3]]);
+        assert_eq!(by_fronts(&points[6..]), [[0]]);
         assert!(by_fronts(&[]).is_empty());
     }
 
