@@ -149,7 +149,7 @@ impl StudyFile {
         }
         if !others.is_empty() {
             text += &format!(
-                "Not searched (each solver at half, once and twice its standard budget; --thorough searches): {}.\n",
+                "Not searched for every solver (half, once and twice the standard budget instead; --thorough searches): {}.\n",
                 others.join(", ")
             );
         }
