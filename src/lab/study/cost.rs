@@ -47,11 +47,17 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             bodies = scene.bodies.max(bodies);
             let mut work = (0.0, 0.0);
             for solver in &plan.solvers {
-                for Candidate { budget, .. } in plan.candidates(&scene.name, solver, Impacts::Own, point)? {
+                let candidates = plan.candidates(&scene.name, solver, Impacts::Own, point)?;
+                for Candidate { budget, .. } in candidates {
+                    let alone = plan.widest_alone(scene.bodies, scene.steps, &budget, solver);
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {
                         let widths: Vec<usize> = match order {
+                            Order::Colored if alone => {
+                                plan.widths.last().map(|w| w.lanes()).into_iter().collect()
+                            }
                             Order::Colored => plan.widths.iter().map(|w| w.lanes()).collect(),
+                            _ if alone => Vec::new(),
                             _ => vec![1],
                         };
                         let widest = widths.iter().copied().max().unwrap_or(1);

@@ -45,6 +45,7 @@ use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant, find};
 use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings, World};
 use crate::lab::error::Error;
+use crate::lab::estimate;
 use crate::lab::files;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
@@ -127,6 +128,9 @@ pub struct StudyPlan {
     /// Random seed of the order of timing runs, and of scenes that have one.
     pub seed: u64,
 }
+
+/// Time of timing a setting in one lane (s), beyond which it is left out.
+const LONG: f64 = 1.0;
 
 impl Default for StudyPlan {
     fn default() -> Self {
@@ -270,6 +274,16 @@ impl StudyPlan {
         self.scenes.iter().filter(lacks).map(String::as_str).collect()
     }
 
+    /// Whether a setting runs in colored order at the widest lanes alone: what was found and takes more than [`LONG`] for its
+    /// timing in one lane, where nobody asked for lanes or orders.
+    fn widest_alone(&self, bodies: usize, steps: u32, budget: &Budget, solver: &Variant) -> bool {
+        let own = StudyPlan::default();
+        let is_open = self.searched() && self.widths == own.widths && self.orders == own.orders;
+        let step = estimate::step(bodies, cost::sweeps(budget, solver), 1);
+        let timed = f64::from(steps.min(self.timing_steps)) * f64::from(self.repeats);
+        is_open && timed * step > LONG
+    }
+
     /// What a solver tries on a scene: the settings that were found for it, under the plan's parameters; the budgets
     /// of the plan where some are given, in a sweep, and where nobody has searched.
     fn candidates(
@@ -362,6 +376,8 @@ struct Cell<'a> {
     impacts: Impacts,
     budget: Budget,
     parameters: Parameters,
+    /// Whether it runs at its widest lanes alone, see [`StudyPlan::widest_alone`].
+    widest_alone: bool,
 }
 
 impl Cell<'_> {
@@ -406,17 +422,22 @@ pub fn run(
             loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
             for &solver in plan.solvers.iter().filter(|solver| loaded.scene.runs_on(solver).is_ok()) {
                 for &impacts in plan.impacts_on(&loaded.scene) {
-                    let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?.into_iter();
-                    let cell = |Candidate { budget, parameters }| Cell {
-                        scene: [i, k],
-                        swept,
-                        name,
-                        solver,
-                        impacts,
-                        budget,
-                        parameters,
-                    };
-                    cells.extend(candidates.map(cell));
+                    let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?;
+                    let (bodies, steps) = (loaded.scene.bodies.len(), loaded.scene.steps);
+                    for Candidate { budget, parameters } in candidates {
+                        let widest_alone = plan.widest_alone(bodies, steps, &budget, solver);
+                        let scene = [i, k];
+                        cells.push(Cell {
+                            scene,
+                            swept,
+                            name,
+                            solver,
+                            impacts,
+                            budget,
+                            parameters,
+                            widest_alone,
+                        });
+                    }
                 }
             }
             variants.push(loaded);
@@ -595,6 +616,8 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
     let mut rows = Vec::new();
     for (&order, outcome) in plan.orders.iter().zip(outcomes) {
         let widths: &[LaneWidth] = match order {
+            Order::Colored if cell.widest_alone => &plan.widths[plan.widths.len() - 1..],
+            _ if cell.widest_alone => &[],
             Order::Colored => &plan.widths,
             _ => &[LaneWidth::W1],
         };

@@ -228,7 +228,7 @@ impl Job<'_> {
 
     fn cell(&self, &Candidate { budget, parameters }: &Candidate) -> Cell<'_> {
         let Job { name, solver, impacts, .. } = *self;
-        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters }
+        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false }
     }
 
     /// Colored order at any width gives the same bits; the plan may have natural order alone.

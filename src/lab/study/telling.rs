@@ -84,7 +84,8 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     };
     let Record { impacts, budget, .. } = *record;
     let parameters = overrides::of_words(solver, &record.parameters)?;
-    let cell = Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters };
+    let cell =
+        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
