@@ -49,7 +49,7 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             for solver in &plan.solvers {
                 let candidates = plan.candidates(&scene.name, solver, Impacts::Own, point)?;
                 for Candidate { budget, .. } in candidates {
-                    let alone = plan.widest_alone(scene.bodies, scene.steps, &budget, solver);
+                    let alone = plan.widest_alone(&scene.name, scene.bodies, scene.steps, &budget, solver);
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {
                         let widths: Vec<usize> = match order {

@@ -276,9 +276,17 @@ impl StudyPlan {
 
     /// Whether a setting runs in colored order at the widest lanes alone: what was found and takes more than [`LONG`] for its
     /// timing in one lane, where nobody asked for lanes or orders.
-    fn widest_alone(&self, bodies: usize, steps: u32, budget: &Budget, solver: &Variant) -> bool {
+    fn widest_alone(
+        &self,
+        scene: &str,
+        bodies: usize,
+        steps: u32,
+        budget: &Budget,
+        solver: &Variant,
+    ) -> bool {
         let own = StudyPlan::default();
-        let is_open = self.searched() && self.widths == own.widths && self.orders == own.orders;
+        let is_found = self.searched() && self.found.of(scene, solver, Impacts::Own).is_some();
+        let is_open = is_found && self.widths == own.widths && self.orders == own.orders;
         let step = estimate::step(bodies, cost::sweeps(budget, solver), 1);
         let timed = f64::from(steps.min(self.timing_steps)) * f64::from(self.repeats);
         is_open && timed * step > LONG
@@ -425,7 +433,8 @@ pub fn run(
                     let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?;
                     let (bodies, steps) = (loaded.scene.bodies.len(), loaded.scene.steps);
                     for Candidate { budget, parameters } in candidates {
-                        let widest_alone = plan.widest_alone(bodies, steps, &budget, solver);
+                        let widest_alone =
+                            plan.widest_alone(&loaded.scene.name, bodies, steps, &budget, solver);
                         let scene = [i, k];
                         cells.push(Cell {
                             scene,
