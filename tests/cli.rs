@@ -193,6 +193,7 @@ fn a_small_study_leaves_whole_files() {
         "study",
         "--scenes",
         "stack:3,bounce",
+        "--standard",
         "--lanes",
         "1,8",
         "--steps",

@@ -152,8 +152,8 @@ fn repeat(plan: &Plan, advice: &Advice) -> String {
     let mut words = vec!["simpulse run".to_string(), quoted(&plan.scene)];
     words.push(format!("--solver {}", solver.name));
     match order {
-        Order::Natural => words.push("--order natural".to_string()),
         Order::Colored => words.push(format!("--lanes {}", chosen.time.map_or(1, |t| t.lanes))),
+        order => words.push(format!("--order {}", order.name())),
     }
     words.push(format!("--substeps {}", budget.substeps));
     let fields = [
@@ -274,8 +274,8 @@ fn name(trial: &Trial) -> String {
 
 fn lanes(trial: &Trial) -> String {
     match trial.setting.order {
-        Order::Natural => "natural order".to_string(),
         Order::Colored => units::lanes(trial.time.map_or(1, |t| t.lanes)),
+        order => format!("{} order", order.name()),
     }
 }
 

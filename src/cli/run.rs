@@ -222,13 +222,13 @@ fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
 pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
     let own = setting.settings()?;
     let own = match (order, lanes) {
-        (Order::Natural, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
-        (Order::Natural, Some(width)) => {
-            let message = format!("{}, but natural order has 1 lane", width.lanes());
-            return Err(Error::invalid("lanes", message));
-        }
         (Order::Colored, Some(width)) => own.exactly(width),
         (Order::Colored, None) => own,
+        (_, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
+        (order, Some(width)) => {
+            let message = format!("{}, but {} order has 1 lane", width.lanes(), order.name());
+            return Err(Error::invalid("lanes", message));
+        }
     };
     Ok(Settings { order, record_impulses: true, ..own })
 }
@@ -369,8 +369,8 @@ fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
 fn how(world: &World) -> String {
     let s = &world.settings;
     let order = match s.order {
-        Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(world.lane_width().lanes()),
+        order => format!("{} order", order.name()),
     };
     format!("{}, {order}", budget::with_impacts(budget::brief(&s.budget, s.solver), s.impacts))
 }

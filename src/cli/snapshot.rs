@@ -92,8 +92,8 @@ pub fn run(args: &SnapshotArgs) -> Result<ExitCode, Error> {
     let frame = Frame::of(&world, &stage, Some(&mut Overlaps::default()));
     let s = &world.settings;
     let order = match s.order {
-        Order::Natural => "natural order".to_string(),
         Order::Colored => lanes(world.lane_width().lanes()),
+        order => format!("{} order", order.name()),
     };
     let time = si(f64::from(args.step) * loaded.scene.dt, "s");
     let title = format!("{} · step {} ({time})", loaded.scene.name, args.step);

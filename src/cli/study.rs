@@ -13,7 +13,7 @@ use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::Override;
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer, html, sweep};
+use crate::lab::report::{self, answer, html, orders, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::sweep::Sweep;
@@ -28,8 +28,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Below the help.
 pub const EXAMPLES: &str = "\
-Without any budget option, each solver runs at half, once and twice its standard budget. With
-budget options, every combination runs; values that a solver ignores are dropped.
+Without any budget option, each solver runs on a scene of the default study at up to three settings
+that were found for both by errors, with the same rule and effort for all (--thorough finds them anew);
+on other scenes at half, once and twice its standard budget. With budget options, every combination
+runs; values that a solver ignores are dropped.
 A sweep runs at each solver's standard budget, in colored order at the widest native lanes,
 unless other options say so.
 
@@ -39,7 +41,9 @@ Examples:
   simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
   simpulse study --scenes stack:10,arch --sweep contact-hertz=15,30,60 --out results/hertz
   simpulse study --scenes mass_ratio --sweep mass-ratio=1,10,100,1000 --out results/ratio
-  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack";
+  simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
+  simpulse study --scenes my.json --solvers all --thorough --out results/my
+  simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
@@ -54,7 +58,7 @@ pub struct StudyArgs {
     /// wider ones are emulated]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
     pub lanes: Vec<LaneWidth>,
-    /// Constraint orders [default: both]
+    /// Constraint orders [default: natural,colored]
     #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
     /// Impact laws: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off.
@@ -98,6 +102,13 @@ pub struct StudyArgs {
     /// Short runs without repeats: an overview in seconds
     #[arg(long)]
     pub quick: bool,
+    /// First search the settings of each solver on each scene, by errors alone: minutes for the default study, an hour
+    /// for all solvers. Writes them to budgets.csv in the folder
+    #[arg(long, conflicts_with_all = ["sweep", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
+    pub thorough: bool,
+    /// Each solver at half, once and twice its standard budget, whatever was found
+    #[arg(long, conflicts_with = "thorough")]
+    pub standard: bool,
     /// Print the tables of every scene after the answer
     #[arg(long)]
     pub verbose: bool,
@@ -139,6 +150,7 @@ impl StudyArgs {
             },
             overrides: self.set.clone(),
             sweep: self.sweep.clone(),
+            found: if self.standard { Arc::default() } else { base.found },
             tolerances: tolerances(&self.tolerance)?,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
@@ -232,6 +244,11 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
     note(&(without + &not_held + &cost));
+    if args.thorough {
+        let bar = Bar::new();
+        plan.found = Arc::new(study::search::search(&plan, &|p| bar.show(p.done, p.total, p.what))?);
+        files::write(&args.out.join(study::found::NAME), &plan.found.to_csv()?)?;
+    }
     let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
     let rescue = {
         let (plan, out, finished, elsewhere) =
@@ -283,7 +300,8 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
         true => sweep::text(&study.records, &study.environment),
         false => answer::text(&study.records, &study.environment, steps),
     };
-    let mut text = study.caution() + &answer;
+    let mut text =
+        study.caution() + &answer + &answer::wrapped(&study.budgets()) + &orders::text(&study.records);
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &format!("\nwrote {} in {}\n", names.join(", "), out.display());

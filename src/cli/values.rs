@@ -119,11 +119,12 @@ pub fn lanes() -> impl TypedValueParser<Value = LaneWidth> {
 
 /// The parser of constraint orders.
 pub fn order() -> impl TypedValueParser<Value = Order> {
-    let natural = PossibleValue::new("natural");
-    let colored = PossibleValue::new("colored").alias("coloured");
-    PossibleValuesParser::new([natural, colored]).map(|name| match name.as_str() {
-        "natural" => Order::Natural,
-        _ => Order::Colored,
+    let names = Order::ALL.map(|order| match order {
+        Order::Colored => PossibleValue::new("colored").alias("coloured"),
+        order => PossibleValue::new(order.name()),
+    });
+    PossibleValuesParser::new(names).map(|name| {
+        Order::ALL.into_iter().find(|order| order.name() == name.as_str()).unwrap_or(Order::Colored)
     })
 }
 

@@ -63,10 +63,28 @@ pub fn brief(variant: &Variant, values: &Parameters) -> String {
     texts.collect::<Vec<_>>().join(" ")
 }
 
+/// What differs from the standard, for [`of_words`].
+pub fn changed(variant: &Variant, values: &Parameters) -> String {
+    let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
+    changed.map(|(p, value)| format!("{}={value}", p.name)).collect::<Vec<_>>().join(" ")
+}
+
 /// All values in words: `contact_hertz=30 contact_damping_ratio=10`.
 pub fn words(variant: &Variant, values: &Parameters) -> String {
     let each = variant.parameters.iter().zip(values).map(|(p, value)| format!("{}={value}", p.name));
     each.collect::<Vec<_>>().join(" ")
+}
+
+/// What [`words`] says of; values that are not named are the standard ones.
+///
+/// Errors: as [`check`].
+pub fn of_words(variant: &Variant, words: &str) -> Result<Parameters, Error> {
+    let mut values = variant.defaults();
+    for word in words.split_whitespace() {
+        let Override { name, value } = word.parse()?;
+        variant.set(&mut values, &name, value)?;
+    }
+    Ok(values)
 }
 
 /// All values by name.
@@ -95,6 +113,15 @@ mod tests {
         assert_eq!(brief(pgs, &values(pgs, &list).unwrap()), "baumgarte 0.5");
         assert!(check(&[pgs], &list).unwrap_err().to_string().contains("soft_step"));
         assert_eq!(by_name(pgs, &values(pgs, &list).unwrap())["baumgarte"], 0.5);
+        for variant in VARIANTS {
+            let mut values = variant.defaults();
+            values[..variant.parameters.len()].iter_mut().for_each(|v| *v *= 0.7);
+            let words = words(variant, &values);
+            // Values below a range are refused, others come back with the same bits.
+            assert!(of_words(variant, &words).map_or(true, |back| back == values), "{words}");
+        }
+        assert_eq!(of_words(soft, "contact_hertz=60").unwrap(), values(soft, &list).unwrap());
+        assert!(of_words(soft, "penalty=3").is_err());
     }
 
     #[test]

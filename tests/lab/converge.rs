@@ -11,7 +11,7 @@ use simpulse::lab::converge::{Curve, Options, Report, converge, plot, table};
 use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
-use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, sliding_box};
+use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, painleve_rod, sliding_box};
 use simpulse::lab::reference::residual::{Target, natural_map};
 use simpulse::lab::reference::sweeps::{Stop, Sweep, pgs};
 use simpulse::lab::reference::{ContactProblem, Pair, Velocity};
@@ -190,6 +190,37 @@ fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
     let soft = report.curves.iter().find(|c| c.solver == "soft_step without relaxing").unwrap();
     assert!(!soft.own_is_rigid && soft.own.first[5].is_some() && soft.rigid.first[1].is_none());
     assert!(soft.rigid.smallest > 0.05 && soft.points[0].own.is_none());
+}
+
+#[test]
+fn the_start_is_not_the_smallest_residual() {
+    // The relaxation lifts off while sliding: every iterate is farther from the rigid law than no impulse at all.
+    let file = frozen_files().into_iter().find(|f| f.ends_with("sliding-box.frozen")).unwrap();
+    let Frozen { problem, reference } = Frozen::read(&file).unwrap();
+    let report = converge(&problem, reference.as_ref(), &options(&["apgd"])).unwrap();
+    let curve = report.curves.iter().find(|c| c.solver == "apgd" && c.start == Start::Cold).unwrap();
+    let least = curve.points[1..].iter().map(|p| p.rigid).fold(f64::INFINITY, f64::min);
+    assert_eq!((curve.points[0].iterations, curve.rigid.smallest), (0, least));
+    assert!(least > 2.0 * curve.points[0].rigid, "{least} {}", curve.points[0].rigid);
+}
+
+#[test]
+fn a_point_whose_load_and_friction_are_one_problem_needs_one_iteration() {
+    // A rod that slides on its lower end: friction presses it down, and load and friction need each other. Slower friction
+    // than sticks, and a rod that slips.
+    for friction in [2.0, 0.4] {
+        let mut problem = painleve_rod(1.0 / 60.0);
+        problem.contacts[0].friction = friction;
+        let report = run(&problem, &["nsgs", "pgs"]);
+        let first = |solver: &str| {
+            let own =
+                |c: &&Curve| c.solver == solver && c.order == Sequence::Natural && c.start == Start::Cold;
+            let curve = report.curves.iter().find(own).unwrap();
+            curve.rigid.first[4].map(|at| curve.points[at].iterations)
+        };
+        assert_eq!(first("nsgs"), Some(1), "µ {friction}");
+        assert!(first("pgs").is_none_or(|k| k > 3), "µ {friction}: {:?}", first("pgs"));
+    }
 }
 
 #[test]

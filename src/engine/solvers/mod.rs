@@ -44,6 +44,7 @@ pub mod jacobi;
 pub mod local_gs;
 pub mod mass_splitting;
 pub mod nncg;
+pub mod nsgs;
 pub mod pgs;
 pub mod pgs_ngs;
 pub mod pgs_ngs_block;
@@ -64,7 +65,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 28] = [
+pub static VARIANTS: [&Variant; 29] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -75,6 +76,7 @@ pub static VARIANTS: [&Variant; 28] = [
     &sor::SOLVER,
     &random_order::SOLVER,
     &local_gs::SOLVER,
+    &nsgs::SOLVER,
     &nncg::SOLVER,
     &anderson::SOLVER,
     &apgd::SOLVER,

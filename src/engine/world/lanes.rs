@@ -27,6 +27,10 @@ impl World {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);
             }
+            Order::Reversed => {
+                self.assignment.serial(work, features, contacts, (0..contacts.len() as u32).rev(), &sides);
+            }
+            Order::Shuffled => self.assignment.shuffled(work, features, contacts, &sides),
             Order::Colored => self.assignment.colored(work, widths, features, contacts, &sides),
         }
         self.counts.colors = self.assignment.colors;

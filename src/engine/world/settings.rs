@@ -14,8 +14,32 @@ use crate::engine::solvers::Variant;
 pub enum Order {
     /// One after the other, sorted by shape pair (width 1 only).
     Natural,
+    /// The natural one from its end (width 1 only).
+    Reversed,
+    /// One after the other, by a hash of the pair of shapes: contacts that stay keep their order (width 1 only).
+    Shuffled,
     /// Color by color.
     Colored,
+}
+
+impl Order {
+    /// Every order.
+    pub const ALL: [Order; 4] = [Order::Natural, Order::Reversed, Order::Shuffled, Order::Colored];
+
+    /// Name on the command line and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Order::Natural => "natural",
+            Order::Reversed => "reversed",
+            Order::Shuffled => "shuffled",
+            Order::Colored => "colored",
+        }
+    }
+
+    /// Whether contacts are solved one by one, in one lane.
+    pub fn is_serial(self) -> bool {
+        self != Order::Colored
+    }
 }
 
 /// Settings of a world: solver, budget, lanes, step, gravity and options.

@@ -308,8 +308,8 @@ fn rank(trials: &mut [Trial]) {
 /// Widths at which a setting may run.
 fn widths(plan: &Plan, order: Order) -> Vec<LaneWidth> {
     match order {
-        Order::Natural => vec![LaneWidth::W1],
         Order::Colored => plan.widths.clone(),
+        _ => vec![LaneWidth::W1],
     }
 }
 

@@ -1,13 +1,14 @@
 //! The grid, the bisection, and what can be left out.
 
 use super::{Plan, Setting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
-use crate::engine::params::{Budget, Parameters};
+use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
 use crate::lab::study::horizon;
 use crate::lab::study::interleave::time_in_turns;
+use crate::lab::study::search::parameters;
 use crate::lab::study::{Failure, Progress, observe, open_scene};
 use std::time::Instant;
 
@@ -79,31 +80,6 @@ pub fn budgets(solver: &Variant) -> Vec<Budget> {
     budgets
 }
 
-/// Values of the solver's parameters to try with substeps of `h` (s): those that its table
-/// lists, without stiffnesses that come to the same.
-pub fn parameters(solver: &Variant, h: f32) -> Vec<Parameters> {
-    let mut all = vec![solver.defaults()];
-    for (place, parameter) in solver.parameters.iter().enumerate().filter(|(_, p)| !p.trials.is_empty()) {
-        let each = |values: &Parameters| {
-            let values = *values;
-            parameter.trials.iter().map(move |&trial| {
-                let mut values = values;
-                values[place] = trial;
-                values
-            })
-        };
-        all = all.iter().flat_map(each).collect();
-    }
-    let Some(softness) = solver.softness else { return all };
-    let mut kept: Vec<Parameters> = Vec::new();
-    for values in all {
-        if !kept.iter().any(|k| softness(k, h) == softness(&values, h)) {
-            kept.push(values);
-        }
-    }
-    kept
-}
-
 impl<'a> Search<'a> {
     /// Nothing tried yet; the clock runs.
     pub fn new(plan: &'a Plan, scene: &'a Scene, progress: &'a dyn Fn(Progress)) -> Self {
@@ -129,7 +105,7 @@ impl<'a> Search<'a> {
         for &solver in &self.plan.solvers {
             for budget in budgets(solver) {
                 let h = self.scene.dt as f32 / budget.substeps as f32;
-                for parameters in parameters(solver, h) {
+                for parameters in parameters(solver, h, |p| p.trials) {
                     let impacts = self.plan.impacts;
                     let of = |&order: &Order| Setting { solver, order, budget, parameters, impacts };
                     grid.extend(orders.iter().map(of));
@@ -284,10 +260,10 @@ mod tests {
     fn capped_stiffnesses_count_once() {
         let soft = find("soft_step").unwrap();
         // The cap is an eighth of the substep rate: 7.5 Hz in 1/60 s, 60 in 1/480, 240 in 1/1920.
-        let count = |rate: f32| parameters(soft, 1.0 / rate).len();
+        let count = |rate: f32| parameters(soft, 1.0 / rate, |p| p.trials).len();
         assert_eq!([count(60.0), count(480.0), count(1920.0)], [1, 3, 4]);
         let pgs = find("pgs").unwrap();
-        assert_eq!(parameters(pgs, 0.01), [pgs.defaults()]);
+        assert_eq!(parameters(pgs, 0.01, |p| p.trials), [pgs.defaults()]);
     }
 
     fn plan(limits: Limits) -> Plan {

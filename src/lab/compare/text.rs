@@ -104,8 +104,8 @@ fn section(title: &str, mut lines: Vec<Line>, all: bool) -> String {
 
 fn cells(pair: &Pair, what: &str, before: String, after: String) -> [String; 7] {
     let width = match pair.order {
-        Order::Natural => "natural".to_string(),
         Order::Colored => lanes(pair.lanes),
+        order => order.name().to_string(),
     };
     [pair.scene.clone(), pair.solver.into(), pair.budget.clone(), width, what.into(), before, after]
 }

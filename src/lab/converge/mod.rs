@@ -102,7 +102,8 @@ pub struct CurvePoint {
 pub struct Reached {
     /// Index into [`Curve::points`] of the first point within each of [`TOLERANCES`].
     pub first: [Option<usize>; TOLERANCES.len()],
-    /// Smallest residual (1).
+    /// Smallest residual after at least one iteration (1): the start is no work of the solver. Infinite where there
+    /// is none.
     pub smallest: f64,
     /// Asymptotic factor per iteration, fitted above the rounding floor; none where the fall is
     /// too fast or too short to fit.
@@ -397,7 +398,7 @@ fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f6
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));
     let residuals: Vec<[f64; 2]> =
         points.iter().filter_map(|p| Some([f64::from(p.iterations), law(p)?])).collect();
-    let smallest = residuals.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    let smallest = residuals.iter().filter(|p| p[0] > 0.0).map(|p| p[1]).fold(f64::INFINITY, f64::min);
     let usable = residuals.iter().position(|p| p[1] <= ABOVE_FLOOR * floor).unwrap_or(residuals.len());
     Reached { first, smallest, rate: rates::rate_at(&residuals[..usable]) }
 }

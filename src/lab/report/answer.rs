@@ -113,7 +113,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
 const WIDTH: usize = 150;
 
 /// The same with lines of [`WIDTH`] at most.
-fn wrapped(text: &str) -> String {
+pub fn wrapped(text: &str) -> String {
     let mut wrapped = String::new();
     for line in text.lines() {
         let mut length = 0;
@@ -176,8 +176,10 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     lanes.sort_unstable();
     lanes.dedup();
     let mut ways: Vec<String> = Vec::new();
-    if records.iter().any(|r| r.order == Order::Natural) {
-        ways.push("natural order".to_string());
+    for order in Order::ALL.into_iter().filter(|order| order.is_serial()) {
+        if records.iter().any(|r| r.order == order) {
+            ways.push(format!("{} order", order.name()));
+        }
     }
     if let Some(widest) = lanes.last() {
         let list: Vec<String> = lanes.iter().map(usize::to_string).collect();
@@ -270,9 +272,9 @@ fn setting(record: &Record) -> [String; 9] {
 /// `7 sub 1 vel 1 rel @8`, the number of lanes behind.
 fn budget(record: &Record) -> String {
     let width = match record.order {
-        Order::Natural => "natural".to_string(),
         Order::Colored if is_emulated(record.lanes) => format!("@{} emulated", record.lanes),
         Order::Colored => format!("@{}", record.lanes),
+        order => order.name().to_string(),
     };
     format!("{} {width}", record.budget_text)
 }
@@ -339,7 +341,7 @@ pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
 
 /// One of these in words.
 pub fn later_line(r: &Record, why: &str) -> String {
-    let order = if r.order == Order::Natural { ", natural order" } else { "" };
+    let order = if r.order.is_serial() { format!(", {} order", r.order.name()) } else { String::new() };
     let time = digits(r.cost_ns() / 1e3);
     format!("{}: {}, {}{order} ({time} µs) passes its run, then {why}", r.scene, r.solver, r.budget_text)
 }

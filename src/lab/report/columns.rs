@@ -48,7 +48,7 @@ pub static STUDY: Sheet = Sheet {
         column("bodies", "", "bodies of the scene"),
         column("dt_s", "s", "length of a step"),
         column("solver", "", "name of the solver"),
-        column("order", "", "constraint order: natural or colored"),
+        column("order", "", "constraint order: natural, reversed, shuffled or colored"),
         column("lanes", "", "lanes per instruction"),
         column("lanes_emulated", "", "whether the build has no instructions so wide"),
         column("substeps", "", "substeps of a step"),

@@ -11,7 +11,7 @@ use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::curve::ErrorAxis;
-use crate::lab::study::{Record, StudyPlan};
+use crate::lab::study::{Record, StudyPlan, search};
 use serde_json::{Value, json};
 
 /// One line of the table file; every number is finite, and what there is not is empty.
@@ -289,6 +289,7 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "orders": plan.orders,
         "impacts": plan.impacts,
         "budgets": plan.budgets,
+        "budget_search": plan.searched().then(|| json!({"rule": search::rule(), "not_searched": plan.not_searched()})),
         "steps": plan.steps,
         "timing_steps": plan.timing_steps,
         "repeats": plan.repeats,

@@ -10,6 +10,8 @@ pub mod export;
 #[doc(hidden)]
 pub mod html;
 #[doc(hidden)]
+pub mod orders;
+#[doc(hidden)]
 pub mod plot;
 #[doc(hidden)]
 pub mod profiles;

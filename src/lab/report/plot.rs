@@ -10,7 +10,6 @@ use super::axes::{
     write_upwards,
 };
 use super::units::si_short;
-use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::study::Record;
 use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of};
@@ -58,7 +57,8 @@ fn draw(records: &[Record], text: &mut String) -> Drawn {
 fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
     write(area, "Time of a step against error: lower left is better", (8, 18), 18, HPos::Left)?;
     let mut x = solver_legend(area, solvers, 12, 44)?;
-    let budgets = solvers.iter().map(|s| budgets_of(records, s).len()).max().unwrap_or(0);
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene);
+    let budgets = scenes.flat_map(|own| solvers.iter().map(|s| budgets_of(own, s).len())).max().unwrap_or(0);
     for budget in 0..budgets.min(4) {
         marker(area, (x + 6, 44), budget, &INK)?;
         x += 20;
@@ -104,7 +104,7 @@ fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64
     for sample in &curve.samples {
         let place = at(sample.time, sample.error);
         marker(area, place, sample.budget, color)?;
-        if sample.record.order == Order::Natural {
+        if sample.record.order.is_serial() {
             area.draw(&Circle::new(place, 2, WHITE.filled()))?;
         }
     }

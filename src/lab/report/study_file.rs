@@ -62,6 +62,7 @@ impl StudyFile {
             let mut settings = study.settings.clone();
             if let Some(map) = settings.as_object_mut() {
                 map.remove("scenes");
+                map.remove("budget_search");
             }
             settings
         };
@@ -109,8 +110,14 @@ impl StudyFile {
         let plans: Vec<Vec<String>> = parts.iter().map(plan).collect();
         let scenes =
             in_turns(plans.iter().map(|p| p.iter().map(|name| vec![name.clone()]).collect()).collect());
+        let not_searched = |study: &StudyFile| study.settings["budget_search"]["not_searched"].clone();
+        let others =
+            parts.iter().flat_map(|p| not_searched(p).as_array().cloned().unwrap_or_default()).collect();
         if let Some(map) = whole.settings.as_object_mut() {
             map.insert("scenes".into(), scenes.into());
+            if let Some(search) = map.get_mut("budget_search").and_then(Value::as_object_mut) {
+                search.insert("not_searched".into(), Value::Array(others));
+            }
         }
         let by_scene = |study: StudyFile| -> Vec<Vec<Record>> {
             study.records.chunk_by(|a, b| a.scene == b.scene).map(<[Record]>::to_vec).collect()
@@ -122,6 +129,31 @@ impl StudyFile {
     /// The scenes that have records, in their order.
     pub fn scenes(&self) -> Vec<String> {
         self.records.chunk_by(|a, b| a.scene == b.scene).map(|scene| scene[0].scene.clone()).collect()
+    }
+
+    /// How the settings were chosen that ran, in a paragraph; empty where the caller chose them.
+    pub fn budgets(&self) -> String {
+        let search = &self.settings["budget_search"];
+        let Some(rule) = search["rule"].as_str() else { return String::new() };
+        let names = |list: &Value| -> Vec<String> {
+            list.as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(|name| Some(name.as_str()?.to_string()))
+                .collect()
+        };
+        let (scenes, others) = (names(&self.settings["scenes"]), names(&search["not_searched"]));
+        let mut text = String::new();
+        if scenes.iter().any(|name| !others.contains(name)) {
+            text += &format!("Budgets: searched among {rule}.\n");
+        }
+        if !others.is_empty() {
+            text += &format!(
+                "Not searched for every solver (half, once and twice the standard budget instead; --thorough searches): {}.\n",
+                others.join(", ")
+            );
+        }
+        text
     }
 
     /// What a reader must know first: scenes that are missing, times of several machines. Empty for a
@@ -235,6 +267,8 @@ mod tests {
         assert_eq!(whole.scenes(), ["a", "b", "c", "d", "e"]);
         assert_eq!(whole.settings["scenes"], serde_json::json!(["a", "b", "c", "d", "e"]));
         assert_eq!((whole.missing_scenes.len(), whole.parts.len()), (0, 2));
+        assert_eq!(whole.settings["budget_search"]["not_searched"].as_array().map(Vec::len), Some(5));
+        assert!(whole.budgets().starts_with("Not searched") && whole.budgets().contains("a, c, e, b, d"));
         assert!(whole.caution().contains("2 runs"), "{}", whole.caution());
         // One part was interrupted before d.
         let cut = StudyFile::merged(vec![of(&["a", "c"], &[]), of(&["b", "d"], &["d"])], &names).unwrap();

@@ -3,7 +3,6 @@
 use super::environment::Environment;
 use super::table::{finish, table};
 use super::units::{bodies, count, digits, ratio, si};
-use crate::engine::world::Order;
 use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
 use crate::lab::study::sweep::Swept;
@@ -140,7 +139,7 @@ fn row(record: &Record) -> Vec<String> {
         record.solver.to_string(),
         value(record).to_string(),
         record.budget_text.clone(),
-        if record.order == Order::Natural { "natural".into() } else { record.lanes.to_string() },
+        if record.order.is_serial() { record.order.name().into() } else { record.lanes.to_string() },
         sample.map_or_else(nothing, |l| digits(l.mean_ns / 1e3)),
         sample.map_or_else(nothing, |l| digits(l.median_ns / 1e3)),
         sample.map_or_else(nothing, |l| digits(l.worst_ns / 1e3)),

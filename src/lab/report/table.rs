@@ -80,7 +80,7 @@ pub fn scene_table(records: &[Record]) -> String {
     let mut previous: Option<&Record> = None;
     for record in records {
         rows.add_row(row(record));
-        let key = |r: &Record| (r.solver, r.budget, r.order);
+        let key = |r: &Record| (r.solver, r.budget_text.clone(), r.order);
         let same_order = previous.is_some_and(|p| key(p) == key(record));
         if let (Some(failure), false) = (record.failure, same_order) {
             notes += &format!(
@@ -105,9 +105,9 @@ pub fn scene_table(records: &[Record]) -> String {
 
 fn lanes(record: &Record) -> String {
     match record.order {
-        Order::Natural => "natural".to_string(),
         Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
         Order::Colored => record.lanes.to_string(),
+        order => order.name().to_string(),
     }
 }
 

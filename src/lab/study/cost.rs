@@ -1,6 +1,8 @@
 //! What a study will take, from its plan alone.
 
+use super::found::Candidate;
 use super::{StudyPlan, is_path};
+use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
@@ -45,12 +47,18 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             bodies = scene.bodies.max(bodies);
             let mut work = (0.0, 0.0);
             for solver in &plan.solvers {
-                for budget in plan.budgets(solver, point)? {
+                let candidates = plan.candidates(&scene.name, solver, Impacts::Own, point)?;
+                for Candidate { budget, .. } in candidates {
+                    let alone = plan.widest_alone(&scene.name, scene.bodies, scene.steps, &budget, solver);
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {
                         let widths: Vec<usize> = match order {
-                            Order::Natural => vec![1],
+                            Order::Colored if alone => {
+                                plan.widths.last().map(|w| w.lanes()).into_iter().collect()
+                            }
                             Order::Colored => plan.widths.iter().map(|w| w.lanes()).collect(),
+                            _ if alone => Vec::new(),
+                            _ => vec![1],
                         };
                         let widest = widths.iter().copied().max().unwrap_or(1);
                         let observed = one(widest) + estimate::errors(scene.bodies);

@@ -99,12 +99,13 @@ pub struct Curve<'a> {
     pub samples: Vec<Sample<'a>>,
 }
 
-/// Budgets of a solver in the order in which they were tried.
-pub fn budgets_of(records: &[Record], solver: &str) -> Vec<Budget> {
+/// Budgets of a solver, with its parameters, in the order in which they were tried.
+pub fn budgets_of<'a>(records: &'a [Record], solver: &str) -> Vec<(Budget, &'a str)> {
     let mut budgets = Vec::new();
     for record in records.iter().filter(|r| r.solver == solver) {
-        if !budgets.contains(&record.budget) {
-            budgets.push(record.budget);
+        let own = (record.budget, record.parameters.as_str());
+        if !budgets.contains(&own) {
+            budgets.push(own);
         }
     }
     budgets
@@ -127,8 +128,9 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
         let own = || records.iter().filter(|r| r.solver == solver);
         let mut samples: Vec<Sample> = Vec::new();
         for (budget, value) in budgets_of(records, solver).iter().enumerate() {
-            for order in [Order::Natural, Order::Colored] {
-                let widths = own().filter(|r| r.budget == *value && r.order == order);
+            for order in Order::ALL {
+                let same = |r: &&Record| (r.budget, r.parameters.as_str()) == *value && r.order == order;
+                let widths = own().filter(same);
                 let timed = widths.filter(|r| r.holds()).filter_map(|record| {
                     let (sample, error) = (record.sample.as_ref()?, axis.of(record)?);
                     Some(Sample { record, budget, time: sample.cost_ns(), error: error.max(ERROR_FLOOR) })

@@ -107,7 +107,7 @@ pub fn run_on(
         }
         tell(format!("extending {name} to a minute: {} settings", untried.len()));
         let jobs: Vec<(Record, Settings)> =
-            untried.into_iter().map(|r| Ok((r.clone(), settings(plan, r)?))).collect::<Result<_, Error>>()?;
+            untried.into_iter().map(|r| Ok((r.clone(), settings(r)?))).collect::<Result<_, Error>>()?;
         let found = in_parallel(&jobs, |(_, settings)| later(&plan.open(name)?, settings.clone()))?;
         for ((record, _), later) in jobs.iter().zip(found) {
             records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.later = Some(later));
@@ -115,15 +115,15 @@ pub fn run_on(
     }
 }
 
-/// The settings of a record of `plan`.
-fn settings(plan: &StudyPlan, record: &Record) -> Result<Settings, Error> {
+/// The settings of a record.
+fn settings(record: &Record) -> Result<Settings, Error> {
     let solver = find(record.solver)?;
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     Ok(Settings {
         order: record.order,
         budget: record.budget,
         impacts: record.impacts,
-        parameters: overrides::values(solver, &plan.overrides)?,
+        parameters: overrides::of_words(solver, &record.parameters)?,
         ..Settings::new(solver).exactly(width)
     })
 }

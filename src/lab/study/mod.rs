@@ -4,6 +4,9 @@
 //! clock is read. *Times* come from [interleaved timing](interleave) of all settings of a scene in common rounds, on
 //! one core. All colored widths and the error run must agree to the last bit ([`Record::bits_equal`]). Settings that
 //! would be recommended are then [extended](horizon) to a minute, untimed and on all cores.
+//!
+//! Which settings of a solver run on a scene is [found](search) by errors alone, with one rule for all, and
+//! [recorded](found).
 
 #[doc(hidden)]
 pub mod answer;
@@ -13,6 +16,7 @@ pub mod compare;
 pub mod cost;
 #[doc(hidden)]
 pub mod curve;
+pub mod found;
 #[doc(hidden)]
 pub mod horizon;
 #[doc(hidden)]
@@ -28,6 +32,7 @@ pub mod ranking;
 pub mod record;
 #[doc(hidden)]
 pub mod savings;
+pub mod search;
 #[doc(hidden)]
 pub mod slices;
 pub mod sweep;
@@ -36,10 +41,11 @@ pub mod telling;
 
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::params::Budget;
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings, World};
 use crate::lab::error::Error;
+use crate::lab::estimate;
 use crate::lab::files;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
@@ -48,10 +54,11 @@ use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use compare::Ratio;
-use interleave::Interleaved;
+use found::{Candidate, Found};
+use interleave::{Interleaved, Sample};
 pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use sweep::{Sweep, Swept};
 
 /// Scenes of the default study: each shows something that the others do not.
@@ -98,12 +105,14 @@ pub struct StudyPlan {
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,
-    /// Constraint orders; natural order has one lane.
+    /// Constraint orders; only colored order has lanes.
     pub orders: Vec<Order>,
     /// Impact laws; scenes where nothing bounces run only the first.
     pub impacts: Vec<Impacts>,
-    /// Work per step.
+    /// Work per step; where nothing is given, what was [found](Self::found).
     pub budgets: BudgetGrid,
+    /// Settings to try where no budgets are given.
+    pub found: Arc<Found>,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
     /// The swept quantity; none in a study of budgets.
@@ -120,6 +129,9 @@ pub struct StudyPlan {
     pub seed: u64,
 }
 
+/// Time of timing a setting in one lane (s), beyond which it is left out.
+const LONG: f64 = 1.0;
+
 impl Default for StudyPlan {
     fn default() -> Self {
         StudyPlan {
@@ -129,6 +141,7 @@ impl Default for StudyPlan {
             orders: vec![Order::Natural, Order::Colored],
             impacts: vec![Impacts::Own, Impacts::Waves],
             budgets: BudgetGrid::default(),
+            found: Found::shipped(),
             overrides: Vec::new(),
             sweep: None,
             tolerances: GivenTolerances::default(),
@@ -243,6 +256,71 @@ impl StudyPlan {
         let at = |budget| point.map_or(Ok(budget), |point| sweep.budget(point.value, budget, variant));
         own.into_iter().map(at).collect()
     }
+
+    /// Whether settings are those that were found, where there are any.
+    pub fn searched(&self) -> bool {
+        self.sweep.is_none() && self.budgets == BudgetGrid::default()
+    }
+
+    /// Scenes on which the settings of some solver were not searched.
+    pub fn not_searched(&self) -> Vec<&str> {
+        let found =
+            |scene: &Scene, solver: &Variant| self.found.of(&scene.name, solver, Impacts::Own).is_some();
+        let lacks = |name: &&String| {
+            let Ok(Loaded { scene, .. }) = self.open(name) else { return true };
+            let mut own = self.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok());
+            own.any(|solver| !found(&scene, solver))
+        };
+        self.scenes.iter().filter(lacks).map(String::as_str).collect()
+    }
+
+    /// Whether a setting runs in colored order at the widest lanes alone: what was found and takes more than [`LONG`] for its
+    /// timing in one lane, where nobody asked for lanes or orders.
+    fn widest_alone(
+        &self,
+        scene: &str,
+        bodies: usize,
+        steps: u32,
+        budget: &Budget,
+        solver: &Variant,
+    ) -> bool {
+        let own = StudyPlan::default();
+        let is_found = self.searched() && self.found.of(scene, solver, Impacts::Own).is_some();
+        let is_open = is_found && self.widths == own.widths && self.orders == own.orders;
+        let step = estimate::step(bodies, cost::sweeps(budget, solver), 1);
+        let timed = f64::from(steps.min(self.timing_steps)) * f64::from(self.repeats);
+        is_open && timed * step > LONG
+    }
+
+    /// What a solver tries on a scene: the settings that were found for it, under the plan's parameters; the budgets
+    /// of the plan where some are given, in a sweep, and where nobody has searched.
+    fn candidates(
+        &self,
+        scene: &str,
+        solver: &'static Variant,
+        impacts: Impacts,
+        point: Option<Swept>,
+    ) -> Result<Vec<Candidate>, Error> {
+        let found = self.found.of(scene, solver, impacts).filter(|_| self.searched());
+        let Some(found) = found else {
+            let parameters = overrides::values(solver, &self.overrides)?;
+            let budgets = self.budgets(solver, point)?.into_iter();
+            return Ok(budgets.map(|budget| Candidate { budget, parameters }).collect());
+        };
+        let mut candidates = Vec::new();
+        for Candidate { budget, mut parameters } in found {
+            for Override { name, value } in
+                self.overrides.iter().filter(|o| solver.parameter(&o.name).is_ok())
+            {
+                solver.set(&mut parameters, name, *value)?;
+            }
+            let candidate = Candidate { budget, parameters };
+            if !candidates.contains(&candidate) {
+                candidates.push(candidate);
+            }
+        }
+        Ok(candidates)
+    }
 }
 
 /// Whether a name means a file: it ends in `.json` or has a separator.
@@ -305,6 +383,18 @@ struct Cell<'a> {
     solver: &'static Variant,
     impacts: Impacts,
     budget: Budget,
+    parameters: Parameters,
+    /// Whether it runs at its widest lanes alone, see [`StudyPlan::widest_alone`].
+    widest_alone: bool,
+}
+
+impl Cell<'_> {
+    /// Its budget, and those parameters that are not the solver's own.
+    fn text(&self) -> String {
+        let budget = budget::with_impacts(budget::brief(&self.budget, self.solver), self.impacts);
+        let parameters = overrides::brief(self.solver, &self.parameters);
+        if parameters.is_empty() { budget } else { format!("{budget} {parameters}") }
+    }
 }
 
 /// What an error run found.
@@ -340,9 +430,23 @@ pub fn run(
             loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
             for &solver in plan.solvers.iter().filter(|solver| loaded.scene.runs_on(solver).is_ok()) {
                 for &impacts in plan.impacts_on(&loaded.scene) {
-                    let budgets = plan.budgets(solver, swept)?.into_iter();
-                    let cell = |budget| Cell { scene: [i, k], swept, name, solver, impacts, budget };
-                    cells.extend(budgets.map(cell));
+                    let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?;
+                    let (bodies, steps) = (loaded.scene.bodies.len(), loaded.scene.steps);
+                    for Candidate { budget, parameters } in candidates {
+                        let widest_alone =
+                            plan.widest_alone(&loaded.scene.name, bodies, steps, &budget, solver);
+                        let scene = [i, k];
+                        cells.push(Cell {
+                            scene,
+                            swept,
+                            name,
+                            solver,
+                            impacts,
+                            budget,
+                            parameters,
+                            widest_alone,
+                        });
+                    }
                 }
             }
             variants.push(loaded);
@@ -388,7 +492,7 @@ fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
 
 /// Settings of a cell in one order at one width.
 fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
-    let mut parameters = overrides::values(cell.solver, &plan.overrides).unwrap_or(cell.solver.defaults());
+    let mut parameters = cell.parameters;
     if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
         // Checked with the plan.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
@@ -445,14 +549,36 @@ fn error_runs(
 fn error_run(plan: &StudyPlan, cell: &Cell, order: Order, timed: u32) -> Result<Outcome, Error> {
     let loaded = plan.open_at(cell.name, cell.swept)?;
     let width = match order {
-        Order::Natural => LaneWidth::W1,
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
+        _ => LaneWidth::W1,
     };
     observe(loaded, settings(plan, cell, order, width), timed)
 }
 
 /// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
 pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
+    observe_while(loaded, settings, hash_at, &|_, _| true)
+}
+
+/// The same up to the first demand that is not met, and the work of a mean step: its sweeps and substeps.
+fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(Outcome, f64), Error> {
+    let (steps, work) = (std::cell::Cell::new(0.0), std::cell::Cell::new(0.0));
+    let substeps = f64::from(settings.budget.substeps);
+    let outcome = observe_while(loaded, settings, 0, &|world, watch| {
+        steps.set(steps.get() + 1.0);
+        work.set(work.get() + world.counts.sweeps as f64 + substeps);
+        watch.broken().is_none()
+    })?;
+    Ok((outcome, work.get() / f64::max(steps.get(), 1.0)))
+}
+
+/// The same, while `goes_on` after a step.
+fn observe_while(
+    loaded: Loaded,
+    settings: Settings,
+    hash_at: u32,
+    goes_on: &dyn Fn(&World, &Watch) -> bool,
+) -> Result<Outcome, Error> {
     let Loaded { scene, mut truth, demands, .. } = loaded;
     let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
     let mut observation = Observation::new(&world);
@@ -473,6 +599,9 @@ pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outco
         }
         if step == hash_at {
             hash = world.state_hash();
+        }
+        if !goes_on(&world, &watch) {
+            break;
         }
     }
     Ok(Outcome {
@@ -496,8 +625,10 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
     let mut rows = Vec::new();
     for (&order, outcome) in plan.orders.iter().zip(outcomes) {
         let widths: &[LaneWidth] = match order {
-            Order::Natural => &[LaneWidth::W1],
+            Order::Colored if cell.widest_alone => &plan.widths[plan.widths.len() - 1..],
+            _ if cell.widest_alone => &[],
             Order::Colored => &plan.widths,
+            _ => &[LaneWidth::W1],
         };
         rows.extend(widths.iter().map(|&width| Row { cell, order, width, outcome }));
     }
@@ -533,36 +664,9 @@ fn timed_records(
         Err(divergence) => Err(divergence),
     };
     let record = |(i, row): (usize, &Row)| {
-        let Row { cell, order, width, outcome } = row;
-        let Loaded { scene, tolerances, unchecked, .. } = variant(row);
-        let parameters = settings(plan, cell, *order, *width).parameters;
         let sample = sample(&interleaved, i);
         let failure = sample.as_ref().err().map(|&d| Failure::from(d));
-        let sample = sample.ok();
-        Record {
-            scene: scene.name.clone(),
-            bodies: scene.bodies.len(),
-            dt: scene.dt,
-            solver: cell.solver.name,
-            order: *order,
-            lanes: width.lanes(),
-            budget: cell.budget,
-            budget_text: budget::with_impacts(budget::brief(&cell.budget, cell.solver), cell.impacts),
-            impacts: cell.impacts,
-            parameters: overrides::words(cell.solver, &parameters),
-            swept: cell.swept,
-            speed_up: None,
-            errors: outcome.errors.ok().filter(|_| failure.is_none()),
-            truth: outcome.truth,
-            tolerances: *tolerances,
-            broken: outcome.broken,
-            unchecked: unchecked.clone(),
-            later: None,
-            bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
-            front: Fronts::default(),
-            sample,
-            failure,
-        }
+        record_of(plan, variant(row), row, sample.ok(), failure)
     };
     let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
 
@@ -570,7 +674,7 @@ fn timed_records(
     for i in 0..records.len() {
         let own = &records[i];
         let budget = |r: &&Record| {
-            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.swept);
+            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.swept, r.parameters.clone());
             key(r) == key(own)
         };
         let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
@@ -578,6 +682,43 @@ fn timed_records(
         records[i].speed_up = ratio.map(|r| r.median);
     }
     Ok(records)
+}
+
+/// The record of a setting with its times, if it has any; why it failed, if it did.
+fn record_of(
+    plan: &StudyPlan,
+    loaded: &Loaded,
+    row: &Row,
+    sample: Option<Sample>,
+    failure: Option<Failure>,
+) -> Record {
+    let Row { cell, order, width, outcome } = row;
+    let Loaded { scene, tolerances, unchecked, .. } = loaded;
+    let parameters = settings(plan, cell, *order, *width).parameters;
+    Record {
+        scene: scene.name.clone(),
+        bodies: scene.bodies.len(),
+        dt: scene.dt,
+        solver: cell.solver.name,
+        order: *order,
+        lanes: width.lanes(),
+        budget: cell.budget,
+        budget_text: cell.text(),
+        impacts: cell.impacts,
+        parameters: overrides::words(cell.solver, &parameters),
+        swept: cell.swept,
+        speed_up: None,
+        errors: outcome.errors.ok().filter(|_| failure.is_none()),
+        truth: outcome.truth,
+        tolerances: *tolerances,
+        broken: outcome.broken,
+        unchecked: unchecked.clone(),
+        later: None,
+        bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
+        front: Fronts::default(),
+        sample,
+        failure,
+    }
 }
 
 #[cfg(test)]

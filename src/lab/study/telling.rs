@@ -6,6 +6,7 @@ use super::{Cell, Record, StudyPlan, settings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
+use crate::lab::overrides;
 use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::scenes::Loaded;
 use crate::lab::scenes::holds::Watch;
@@ -81,8 +82,10 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
+    let Record { impacts, budget, .. } = *record;
+    let parameters = overrides::of_words(solver, &record.parameters)?;
     let cell =
-        Cell { scene: [0; 2], swept: None, name, solver, impacts: record.impacts, budget: record.budget };
+        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;

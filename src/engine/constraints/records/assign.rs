@@ -3,6 +3,7 @@
 use crate::engine::coloring::{Coloring, EXEMPT};
 use crate::engine::constraints::records::batches::Place;
 use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::engine::constraints::records::order::mixed;
 use crate::engine::constraints::{
     records::features::Features, records::features::Layout, records::features::OppositeKind, step::Workspace,
 };
@@ -44,6 +45,8 @@ pub struct Assignment {
     groups: [Group; 3],
     /// Entries of one color.
     color: Vec<Entry>,
+    /// Contacts in a shuffled order.
+    places: Vec<u32>,
     /// Colors in use.
     pub colors: usize,
     /// Constraints that got no color and are solved one by one.
@@ -155,6 +158,26 @@ impl Assignment {
         };
         let allowed = LaneWidth::ALL.into_iter().rev().filter(|w| (narrowest..=widest).contains(w));
         allowed.min_by_key(|&w| cost(w)).unwrap_or(widest)
+    }
+
+    /// One after the other, by a hash of their shapes.
+    pub fn shuffled(
+        &mut self,
+        work: &mut Workspace,
+        features: &Features,
+        contacts: &[Contact],
+        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+    ) {
+        let mut places = std::mem::take(&mut self.places);
+        places.clear();
+        places.extend(0..contacts.len() as u32);
+        let shapes = |i: u32| {
+            let Contact { shape_a, shape_b, .. } = contacts[i as usize];
+            u64::from(shape_a) << 32 | u64::from(shape_b)
+        };
+        places.sort_unstable_by_key(|&i| (mixed(shapes(i)), i));
+        self.serial(work, features, contacts, places.iter().copied(), sides);
+        self.places = places;
     }
 
     /// One after the other, in `order`, after the constraints of other types.

@@ -3,7 +3,7 @@
 use super::{Passes, ROW};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::pass::PassMode;
+use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
 use crate::engine::constraints::kernels::velocity::block::BlockSweep;
 use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
@@ -75,17 +75,19 @@ impl Passes<'_> {
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
     /// together; see [`crate::engine::constraints::kernels::velocity::block`].
     pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
-        if self.run(phase, &mut BlockSweep::<_, false>(rule)) {
-            self.sweep_bias(phase);
-            self.solved(&Sweep(rule));
-        }
+        self.sweep_by(phase, &mut BlockSweep::<_, false>(rule), &Sweep(rule));
     }
 
     /// Constraint pass: as [`Self::block_sweep`], but friction rows come last, bounded by the new impulses.
     pub fn block_sweep_normal_first<R: NormalRule>(&mut self, phase: Phase, rule: R) {
-        if self.run(phase, &mut BlockSweep::<_, true>(rule)) {
+        self.sweep_by(phase, &mut BlockSweep::<_, true>(rule), &Sweep(rule));
+    }
+
+    /// Constraint pass: one velocity sweep by a pass of the solver's own, which solves the law of `law`.
+    pub fn sweep_by(&mut self, phase: Phase, pass: &mut dyn AnyPass, law: &dyn VelocitySweep) {
+        if self.run(phase, pass) {
             self.sweep_bias(phase);
-            self.solved(&Sweep(rule));
+            self.solved(law);
         }
     }
 

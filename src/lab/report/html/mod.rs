@@ -124,11 +124,12 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
         section("machine", "Machine, settings and command", "", machine(study));
         return text + &body + "</body>\n</html>\n";
     }
-    section("answer", "The answer", "", words::answer(records, study.settings["steps"].as_u64()));
+    let answer = words::answer(records, study.settings["steps"].as_u64());
+    section("answer", "The answer", "", answer + &format!("<p>{}</p>\n", escaped(&study.budgets())));
     section(
         "overview",
         "Speed against error over all scenes",
-        "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from the smallest budget to the largest; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
+        "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from its first budget on each scene to its last; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
         overview::overview(records),
     );
     if !recordings.is_empty() {
@@ -174,13 +175,13 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
     section(
         "lanes",
         "Lanes",
-        "Each solver at its standard budget in colored order: speed-up over one lane, and the share of lanes that hold a contact.",
+        "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.",
         legend() + &sections::lanes(records),
     );
     section(
         "phases",
         "Time per phase",
-        "Each solver at its standard budget and fastest lane width (budget@lanes); ✗ where it does not hold.",
+        "Each solver at the middle one of its budgets and its fastest lane width (budget@lanes); ✗ where it does not hold.",
         sections::phases(records),
     );
     section(

@@ -98,7 +98,10 @@ pub fn overview(records: &[Record]) -> String {
                 continue;
             }
             let (xs, ys): (Vec<f64>, Vec<f64>) = held.iter().copied().unzip();
-            let name = all.clone().next().map_or("", |d| d.entry.budget_text.as_str());
+            let mut names: Vec<&str> = all.clone().map(|d| d.entry.budget_text.as_str()).collect();
+            names.dedup();
+            let name =
+                if let [one] = names[..] { one.to_string() } else { format!("its budget {}", budget + 1) };
             let (held_on, of) = (held.len(), scenes(records).len());
             let title = format!(
                 "{solver}, {name}: holds on {} of {} scenes; on those its geometric mean error is {} × tolerance, its time {}× the fastest",

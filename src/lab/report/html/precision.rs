@@ -89,7 +89,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
         let (time, color) = (1e-9 * sample.cost_ns(), Style::of(entry.solver).color);
         let budgets: Vec<&&Record> =
             settings.iter().filter(|e| e.solver == entry.solver && e.order == entry.order).collect();
-        let size = budgets.iter().position(|e| e.budget == entry.budget).unwrap_or(0).min(4);
+        let size = budgets.iter().position(|e| e.budget_text == entry.budget_text).unwrap_or(0).min(4);
         let what = format!("{}, {}: {}", entry.solver, entry.words(), si(time, "s"));
         match (entry.broke(), axis.of(entry)) {
             (None, Some(value)) => {

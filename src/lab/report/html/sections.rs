@@ -67,7 +67,6 @@ pub fn lanes(records: &[Record]) -> String {
     }
     let mut text = String::from("<div class=\"panels four\">\n");
     for scene in scenes(records) {
-        // The standard budget of each solver.
         let runs = |solver: &'static str| -> Vec<&Record> {
             let Some(chosen) = standard(scene, solver).filter(|e| !e.is_natural()) else { return Vec::new() };
             scene.iter().filter(|e| answer::same(e, chosen) && e.sample.is_some()).collect()

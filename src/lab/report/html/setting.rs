@@ -1,6 +1,5 @@
 //! What a page asks of a record.
 
-use crate::engine::world::Order;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis};
 use crate::lab::study::{Record, answer};
 use crate::lab::units::lanes;
@@ -55,7 +54,7 @@ impl Setting for Record {
     }
 
     fn is_natural(&self) -> bool {
-        self.order == Order::Natural
+        self.order.is_serial()
     }
 
     fn worst(&self) -> Option<f64> {
@@ -64,7 +63,7 @@ impl Setting for Record {
 
     fn words(&self) -> String {
         match self.is_natural() {
-            true => format!("{}, natural order", self.budget_text),
+            true => format!("{}, {} order", self.budget_text, self.order.name()),
             false => format!("{}, {}", self.budget_text, lanes(self.lanes)),
         }
     }

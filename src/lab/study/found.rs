@@ -1,0 +1,168 @@
+//! The settings that a study tries where none are given, as [`super::search`] found them.
+//!
+//! `simpulse study --solvers all --thorough` makes the list anew; a list that ships with the program is in
+//! `budgets.csv`.
+
+use crate::engine::constraints::Impacts;
+use crate::engine::params::{Budget, Parameters};
+use crate::engine::solvers::{Variant, find};
+use crate::lab::error::Error;
+use crate::lab::overrides;
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, LazyLock};
+
+/// Name of the list in the folder of a study that searched.
+pub const NAME: &str = "budgets.csv";
+
+/// A budget with the solver's parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Work per step.
+    pub budget: Budget,
+    /// Values in the order of the solver's table.
+    pub parameters: Parameters,
+}
+
+/// What was found for one solver on one scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Name with size.
+    pub scene: String,
+    /// Who was searched for.
+    pub solver: &'static str,
+    /// How impacts are solved.
+    pub impacts: Impacts,
+    /// The least work first.
+    pub candidates: Vec<Candidate>,
+}
+
+/// A list of what was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Scene by scene.
+    pub entries: Vec<Entry>,
+}
+
+/// A line of the file.
+#[derive(Serialize, Deserialize)]
+struct Line {
+    scene: String,
+    solver: String,
+    impacts: Impacts,
+    substeps: u32,
+    velocity_iterations: u32,
+    relax_iterations: u32,
+    position_iterations: u32,
+    parameters: String,
+}
+
+impl Found {
+    /// The list of this program.
+    pub fn shipped() -> Arc<Found> {
+        static SHIPPED: LazyLock<Arc<Found>> =
+            LazyLock::new(|| Arc::new(Found::of_csv(include_str!("budgets.csv")).unwrap_or_default()));
+        SHIPPED.clone()
+    }
+
+    /// What was found for a solver on a scene, with its own treatment of impacts where not with this one; none where
+    /// nobody has searched.
+    pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<Candidate>> {
+        let with = |impacts: Impacts| {
+            let is = |e: &&Entry| (e.scene.as_str(), e.solver, e.impacts) == (scene, solver.name, impacts);
+            self.entries.iter().find(is).map(|e| e.candidates.clone())
+        };
+        with(impacts).or_else(|| with(Impacts::Own))
+    }
+
+    /// Reads the text of a list. Errors: a text that is none; solvers and parameters that do not exist.
+    pub fn of_csv(text: &str) -> Result<Found, Error> {
+        let mut entries: Vec<Entry> = Vec::new();
+        for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
+            let line: Line = line.map_err(|e| Error::invalid(NAME, e.to_string()))?;
+            let solver = find(&line.solver)?;
+            let candidate = Candidate {
+                budget: Budget {
+                    substeps: line.substeps,
+                    velocity_iterations: line.velocity_iterations,
+                    relax_iterations: line.relax_iterations,
+                    position_iterations: line.position_iterations,
+                },
+                parameters: overrides::of_words(solver, &line.parameters)?,
+            };
+            match entries.last_mut() {
+                Some(last)
+                    if (&last.scene, last.solver, last.impacts)
+                        == (&line.scene, solver.name, line.impacts) =>
+                {
+                    last.candidates.push(candidate);
+                }
+                _ => entries.push(Entry {
+                    scene: line.scene,
+                    solver: solver.name,
+                    impacts: line.impacts,
+                    candidates: vec![candidate],
+                }),
+            }
+        }
+        Ok(Found { entries })
+    }
+
+    /// The text of the list: a line per setting.
+    pub fn to_csv(&self) -> Result<Vec<u8>, Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for Entry { scene, solver, impacts, candidates } in &self.entries {
+            for Candidate { budget, parameters } in candidates {
+                let line = Line {
+                    scene: scene.clone(),
+                    solver: (*solver).into(),
+                    impacts: *impacts,
+                    substeps: budget.substeps,
+                    velocity_iterations: budget.velocity_iterations,
+                    relax_iterations: budget.relax_iterations,
+                    position_iterations: budget.position_iterations,
+                    parameters: overrides::changed(find(solver)?, parameters),
+                };
+                writer.serialize(line).map_err(|e| Error::invalid(NAME, e.to_string()))?;
+            }
+        }
+        writer.into_inner().map_err(|e| Error::invalid(NAME, e.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::VARIANTS;
+    use crate::lab::study::{DEFAULT_SCENES, DEFAULT_SOLVERS, budget, open_scene};
+
+    /// Scenes that were not searched for every solver of the crate, for the time that it takes.
+    const LARGE: [&str; 2] = ["pyramid:30", "circle_pile:500"];
+
+    #[test]
+    fn the_shipped_list_has_every_solver_on_the_scenes_of_the_study() {
+        let found = Found::of_csv(include_str!("budgets.csv")).unwrap();
+        for name in DEFAULT_SCENES {
+            let scene = open_scene(name, None, None, None).unwrap().scene;
+            let of_study = |v: &&&Variant| !LARGE.contains(&name) || DEFAULT_SOLVERS.contains(&v.name);
+            for solver in VARIANTS.iter().filter(of_study).filter(|solver| scene.runs_on(solver).is_ok()) {
+                let candidates = found.of(&scene.name, solver, Impacts::Own).unwrap_or_default();
+                assert!((1..=3).contains(&candidates.len()), "{} on {}", solver.name, scene.name);
+                for candidate in candidates {
+                    budget::check(&candidate.budget, solver).unwrap();
+                }
+            }
+        }
+        // A line is a line again.
+        assert_eq!(found.to_csv().unwrap(), include_bytes!("budgets.csv"));
+    }
+
+    #[test]
+    fn what_is_no_list_is_refused() {
+        let head = "scene,solver,impacts,substeps,velocity_iterations,relax_iterations,position_iterations,parameters\n";
+        let message = |line: &str| Found::of_csv(&format!("{head}{line}\n")).unwrap_err().to_string();
+        assert!(message("arch,pgz,own,1,1,0,0,").contains("'pgz'"));
+        assert!(message("arch,pgs,own,one,1,0,0,").contains("budgets.csv"));
+        assert!(message("arch,pgs,own,1,1,0,0,penalty=2").contains("penalty"));
+        assert_eq!(Found::of_csv(head).unwrap(), Found::default());
+    }
+}

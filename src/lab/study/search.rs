@@ -1,0 +1,385 @@
+//! Which settings of a solver are worth timing on a scene: one rule, and one effort, for every solver.
+//!
+//! Candidates are [`SUBSTEPS`] × [`SWEEPS`] (at most [`MOST_SWEEPS`] sweeps in a step) at the solver's standard
+//! parameters, and further ones drawn from other values of its [stiffness](STIFFNESS), or of what its row lists, up to
+//! [`MOST`] in all. They are judged by errors alone, so no clock is read and all cores may work:
+//!
+//! ```text
+//! 54 candidates ─ 1/16 of the run ─► a quarter ─ 1/4 of the run ─► 6 ─ whole run ─► at most 3, which a study times
+//! ```
+//!
+//! A candidate has an excess over the tolerances of the scene and a *work*: sweeps and substeps of a mean step, as the
+//! solver counts them. Those stay first that no other one beats with as little work and less excess, then those that only
+//! these beat (successive halving of Jamieson and Talwalkar, "Non-stochastic best arm identification and hyperparameter
+//! optimization", 2016, by non-dominated fronts instead of one loss). Nobody is dropped who is not beaten: where nothing
+//! has touched yet, short runs tell nothing. Of the last ones a study times the least work that is plausible, that is
+//! tight and that is exact, each of which has to stand for a minute where the scene rests, and, where these are fewer
+//! than three, the next ones that are plausible. Where none of the last is plausible, the dropped ones run whole as
+//! well, until one is: no solver fails on a scene by a candidate that only short runs have seen.
+
+use super::found::{Candidate, Entry, Found};
+use super::horizon::{in_parallel, later};
+use super::{Cell, Failure, Progress, Record, Row, StudyPlan};
+use super::{leave_out_unseen, observe_until_broken, record_of, settings};
+use crate::engine::constraints::Impacts;
+use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::params::{Budget, Parameter, Parameters};
+use crate::engine::solvers::Variant;
+use crate::engine::world::Order;
+use crate::lab::error::Error;
+use crate::lab::scenes::tolerance::Accuracy;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Substeps to try.
+pub const SUBSTEPS: [u32; 5] = [1, 2, 4, 8, 14];
+/// Sweeps per substep to try; sweeps of other kinds in the proportion of the standard budget.
+pub const SWEEPS: [u32; 6] = [1, 2, 4, 8, 16, 32];
+/// Most of them in a step.
+pub const MOST_SWEEPS: u32 = 128;
+/// Most candidates of a solver.
+pub const MOST: usize = 54;
+/// Values of stiffness to try beside the standard one, where the solver's row lists none.
+pub const STIFFNESS: [(&str, &[f32]); 4] = [
+    ("baumgarte", &[0.1, 0.8]),
+    ("correction", &[0.4, 0.8]),
+    ("stiffness", &[0.08, 0.2]),
+    ("beta", &[1e4, 1e6]),
+];
+
+/// Parts of a run after which a quarter stays.
+const PARTS: [u32; 2] = [16, 4];
+/// Candidates that run whole at least, and settings of them that are timed.
+const LAST: usize = 6;
+const TIMED: usize = 3;
+
+/// The rule in a sentence, for pages.
+pub fn rule() -> String {
+    let list = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    format!(
+        "substeps {} × sweeps {} (at most {MOST_SWEEPS} in a step) × stiffness, at most {MOST} settings for each solver and scene, \
+         in colored order, by successive halving on errors; timed are those of least work that are plausible, tight and exact",
+        list(&SUBSTEPS),
+        list(&SWEEPS)
+    )
+}
+
+/// Searches for every solver of the plan on each of its scenes, on all cores.
+///
+/// Errors: as [`StudyPlan::check`].
+pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Found, Error> {
+    plan.check()?;
+    let mut jobs = Vec::new();
+    for name in &plan.scenes {
+        let scene = plan.open(name)?.scene;
+        for &solver in plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
+            jobs.extend(plan.impacts_on(&scene).iter().map(|&impacts| Job { plan, name, solver, impacts }));
+        }
+    }
+    let (done, total) = (AtomicUsize::new(0), jobs.len());
+    let entries = in_parallel(&jobs, |job| {
+        let what = format!("searching {} · {}", job.name, job.solver.name);
+        progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
+        let candidates = job.best()?;
+        let scene = plan.open(job.name)?.scene.name;
+        Ok(Entry { scene, solver: job.solver.name, impacts: job.impacts, candidates })
+    })?;
+    Ok(Found { entries })
+}
+
+/// The candidates of a solver in steps of `dt` (s): the standard parameters first, then the others as they are drawn.
+pub fn candidates(solver: &Variant, dt: f64) -> Vec<Candidate> {
+    let (mut standard, mut others) = (Vec::new(), Vec::new());
+    for budget in budgets(solver) {
+        let h = dt as f32 / budget.substeps as f32;
+        let mut list = parameters(solver, h, |p| match STIFFNESS.iter().find(|s| s.0 == p.name) {
+            Some((_, values)) if p.trials.is_empty() => values,
+            _ => p.trials,
+        })
+        .into_iter()
+        .map(|parameters| Candidate { budget, parameters });
+        standard.extend(list.next());
+        others.extend(list);
+    }
+    others.shuffle(&mut Pcg64::seed_from_u64(1));
+    others.truncate(MOST.saturating_sub(standard.len()));
+    standard.extend(others);
+    standard
+}
+
+/// The budgets of the grid, each once.
+fn budgets(solver: &Variant) -> Vec<Budget> {
+    let standard = solver.budget;
+    let unit = if solver.uses.velocity { standard.velocity_iterations } else { standard.position_iterations };
+    let mut budgets: Vec<Budget> = Vec::new();
+    for substeps in SUBSTEPS {
+        for sweeps in SWEEPS.into_iter().filter(|sweeps| substeps * sweeps <= MOST_SWEEPS) {
+            // As many of its other sweeps as its standard budget has to one of these, and one at least.
+            let scaled = |own: u32| (own * sweeps / unit.max(1)).max(own.min(1));
+            let budget = Budget {
+                substeps,
+                velocity_iterations: scaled(standard.velocity_iterations),
+                relax_iterations: scaled(standard.relax_iterations),
+                position_iterations: scaled(standard.position_iterations),
+            };
+            if !budgets.contains(&budget) {
+                budgets.push(budget);
+            }
+        }
+    }
+    budgets
+}
+
+/// The standard parameters of a solver, and then every combination of `trials` of them, in substeps of `h` (s),
+/// without stiffnesses that come to the same.
+pub fn parameters<'a>(solver: &Variant, h: f32, trials: impl Fn(&Parameter) -> &'a [f32]) -> Vec<Parameters> {
+    let mut all = vec![solver.defaults()];
+    for (place, parameter) in solver.parameters.iter().enumerate() {
+        for known in 0..all.len() {
+            for &trial in trials(parameter).iter().filter(|&&trial| trial != parameter.default) {
+                let mut values = all[known];
+                values[place] = trial;
+                all.push(values);
+            }
+        }
+    }
+    let Some(softness) = solver.softness else { return all };
+    let mut kept: Vec<Parameters> = Vec::new();
+    for values in all {
+        if !kept.iter().any(|k| softness(k, h) == softness(&values, h)) {
+            kept.push(values);
+        }
+    }
+    kept
+}
+
+/// A solver on a scene.
+struct Job<'a> {
+    plan: &'a StudyPlan,
+    name: &'a str,
+    solver: &'static Variant,
+    impacts: Impacts,
+}
+
+/// A candidate after a run.
+struct Trial {
+    candidate: Candidate,
+    record: Record,
+    /// Sweeps and substeps of a mean step.
+    work: f64,
+}
+
+impl Trial {
+    /// Excess over the strictest tolerances; what is within them is as good as anything.
+    fn excess(&self) -> f64 {
+        self.record.excess_at(Accuracy::Exact).max(1.0)
+    }
+
+    fn is_plausible(&self) -> bool {
+        self.record.is_good(Accuracy::Plausible)
+    }
+}
+
+impl Job<'_> {
+    /// The settings to time, the least work first.
+    fn best(&self) -> Result<Vec<Candidate>, Error> {
+        let scene = self.plan.open(self.name)?.scene;
+        let mut left = candidates(self.solver, scene.dt);
+        let mut dropped = Vec::new();
+        for part in PARTS {
+            let trials = self.judged(&left, Some((scene.steps / part).max(1)))?;
+            let points: Vec<[f64; 2]> = trials.iter().map(|t| [t.work, t.excess()]).collect();
+            let fronts = by_fronts(&points);
+            let unbeaten = fronts.first().map_or(0, Vec::len);
+            let kept = left.len().div_ceil(4).max(LAST).max(unbeaten).min(left.len());
+            let order: Vec<Candidate> = fronts.into_iter().flatten().map(|i| left[i]).collect();
+            dropped.splice(0..0, order[kept..].iter().copied());
+            left = order[..kept].to_vec();
+        }
+        let mut trials = self.judged(&left, self.plan.steps)?;
+        let mut dropped = dropped.into_iter();
+        loop {
+            let chosen = choose(&trials);
+            let unknown = chosen
+                .iter()
+                .copied()
+                .find(|&i| trials[i].record.later.is_none() && trials[i].is_plausible());
+            if let Some(i) = unknown.filter(|_| self.rests()) {
+                trials[i].record.later = Some(self.later(&trials[i].candidate)?);
+            } else if let Some(next) = dropped.next().filter(|_| chosen.is_empty()) {
+                trials.extend(self.judged(&[next], self.plan.steps)?);
+            } else if chosen.is_empty() {
+                // The nearest; of those that do not even hold the standard budget, which a reader expects.
+                let nearest = trials.iter().min_by(|a, b| a.record.excess().total_cmp(&b.record.excess()));
+                let nearest = nearest.filter(|t| t.record.excess().is_finite()).map(|t| t.candidate);
+                let (budget, parameters) = (self.solver.budget, self.solver.defaults());
+                return Ok(vec![nearest.unwrap_or(Candidate { budget, parameters })]);
+            } else {
+                return Ok(chosen.into_iter().map(|i| trials[i].candidate).collect());
+            }
+        }
+    }
+
+    fn rests(&self) -> bool {
+        self.plan.open(self.name).is_ok_and(|loaded| loaded.rests())
+    }
+
+    fn cell(&self, &Candidate { budget, parameters }: &Candidate) -> Cell<'_> {
+        let Job { name, solver, impacts, .. } = *self;
+        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false }
+    }
+
+    /// Colored order at any width gives the same bits; the plan may have natural order alone.
+    fn order(&self) -> (Order, LaneWidth) {
+        match self.plan.orders[..] {
+            [order] if order.is_serial() => (order, LaneWidth::W1),
+            _ => (Order::Colored, native_width()),
+        }
+    }
+
+    fn later(&self, candidate: &Candidate) -> Result<super::record::Later, Error> {
+        let (order, width) = self.order();
+        later(&self.plan.open(self.name)?, settings(self.plan, &self.cell(candidate), order, width))
+    }
+
+    /// Runs candidates for so many steps, or for those of the scene.
+    fn judged(&self, list: &[Candidate], steps: Option<u32>) -> Result<Vec<Trial>, Error> {
+        let plan = StudyPlan { steps, ..self.plan.clone() };
+        let (order, width) = self.order();
+        let (mut records, mut works) = (Vec::new(), Vec::new());
+        let mut loaded = plan.open(self.name)?;
+        loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
+        for candidate in list {
+            let cell = self.cell(candidate);
+            let given = settings(&plan, &cell, order, width);
+            let (outcome, work) = observe_until_broken(plan.open(self.name)?, given)?;
+            let row = Row { cell: &cell, order, width, outcome: &outcome };
+            let failure = outcome.errors.as_ref().err().map(|&d| Failure::from(d));
+            records.push(record_of(&plan, &loaded, &row, None, failure));
+            works.push(work);
+        }
+        if steps.is_some() {
+            leave_out_unseen(&mut records, &loaded.scene);
+        }
+        let trials = list.iter().zip(records).zip(works);
+        Ok(trials.map(|((&candidate, record), work)| Trial { candidate, record, work }).collect())
+    }
+}
+
+/// The places of the settings to time: at each accuracy the least work, and then the next plausible ones; the least work first.
+fn choose(trials: &[Trial]) -> Vec<usize> {
+    let mut sorted: Vec<usize> = (0..trials.len()).filter(|&i| trials[i].is_plausible()).collect();
+    sorted.sort_by(|&a, &b| {
+        let key = |i: usize| (trials[i].work, trials[i].excess());
+        let (a, b) = (key(a), key(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    let cheapest = |accuracy| sorted.iter().copied().find(|&i| trials[i].record.is_good(accuracy));
+    let mut chosen: Vec<usize> = Vec::new();
+    for i in Accuracy::ALL.into_iter().filter_map(cheapest).chain(sorted.iter().copied()) {
+        if chosen.len() < TIMED && !chosen.contains(&i) {
+            chosen.push(i);
+        }
+    }
+    sorted.retain(|i| chosen.contains(i));
+    sorted
+}
+
+/// Places of points (work, excess): those that no other one beats with as little work and less excess, then those that
+/// only these beat, and so on; of one front the least excess first. Infinite ones come last, by their work.
+fn by_fronts(points: &[[f64; 2]]) -> Vec<Vec<usize>> {
+    let (mut left, mut failed): (Vec<usize>, Vec<usize>) =
+        (0..points.len()).partition(|&i| points[i][1].is_finite());
+    let key = |&i: &usize, by: [usize; 2]| by.map(|k| points[i][k]);
+    let order = |a: [f64; 2], b: [f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+    let beats = |a: usize, b: usize| points[a][0] <= points[b][0] && points[a][1] < points[b][1];
+    let mut fronts = Vec::new();
+    while !left.is_empty() {
+        let (mut front, rest): (Vec<usize>, Vec<usize>) =
+            left.iter().partition(|&&i| !left.iter().any(|&j| beats(j, i)));
+        front.sort_by(|a, b| order(key(a, [1, 0]), key(b, [1, 0])));
+        fronts.push(front);
+        left = rest;
+    }
+    failed.sort_by(|a, b| order(key(a, [0, 1]), key(b, [0, 1])));
+    // All alike, and beaten by whatever holds.
+    fronts.extend((!fronts.is_empty() && !failed.is_empty()).then_some(failed.clone()));
+    if fronts.is_empty() {
+        fronts = failed.into_iter().map(|i| vec![i]).collect();
+    }
+    fronts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::solvers::{VARIANTS, find};
+    use crate::lab::study::budget;
+
+    #[test]
+    fn every_solver_has_the_same_grid_and_no_more_candidates_than_any_other() {
+        for solver in VARIANTS {
+            let list = candidates(solver, 1.0 / 60.0);
+            assert!((20..=MOST).contains(&list.len()), "{} {}", solver.name, list.len());
+            assert!(list.iter().all(|c| budget::check(&c.budget, solver).is_ok()));
+            assert!(list.iter().enumerate().all(|(i, c)| !list[..i].contains(c)), "{}", solver.name);
+            for substeps in SUBSTEPS {
+                assert!(
+                    list.iter().any(|c| c.budget.substeps == substeps && c.parameters == solver.defaults())
+                );
+            }
+        }
+        let soft = candidates(find("soft_step").unwrap(), 1.0 / 60.0);
+        let hertz = |value: f32| soft.iter().filter(|c| c.parameters[0] == value).count();
+        assert!(hertz(30.0) >= 27 && hertz(120.0) > 3, "{soft:?}");
+    }
+
+    #[test]
+    fn other_sweeps_keep_their_proportion() {
+        let of = |name: &str, sweeps: u32| {
+            let list = budgets(find(name).unwrap()).into_iter().filter(|b| b.substeps == 1);
+            let key = |b: &Budget| {
+                if b.velocity_iterations > 0 { b.velocity_iterations } else { b.position_iterations }
+            };
+            list.filter(|b| key(b) == sweeps)
+                .map(|b| [b.relax_iterations, b.position_iterations])
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(of("pgs_soft", 16), [[8, 0]]);
+        assert_eq!(of("pgs_ngs", 1), [[0, 1]]);
+        assert_eq!(of("soft_step", 8), [[8, 0]]);
+        assert_eq!(of("pgs", 32), [[0, 0]]);
+    }
+
+    #[test]
+    fn fronts_come_one_after_the_other() {
+        let infinite = f64::INFINITY;
+        let points =
+            [[1.0, 9.0], [2.0, 9.0], [3.0, 2.0], [1.0, infinite], [4.0, 3.0], [9.0, 1.0], [0.5, infinite]];
+        // 1 has more work than 0 and no less excess, but no more either.
+        assert_eq!(by_fronts(&points), [vec![5, 2, 0, 1], vec![4], vec![6, 3]]);
+        assert_eq!(by_fronts(&points[6..]), [[0]]);
+        assert!(by_fronts(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_search_finds_what_holds_and_what_needs_least_work() {
+        let plan = StudyPlan {
+            scenes: vec!["stack:2".into()],
+            solvers: vec![find("pgs").unwrap(), find("jacobi").unwrap()],
+            ..StudyPlan::default()
+        };
+        let found = search(&plan, &|_| ()).unwrap();
+        let pgs = found.of("stack:2", plan.solvers[0], Impacts::Own).unwrap();
+        assert_eq!(pgs.len(), 3);
+        let work = |c: &Candidate| c.budget.substeps * (1 + c.budget.velocity_iterations);
+        assert!(pgs.windows(2).all(|w| work(&w[0]) <= work(&w[1])), "{pgs:?}");
+        // The same twice, and the same from a file.
+        assert_eq!(search(&plan, &|_| ()).unwrap(), found);
+        assert_eq!(Found::of_csv(&String::from_utf8(found.to_csv().unwrap()).unwrap()).unwrap(), found);
+        let none = found.of("stack:3", plan.solvers[0], Impacts::Own);
+        assert_eq!(none, None);
+    }
+}
