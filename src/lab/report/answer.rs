@@ -112,7 +112,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
 /// Longest line of prose (characters).
 const WIDTH: usize = 150;
 
-/// The same with lines of [`WIDTH`] at most.
+/// The same with lines of 150 characters at most.
 pub fn wrapped(text: &str) -> String {
     let mut wrapped = String::new();
     for line in text.lines() {
