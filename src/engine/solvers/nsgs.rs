@@ -157,8 +157,9 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
             let free = slope.neg_mul_add(with_arms::<L, N, O>(along_n, state.w, arm_n), constant);
             let old = record[layout.at(p, layout.normal_impulse)];
             if !friction_rows {
-                let delta = free.max(L::zero()) - old;
-                record[layout.at(p, layout.normal_impulse)] = old + delta;
+                let new = free.max(L::zero());
+                let delta = new - old;
+                record[layout.at(p, layout.normal_impulse)] = new;
                 state.sum[0] = state.sum[0] + delta;
                 along_n = mass_sum.mul_add(delta, along_n);
                 spin::<L, N, O>(&mut state.w, inertia, arm_n, delta);
