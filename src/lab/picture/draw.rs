@@ -75,13 +75,15 @@ impl View {
     }
 }
 
-/// Lower and upper corner of what moves; of everything, where nothing does.
-fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>]) -> [[f64; 2]; 2] {
+/// Lower and upper corner of what moves and of what it hangs on; of everything, where nothing moves.
+fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>], poses: &[[f64; 3]]) -> [[f64; 2]; 2] {
     let moves = |i: usize| stage.kinds[stage.shapes[i].0 as usize] != BodyKind::Static;
     let any = (0..outlines.len()).any(moves);
     let points = || {
         let shown = outlines.iter().enumerate().filter(|(i, _)| !any || moves(*i));
-        shown.flat_map(|(_, points)| points.iter().copied()).filter(|p| p[0].is_finite() && p[1].is_finite())
+        let hinges = stage.joints.iter().flat_map(|joint| joint.ends(poses));
+        let points = shown.flat_map(|(_, points)| points.iter().copied()).chain(hinges);
+        points.filter(|p| p[0].is_finite() && p[1].is_finite())
     };
     if points().next().is_none() {
         return [[-1.0; 2], [1.0; 2]];
@@ -108,7 +110,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         .iter()
         .map(|(body, shape)| placed(&outline(shape), frame.poses[*body as usize]))
         .collect();
-    let [low, high] = bounds(stage, &outlines);
+    let [low, high] = bounds(stage, &outlines, &frame.poses);
     let (w, h) = (high[0] - low[0], high[1] - low[1]);
     let inner = f64::from(width) - 2.0 * MARGIN;
     let height = inner * (h / w).clamp(ASPECT[0], ASPECT[1]);
@@ -146,7 +148,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         }
     }
     let mark = (0.3 * typical(stage, scale)).clamp(3.0, 12.0);
-    super::joints::draw(&mut picture, &stage.joints, &frame.poses, mark, |place| view.at(place));
+    super::joints::draw(&mut picture, stage, &frame.poses, mark, |place| view.at(place));
     let arrow = points(&mut picture, stage, frame, &view, deepest);
     // Whatever of the ground reaches into them.
     let top = HEADER + height;

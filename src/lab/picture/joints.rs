@@ -1,7 +1,9 @@
 //! Joints as people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
 
+use super::frame::Stage;
 use super::outline::placed;
 use super::{Color, Item, Picture};
+use crate::engine::bodies::BodyKind;
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
 
@@ -40,6 +42,13 @@ pub struct JointRecord {
     pub axis: [f64; 2],
 }
 
+impl JointRecord {
+    /// Where its anchors are (m).
+    pub fn ends(&self, poses: &[[f64; 3]]) -> [[f64; 2]; 2] {
+        [0, 1].map(|k| placed(&[self.anchors[k]], poses[self.bodies[k] as usize])[0])
+    }
+}
+
 /// Color of joints: purple, which neither contacts nor their depths have.
 const COLOR: Color = Color::rgb(0x7a3e9d);
 
@@ -71,18 +80,23 @@ pub fn records(world: &World) -> Vec<JointRecord> {
     world.joints().filter_map(of).collect()
 }
 
-/// Draws joints of bodies at `poses`, `size` pixels wide, where `at` takes places of the stage (m) to pixels.
+/// Draws joints of bodies at `poses`, `size` pixels wide, where `at` takes places of the stage (m) to pixels. A hinge
+/// outside of a body has a line to its middle.
 pub(super) fn draw(
     picture: &mut Picture,
-    joints: &[JointRecord],
+    stage: &Stage,
     poses: &[[f64; 3]],
     size: f64,
     at: impl Fn([f64; 2]) -> [f64; 2],
 ) {
-    for joint in joints {
-        let [a, b] = joint.bodies.map(|i| poses[i as usize]);
-        let place = |anchor: [f64; 2], pose: [f64; 3]| at(placed(&[anchor], pose)[0]);
-        let [p, q] = [place(joint.anchors[0], a), place(joint.anchors[1], b)];
+    let mut reach = vec![0.0_f64; poses.len()];
+    for (body, shape) in &stage.shapes {
+        let own = &mut reach[*body as usize];
+        shape.for_each_vertex(|v| *own = own.max(f64::from(v.length() + shape.radius())));
+    }
+    for joint in &stage.joints {
+        let a = poses[joint.bodies[0] as usize];
+        let [p, q] = joint.ends(poses).map(&at);
         // Along the axis as far as b's anchor, and a bit on.
         let (sin, cos) = a[2].sin_cos();
         let axis = [cos * joint.axis[0] - sin * joint.axis[1], -(sin * joint.axis[0] + cos * joint.axis[1])];
@@ -112,6 +126,12 @@ pub(super) fn draw(
         match joint.mark {
             Mark::Revolute => {
                 line(picture, p, q);
+                for (k, end) in [p, q].into_iter().enumerate() {
+                    let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
+                    if stage.kinds[i] == BodyKind::Dynamic && anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
+                        line(picture, at([poses[i][0], poses[i][1]]), end);
+                    }
+                }
                 ring(picture, 16, 0.0, 0.5 * size);
             }
             Mark::Distance => {

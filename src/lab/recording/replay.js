@@ -100,13 +100,22 @@
     return made;
   };
 
-  // Corners of what moves at the start.
+  // How far each body reaches from its middle.
+  const reaches = ({ kinds, shapes }) => {
+    const all = new Float64Array(kinds.length);
+    for (const { body, points, radius } of shapes)
+      for (const [u, v] of points) all[body] = Math.max(all[body], Math.hypot(u, v) + radius);
+    return all;
+  };
+
+  // Corners of what moves at the start, and of what it hangs on.
   function bounds(recordings) {
     const box = [Infinity, Infinity, -Infinity, -Infinity];
-    for (const { shapes, kinds, frames } of recordings) {
+    for (const { shapes, kinds, frames, joints = [] } of recordings) {
+      const hinges = joints.flatMap(({ bodies, anchors }) => [0, 1].map((k) => ({ body: bodies[k], points: [anchors[k]], radius: 0, hinge: true })));
       const any = kinds.includes("d") || kinds.includes("k");
-      for (const { body, points, radius } of shapes) {
-        if (any && kinds[body] === "s") continue;
+      for (const { body, points, radius, hinge } of [...shapes, ...hinges]) {
+        if (any && kinds[body] === "s" && !hinge) continue;
         const [x, y, angle] = frames[0].poses.subarray(3 * body, 3 * body + 3);
         const [c, s] = [Math.cos(angle), Math.sin(angle)];
         for (const [u, v] of points) {
@@ -167,7 +176,8 @@
     }
 
     // As people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
-    function drawJoints(c, { joints = [] }, poses, px, py, scale) {
+    function drawJoints(c, recording, poses, px, py, scale) {
+      const { joints = [], kinds } = recording, reach = joints.length ? reaches(recording) : [];
       const s = Math.min(Math.max(0.3 * size * scale, 3), 12);
       c.strokeStyle = "#7a3e9d";
       c.fillStyle = "#fbf7fd";
@@ -217,6 +227,10 @@
           c.setLineDash(dashed ? [s, s] : []);
           stroke([ax, ay], [bx, by]);
           c.setLineDash([]);
+          for (const k of mark === "revolute" ? [0, 1] : []) {
+            const i = bodies[k], [x, y] = poses.subarray(3 * i, 3 * i + 2);
+            if (kinds[i] === "d" && Math.hypot(...anchors[k]) > 1.01 * reach[i]) stroke([px(x), py(y)], place(k));
+          }
           if (mark === "motor") ring(4, 0, 0.6 * s);
           if (!dashed) ring(16, 0, (mark === "revolute" ? 0.5 : 0.3) * s);
         }
