@@ -42,10 +42,12 @@
 //! the share α γ.
 
 mod descent;
+mod joints;
 mod lanes;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::types::{Joined, Placed};
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::StepParts;
@@ -87,7 +89,6 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     kept: KeptSize { per_point: PER_POINT, per_body: PER_BODY, ..KeptSize::NONE },
-    holds_no_joints: Some("its bodies see rows of contacts alone"),
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),
@@ -128,6 +129,7 @@ impl Solver for Avbd {
             }
             self.run(passes, Phase::Solve, |descent, on| descent.hold(on));
             keep_impulses(passes, h);
+            passes.reload_types();
             passes.hide_turns();
             passes.end_substep(substep);
         }
@@ -148,9 +150,12 @@ impl Avbd {
         if !passes.runs(Phase::Solve) {
             return;
         }
-        passes.build_graph(&mut self.graph);
-        let StepParts { work: Workspace { rows, lanes, serial, .. }, contacts, width, .. } = passes.parts();
-        let sequence = lanes.segments().is_empty().then(|| serial.contact());
+        passes.build_whole_graph(&mut self.graph);
+        let StepParts { work: Workspace { rows, poses, types, lanes, serial, .. }, contacts, width, .. } =
+            passes.parts();
+        let colored = |types: &[Joined]| types.iter().any(|joined| joined.is_colored());
+        let sequence = (lanes.segments().is_empty() && !colored(types)).then(|| serial.contact());
+        self.descent.joints.assign(types, Placed { rows, poses });
         self.descent.assign(rows, contacts, &self.graph, width, sequence);
     }
 
@@ -169,13 +174,30 @@ impl Avbd {
         if !passes.runs(phase) {
             return;
         }
-        let StepParts { work: Workspace { rows, motion, kept, .. }, contacts, input, clock, .. } =
-            passes.parts();
+        let StepParts {
+            work: Workspace { rows, motion, kept, types, poses, .. },
+            contacts,
+            input,
+            clock,
+            ..
+        } = passes.parts();
         let Features { rotation, friction, .. } = input.features;
         let (increments, bodies) = (motion.velocity_increments(), rows.len() - 1);
         work(
             &mut self.descent,
-            &mut DescentInput { rows, kept, contacts, increments, bodies, rotation, friction },
+            &mut DescentInput {
+                rows,
+                kept,
+                contacts,
+                increments,
+                bodies,
+                rotation,
+                friction,
+                types,
+                poses,
+                graph: &self.graph,
+                h: input.h,
+            },
         );
         // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
         let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);

@@ -10,10 +10,10 @@ use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, at_width};
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, TypeInput};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
 use crate::engine::lanes::{LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
-use rows::{JointPass, Task};
+use rows::{JointPass, RowBlock, Task};
 use std::f32::consts::TAU;
 use std::fmt;
 
@@ -272,6 +272,35 @@ impl<T: JointType> Joints<T> {
     }
 }
 
+impl<T: JointType> Joints<T> {
+    /// The pass over one joint, in one lane.
+    fn alone(&self, i: usize, Placed { rows, poses }: Placed<'_>, task: Task) -> JointPass<f32> {
+        let [a, b] = self.ends[i];
+        let names = if self.swapped { [b, a] } else { [a, b] };
+        let [a, b] = names.map(|body| body as usize);
+        let Quad([ax, ay, bx, by]) = self.anchors[i];
+        let turned = |body: usize, [x, y]: [f32; 2]| {
+            let [cos, sin, ..] = poses[body].rotation;
+            [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
+        };
+        let (ra, rb, from, to) =
+            (turned(a, [ax, ay]), turned(b, [bx, by]), poses[a].position, poses[b].position);
+        let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
+        let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
+        let mut pass = JointPass::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]], task);
+        pass.names = names;
+        pass
+    }
+
+    /// States the rows of a joint to `pass`.
+    fn state(&mut self, joint: usize, pass: &mut JointPass<f32>) {
+        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
+        let (numbers, kept) =
+            (&self.numbers[joint * numbers..][..numbers], &mut self.kept[joint * kept..][..kept]);
+        rows_once::<T, f32>(self.form, numbers, kept, pass);
+    }
+}
+
 /// [`JointType::rows`] where speed does not matter: compiled once.
 #[inline(never)]
 fn rows_once<T: JointType, L: Lanes>(form: T::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
@@ -337,6 +366,19 @@ impl<T: JointType> ConstraintType for Joints<T> {
             _ => return,
         };
         at_width!(width, Self::pass(self, task, on))
+    }
+
+    fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
+        let mut pass = self.alone(constraint, on, Task::Collect);
+        pass.blocks = std::mem::take(to);
+        self.state(constraint, &mut pass);
+        *to = pass.blocks;
+    }
+
+    fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
+        let mut pass = self.alone(constraint, on, Task::Replace);
+        pass.blocks.extend(blocks.iter().rev());
+        self.state(constraint, &mut pass);
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {

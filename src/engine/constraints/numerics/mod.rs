@@ -4,4 +4,5 @@ pub mod cone;
 pub mod coulomb_lcp;
 pub mod lemke;
 pub mod matrix;
+pub mod small;
 pub(crate) mod supports;
