@@ -228,7 +228,9 @@ fn forces(block: &RowBlock, kept: &Kept, h: f32, alpha: f32) -> Forces {
     if let Some(cap) = cap {
         let norm = force.iter().map(|f| f * f).sum::<f32>().sqrt();
         if norm > cap {
+            // A constant force has no stiffness.
             force = force.map(|f| f * (cap / norm));
+            stiffness = [[0.0; ROWS]; ROWS];
         }
     }
     let grows = match block.law {
