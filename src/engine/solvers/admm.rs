@@ -4,7 +4,7 @@
 //! **Source.** `boyd2011`, section 3; `desaxce1998` (friction as one cone, of which µ |ut| is part of the
 //! normal velocity).
 //!
-//! **Departures.** The linear problem is solved by a few steps of conjugate gradients, from the last
+//! **Departures.** Rows of joints are in the same vectors, with their bounds in place of cones. The linear problem is solved by a few steps of conjugate gradients, from the last
 //! solution on. ρ is scaled by each point's effective mass, the same along n and t. The multiplier
 //! starts where the contact law puts it, at −u.
 //!
@@ -26,7 +26,7 @@
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::point_vector::{
     Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, update,
@@ -60,7 +60,6 @@ pub static SOLVER: Variant = Variant {
             trials: &[3.0, 6.0],
         },
     ],
-    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
         (Law::Rest, "20 iterations are too few for tall stacks"),
@@ -74,6 +73,7 @@ fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [fraction, penalty, linear] = [0, 1, 2].map(|i| passes.parameter(i));
     let rule = Baumgarte::new(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let law = rule.of_errors();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
@@ -82,22 +82,23 @@ fn step(passes: &mut Passes<'_>) {
         passes.with_system(Phase::Solve, |system| {
             system.lane_surfaces(&mut bias);
             update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+            system.lane_bias(law, &mut bias);
             system.lane_masses(&mut stiffness);
             // ρ D⁻¹, the same along n and t.
             update([&mut stiffness], [], |[mass], []| [quotient([Wide::splat(penalty); 2], [mass[0]; 2])]);
             system.lane_impulses(&mut lambda);
             z.clone_from(&lambda);
-            velocity(system, &bias, &mut u);
+            velocity(system, &bias, &mut lambda, &mut u);
             update([&mut w], [&u, &bias, &stiffness], |_, [u, bias, stiffness]| {
                 let w = quotient(scaled(-1.0, with_slide(u, bias)), stiffness);
-                // A multiplier is in the polar cone.
-                [difference(w, cone::project(w, bias[1]))]
+                // A multiplier is in the polar cone; that of a joint begins at zero.
+                [difference(w, cone::project_point(w, bias[1]))]
             });
         });
         for _ in 0..budget.velocity_iterations {
             passes.with_system(Phase::Solve, |system| {
                 // Residual of the linear problem at λ: velocities are those of λ.
-                velocity(system, &bias, &mut u);
+                velocity(system, &bias, &mut lambda, &mut u);
                 update(
                     [&mut right],
                     [&u, &bias, &stiffness, &z, &w, &lambda],
@@ -114,9 +115,15 @@ fn step(passes: &mut Passes<'_>) {
                 );
                 update([&mut z, &mut w], [&lambda, &bias], |[_, w], [lambda, bias]| {
                     let both = sum(lambda, w);
-                    let z = cone::project(both, bias[1]);
+                    let z = cone::project_point(both, bias[1]);
                     [z, difference(both, z)]
                 });
+                if system.has_joints() {
+                    // Of joints z is λ + w by now, and w zero.
+                    right.clone_from(&z);
+                    system.bound_lanes(&mut z);
+                    update([&mut w], [&right, &z], |[w], [both, z]| [sum(w, difference(both, z))]);
+                }
                 system.set_lane_impulses(&mut z);
             });
             passes.count_sweep(2);
@@ -135,10 +142,11 @@ fn step(passes: &mut Passes<'_>) {
     }
 }
 
-/// u = J v + b, b along n alone.
-fn velocity(system: &mut System<'_>, bias: &PointVector, to: &mut PointVector) {
+/// u = J v + b + R λ, b along n alone; R of joints with springs.
+fn velocity(system: &mut System<'_>, bias: &PointVector, lambda: &mut PointVector, to: &mut PointVector) {
     system.lane_velocities(to);
     update([to], [bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
+    system.soften_lanes(to, lambda);
 }
 
 /// u + (µ |ut|, 0), the second entry of `bias` being µ.
@@ -166,6 +174,7 @@ fn conjugate_gradients(
         update([image], [before, stiffness, direction], |[after], [before, stiffness, p]| {
             [[0, 1].map(|k| after[k] - before[k] + stiffness[k] * p[k])]
         });
+        system.soften_lanes(image, direction);
         let curve = dot(direction, image);
         if curve <= 0.0 {
             // Rounding: take the trial back and stop.

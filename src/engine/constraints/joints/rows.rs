@@ -44,6 +44,7 @@
 
 use crate::engine::constraints::joints::ANCHORS;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
+use crate::engine::constraints::kernels::pass::VectorTask;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::numerics::small::solve;
 use crate::engine::constraints::records::rows::ROWS;
@@ -98,6 +99,15 @@ pub(crate) enum Task {
         /// Of rigid rows.
         law: Softness,
     },
+    /// Reads or writes vectors.
+    Vector {
+        /// What it does.
+        of: VectorTask,
+        /// Of rigid rows.
+        law: Softness,
+        /// 1/h (1/s)
+        inv_h: f32,
+    },
     /// Appends the blocks of the first lane to [`JointPass::blocks`].
     Collect,
     /// Takes the impulses of the first lane from [`JointPass::blocks`], the last one first.
@@ -111,9 +121,20 @@ pub(crate) enum Task {
     },
 }
 
+/// Where the rows of a batch are in vectors, in lane vectors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    /// Of its first row.
+    pub first: usize,
+    /// From row to row.
+    pub stride: usize,
+    /// Rows that have been visited.
+    pub next: usize,
+}
+
 /// The two bodies of a batch of joints, and what the pass does with their rows.
 #[derive(Debug)]
-pub struct JointPass<L> {
+pub struct JointPass<'v, L> {
     /// Rows of a and b.
     pub(crate) bodies: [[L; 8]; 2],
     /// sin Δθ and 1 − cos Δθ of a and b.
@@ -123,6 +144,8 @@ pub struct JointPass<L> {
     task: Task,
     /// See [`Task::Collect`].
     pub(super) blocks: Vec<RowBlock>,
+    /// x and y of [`Task::Vector`].
+    pub(super) vectors: Option<([&'v mut [L]; 2], Places)>,
     /// Of the bodies of a joint alone.
     pub(super) names: [u32; 2],
 }
@@ -139,12 +162,12 @@ pub fn add<L: Lanes>(u: [L; 2], v: [L; 2]) -> [L; 2] {
     [u[0] + v[0], u[1] + v[1]]
 }
 
-impl<L: Lanes> JointPass<L> {
+impl<'v, L: Lanes> JointPass<'v, L> {
     #[inline(always)]
     pub(crate) fn new(bodies: [[L; 8]; 2], anchors: &[L], task: Task) -> Self {
         let anchors = [anchors[0], anchors[1], anchors[2], anchors[3], anchors[4], anchors[5]];
         let turns = [turn(bodies[0][TURN]), turn(bodies[1][TURN])];
-        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), names: [u32::MAX; 2] }
+        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), vectors: None, names: [u32::MAX; 2] }
     }
 
     /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
@@ -220,6 +243,88 @@ impl<L: Lanes> JointPass<L> {
     #[inline(always)]
     fn solved<const N: usize>(&self, j: &[Jacobian<L>; N], x: [L; N]) -> [L; N] {
         solve(self.response(j), x)
+    }
+
+    /// What a block has in vectors.
+    ///
+    /// A row asks for J v + b + R λ = 0 within its bounds: b = β C where it is rigid, C/h where a limit is open, −u of a
+    /// motor, and b = (S/D) C, R = K/D of a spring, which is the line of the [module](self) at rest.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn vector_block<const N: usize>(
+        &mut self,
+        j: &[Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        impulse: &mut [L],
+        of: VectorTask,
+        solver: Softness,
+        inv_h: f32,
+    ) {
+        const VELOCITY: [usize; 3] = [VX, VY, W];
+        let Some(([x, y], mut places)) = self.vectors.take() else { return };
+        let at = |i: usize| places.first + (places.next + i) * places.stride;
+        let one = L::splat(1.0);
+        let least = L::splat(1e-9);
+        match of {
+            VectorTask::Impulses => (0..N).for_each(|i| x[at(i)] = impulse[i]),
+            VectorTask::SetImpulses => (0..N).for_each(|i| impulse[i] = x[at(i)]),
+            VectorTask::Velocities => (0..N).for_each(|i| x[at(i)] = self.rate(&j[i], VELOCITY)),
+            VectorTask::Push => (0..N).for_each(|i| self.apply(&j[i], x[at(i)], VELOCITY)),
+            VectorTask::Masses => {
+                let k = self.response(j);
+                let more = match law {
+                    RowLaw::Spring { damping, .. } => one + one / damping.max(least),
+                    _ => one,
+                };
+                for i in 0..N {
+                    let k = k[i][i] * more;
+                    x[at(i)] = k.select_positive(one / k, L::zero());
+                }
+            }
+            VectorTask::Bias => {
+                let rigid = L::splat(solver.bias_rate);
+                for i in 0..N {
+                    x[at(i)] = match law {
+                        RowLaw::Rigid => rigid * error[i],
+                        RowLaw::Limit => error[i].select_positive(L::splat(inv_h), rigid) * error[i],
+                        RowLaw::Motor { speed, .. } => -speed,
+                        RowLaw::Spring { stiffness, damping, .. } => {
+                            stiffness / damping.max(least) * error[i]
+                        }
+                    };
+                }
+            }
+            VectorTask::Soften => {
+                if let RowLaw::Spring { damping, .. } = law {
+                    let (k, scale) = (self.response(j), one / damping.max(least));
+                    for r in 0..N {
+                        for c in 0..N {
+                            let k = k[r.max(c)][r.min(c)];
+                            x[at(r)] = (scale * k).mul_add(y[at(c)], x[at(r)]);
+                        }
+                    }
+                }
+            }
+            VectorTask::Bound => {
+                let cap = match law {
+                    RowLaw::Motor { cap, .. } => Some(cap),
+                    RowLaw::Spring { cap, .. } => cap,
+                    RowLaw::Limit => {
+                        x[at(0)] = x[at(0)].max(L::zero());
+                        None
+                    }
+                    RowLaw::Rigid => None,
+                };
+                if let Some(cap) = cap {
+                    let norm = (0..N).fold(L::zero(), |sum, i| x[at(i)].mul_add(x[at(i)], sum)).sqrt();
+                    let scale = (norm - cap).select_positive(cap / norm, one);
+                    (0..N).for_each(|i| x[at(i)] = x[at(i)] * scale);
+                }
+            }
+        }
+        places.next += N;
+        self.vectors = Some(([x, y], places));
     }
 
     /// A block of the first lane.
@@ -357,6 +462,9 @@ impl<L: Lanes> JointPass<L> {
                 for i in 0..N {
                     self.apply(&j[i], x[i], VELOCITY);
                 }
+            }
+            Task::Vector { of, law: solver, inv_h } => {
+                self.vector_block(&j, error, law, impulse, of, solver, inv_h)
             }
             Task::Collect => {
                 let block = self.collected(&j, error, law, impulse);

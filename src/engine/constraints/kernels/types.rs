@@ -8,8 +8,7 @@
 //! Jacobi sweeps.
 //!
 //! A solver that has no passes takes constraints one by one as [`RowBlock`]s ([`ConstraintType::collect`]); what has none
-//! does nothing under such a solver. Vectors over contact points ([`crate::engine::constraints::records::point_vector`]) know
-//! contacts alone.
+//! does nothing under such a solver. Its impulses join the vectors of solvers that use them, if it says how many it has.
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
@@ -19,7 +18,7 @@ use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::constraints::records::rows::RowBlock;
-use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::fmt;
@@ -45,6 +44,8 @@ pub struct TypeInput<'a> {
     pub poses: &'a [PoseRow],
     /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
     pub batches: &'a mut Batches,
+    /// Parts of vectors, x and y of [`PassMode::Vector`]; else empty. `[groups × rows × 2]`, see [`ConstraintType::rows`].
+    pub vectors: [&'a mut [Block]; 2],
 }
 
 /// One row per body, and an inert one at the end: gathered and written in place or, in a Jacobi sweep,
@@ -145,6 +146,12 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Lane vectors of a record.
     fn stride(&self) -> usize;
 
+    /// Impulses of a constraint in vectors; those of 16 constraints that follow each other in a segment share as many pairs
+    /// of blocks, of which the second ones are zero. None: vectors know nothing of the type.
+    fn rows(&self) -> usize {
+        0
+    }
+
     /// Called before the passes of a step, of substeps of `h` (s).
     fn begin(&mut self, _bodies: &Bodies, _h: f32) {}
 
@@ -230,6 +237,11 @@ impl Joined {
     /// Its batches, colored and serial.
     pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
         [&mut self.lanes, &mut self.serial]
+    }
+
+    /// Rows of sixteen constraints in vectors.
+    pub(crate) fn vector_rows(&self) -> usize {
+        self.kind.rows() * (self.lanes.groups() + self.serial.groups())
     }
 
     /// Whether any of its constraints is colored.

@@ -271,6 +271,7 @@ impl<'a> Passes<'a> {
                     rows,
                     poses,
                     batches,
+                    vectors: [&mut [], &mut []],
                 });
             }
         }
@@ -293,6 +294,7 @@ impl<'a> Passes<'a> {
                     rows,
                     poses,
                     batches,
+                    vectors: [&mut [], &mut []],
                 });
             }
         }
