@@ -4,7 +4,7 @@
 //! **Source.** `boyd2011`, section 3; `desaxce1998` (friction as one cone, of which µ |ut| is part of the
 //! normal velocity).
 //!
-//! **Departures.** Rows of joints are in the same vectors, with their bounds in place of cones. The linear problem is solved by a few steps of conjugate gradients, preconditioned by its diagonal, from the last
+//! **Departures.** Rows of joints are in the same vectors, with their bounds in place of cones. The linear problem is solved by a few steps of conjugate gradients, preconditioned by D, from the last
 //! solution on. ρ is scaled by each point's effective mass, the same along n and t. The multiplier
 //! starts where the contact law puts it, at −u.
 //!
@@ -85,11 +85,10 @@ fn step(passes: &mut Passes<'_>) {
             update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
             system.lane_bias(law, &mut bias);
             system.lane_masses(&mut stiffness);
-            // ρ D⁻¹, the same along n and t, and the diagonal of (K + ρ D⁻¹)⁻¹.
+            // ρ D⁻¹ and D/(1 + ρ), the same along n and t.
             update([&mut stiffness, &mut inverse], [], |[mass, _], []| {
-                let stiffness = quotient([Wide::splat(penalty); 2], [mass[0]; 2]);
-                let one = Wide::splat(1.0);
-                [stiffness, quotient(mass, [0, 1].map(|k| one + stiffness[k] * mass[k]))]
+                let mass = [mass[0]; 2];
+                [quotient([Wide::splat(penalty); 2], mass), scaled(1.0 / (1.0 + penalty), mass)]
             });
             system.lane_impulses(&mut lambda);
             z.clone_from(&lambda);
@@ -175,7 +174,7 @@ fn conjugate_gradients(
     [stiffness, inverse]: [&PointVector; 2],
     [lambda, residual, direction, image, step, before]: [&mut PointVector; 6],
 ) {
-    // Preconditioned by the diagonal: rows of soft joints are stiffer than contacts by any factor.
+    // Preconditioned: rows of soft joints are stiffer than contacts by any factor.
     let norm = |r: &PointVector| sum_of_products([r, inverse], |[r, m]| [r, [0, 1].map(|k| m[k] * r[k])]);
     update([direction], [residual, inverse], |_, [r, m]| [[0, 1].map(|k| m[k] * r[k])]);
     let mut square = norm(residual);

@@ -46,6 +46,7 @@
 //! the share α γ.
 
 mod descent;
+mod input;
 mod joints;
 mod lanes;
 
@@ -57,7 +58,8 @@ use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
 use crate::engine::params::{Budget, Parameter};
-use descent::{Descent, DescentInput, NORMAL, PER_BODY, PER_POINT, TANGENT};
+use descent::{Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
+use input::DescentInput;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -189,6 +189,13 @@ impl<'v, L: Lanes> JointPass<'v, L> {
         self.bodies[1][TURN] - self.bodies[0][TURN]
     }
 
+    /// J times the displacements since the start of the step (m or rad): the error of a row that holds a speed alone, and
+    /// knows of no error before.
+    #[inline(always)]
+    pub fn travel(&self, j: &Jacobian<L>) -> L {
+        self.rate(j, [DX, DY, TURN])
+    }
+
     /// Arms of a and b to their anchors (m), and the way from a's anchor to b's (m), as they are now.
     #[inline(always)]
     pub fn anchors(&self) -> ([[L; 2]; 2], [L; 2]) {
@@ -354,7 +361,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
         for r in 0..N {
             block.jacobians[r] = Jacobian { axis: j[r].axis.map(first), arms: j[r].arms.map(first) };
             block.errors[r] = first(error[r]);
-            block.travel[r] = first(self.rate(&j[r], [DX, DY, TURN]));
+            block.travel[r] = first(self.travel(&j[r]));
             block.impulses[r] = first(impulse[r]);
             for c in 0..=r {
                 (block.response[r][c], block.response[c][r]) = (first(k[r][c]), first(k[r][c]));

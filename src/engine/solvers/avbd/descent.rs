@@ -26,18 +26,13 @@
 //! square k JᵀJ for each row. It is solved as L D Lᵀ in the order x, y, θ, in lanes and in `f32`: what
 //! rounding does to the step of a body, its next step sees and mends, as forces are recomputed from positions.
 
+use super::input::{DescentInput, PENALTY};
 use super::joints::JointDescent;
 use super::lanes::{BodyLanes, Ends};
 use crate::engine::constraints::kernels::pass::at_width;
-use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::Kept;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
-use crate::engine::narrowphase::lanes::PoseRow;
-
-/// Least and greatest penalty (N/m).
-pub(super) const PENALTY: [f32; 2] = [1.0, 1e9];
 
 /// Overlap that is no error (m): `COLLISION_MARGIN` of the source.
 const MARGIN: f32 = 5e-4;
@@ -73,25 +68,6 @@ pub struct Descent {
     /// Records of contacts, seen from body b.
     contacts: Vec<Block>,
     pub(super) joints: JointDescent,
-}
-
-/// Further inputs of a pass of block descent.
-pub(crate) struct DescentInput<'a> {
-    pub rows: &'a mut [BodyRow],
-    pub kept: &'a mut Kept,
-    pub contacts: &'a [Contact],
-    /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
-    pub increments: &'a [[f32; 4]],
-    /// The last row is none.
-    pub bodies: usize,
-    pub rotation: bool,
-    pub friction: bool,
-    pub types: &'a mut [Joined],
-    pub poses: &'a [PoseRow],
-    /// Of contacts and, behind them, joints.
-    pub graph: &'a Graph,
-    /// Substep (s).
-    pub h: f32,
 }
 
 impl Descent {

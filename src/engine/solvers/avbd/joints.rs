@@ -20,7 +20,7 @@
 //! C is taken where bodies are, not along its tangent. What a turning arm adds to the stiffness is f ∂²C/∂θ² = f d·r of a
 //! row along d; its size is |f| √(|r|² − s²) with s = r × d, and is added to the diagonal as the source does.
 
-use super::descent::{DescentInput, PENALTY};
+use super::input::{DescentInput, PENALTY};
 use crate::engine::constraints::joints::rows::{RowBlock, RowLaw};
 use crate::engine::constraints::kernels::types::{Joined, Placed};
 use crate::engine::constraints::records::rows::ROWS;
