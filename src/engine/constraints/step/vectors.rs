@@ -11,7 +11,8 @@ impl Passes<'_> {
     /// All impulses and velocities as vectors, in an order that no width changes.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, types, poses, .. } = &mut *self.work;
-        let joints = Others { types, poses, h: self.input.h, counted: self.input.phases.counted };
+        let (h, counted) = (self.input.h, self.input.phases.counted);
+        let joints = Others { types, poses, h, counted, driven: self.driven };
         System::new(
             rows,
             [lanes, serial],

@@ -24,10 +24,10 @@ pub type Pair = [f32; 2];
 
 /// A view of the step's problem; see the [module](self).
 pub struct System<'a> {
-    rows: &'a mut [BodyRow],
+    pub(super) rows: &'a mut [BodyRow],
     batches: [&'a mut Batches; 2],
     contacts: &'a [Contact],
-    others: Others<'a>,
+    pub(super) others: Others<'a>,
     features: &'a Features,
     clock: &'a mut Clock,
     width: LaneWidth,
@@ -40,6 +40,38 @@ pub(crate) struct Others<'a> {
     /// Substep (s).
     pub h: f32,
     pub counted: bool,
+    /// Springs and motors have acted in this substep.
+    pub driven: bool,
+}
+
+impl Others<'_> {
+    /// A pass over all of them; each takes its part of the vectors.
+    pub fn run(
+        &mut self,
+        rows: &mut [BodyRow],
+        width: LaneWidth,
+        (phase, mode): (Phase, PassMode),
+        law: Softness,
+        [mut x, mut y]: [&mut [Block]; 2],
+    ) {
+        let &mut Others { ref mut types, poses, h, counted, driven } = self;
+        for Joined { kind, lanes, serial } in types.iter_mut() {
+            for part in [Part::Lanes, Part::Serial] {
+                let width = match part {
+                    Part::Lanes => PassWidth { width, counted },
+                    Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+                };
+                let batches = part.of(lanes, serial);
+                let count = 2 * kind.rows() * batches.groups();
+                let vectors = [&mut x, &mut y].map(|all| all.split_off_mut(..count).unwrap_or_default());
+                if matches!(mode, PassMode::Vector(_)) && count == 0 {
+                    continue;
+                }
+                let rows = TypeRows::new(rows, &mut [], mode);
+                kind.run(TypeInput { phase, mode, law, driven, h, width, rows, poses, batches, vectors });
+            }
+        }
+    }
 }
 
 impl<'a> System<'a> {
@@ -123,7 +155,7 @@ impl<'a> System<'a> {
         self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
     }
 
-    /// A pass over constraints of other types than contacts.
+    /// A pass between impulses of joints and vectors.
     fn over_others(
         &mut self,
         task: VectorTask,
@@ -132,41 +164,17 @@ impl<'a> System<'a> {
         y: Option<&mut PointVector>,
     ) {
         let (mut none, [lanes, serial]) = (PointVector::default(), &self.batches);
-        let mut x = x.others([lanes, serial]);
-        let mut y = match y {
+        let x = x.others([lanes, serial]);
+        let y = match y {
             Some(y) => y.others([lanes, serial]),
             None => none.others([&Batches::default(), &Batches::default()]),
         };
-        let Others { types, poses, h, counted } = &mut self.others;
-        for joined in types.iter_mut() {
-            let rows = joined.kind.rows();
-            for part in [Part::Lanes, Part::Serial] {
-                let width = match part {
-                    Part::Lanes => PassWidth { width: self.width, counted: *counted },
-                    Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
-                };
-                let batches = part.of(&mut joined.lanes, &mut joined.serial);
-                let count = 2 * rows * batches.groups();
-                let own_x = x.split_off_mut(..count).expect("a vector of these constraints");
-                let own_y = y.split_off_mut(..count).unwrap_or_default();
-                if count == 0 {
-                    continue;
-                }
-                let mode = PassMode::Vector(task);
-                joined.kind.run(TypeInput {
-                    phase: Phase::Solve,
-                    mode,
-                    law,
-                    driven: false,
-                    h: *h,
-                    width,
-                    rows: TypeRows::new(self.rows, &mut [], mode),
-                    poses,
-                    batches,
-                    vectors: [own_x, own_y],
-                });
-            }
-        }
+        self.others.run(self.rows, self.width, (Phase::Solve, PassMode::Vector(task)), law, [x, y]);
+    }
+
+    /// A pass over constraints of other types than contacts.
+    pub(super) fn over_types(&mut self, phase: Phase, mode: PassMode) {
+        self.others.run(self.rows, self.width, (phase, mode), Softness::RIGID, [&mut [], &mut []]);
     }
 
     /// Colored batches at their width, then serial ones at one lane.
