@@ -43,7 +43,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::kernels::velocity::rules::NormalRule;
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::numerics::envelope::Envelope;
 use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
 use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::system::{Pair, PointRows};
@@ -285,8 +285,11 @@ struct Problem {
     start: Vec<f64>,
     /// u there, the bias included (m/s).
     velocity: Vec<f64>,
-    /// K, by rows (1/kg).
-    matrix: Vec<f64>,
+    /// K + R: its entries (1/kg) by rows, columns ascending, and where each row begins. `[rows + 1]`
+    entries: Vec<(usize, f64)>,
+    begins: Vec<usize>,
+    /// Its diagonal (1/kg).
+    diagonal: Vec<f64>,
 }
 
 impl Problem {
@@ -304,7 +307,17 @@ impl Problem {
         let rows = points.iter().flat_map(|p| [row(p, 0), row(p, 1)]).collect();
         let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
         let (start, velocity) = (flat(impulses), flat(velocities));
-        Problem { friction, start, velocity, rows, bounds: vec![], matrix: vec![], points }
+        Problem {
+            friction,
+            start,
+            velocity,
+            rows,
+            bounds: vec![],
+            entries: vec![],
+            begins: vec![],
+            diagonal: vec![],
+            points,
+        }
     }
 
     /// Adds the rows of a block of a joint.
@@ -334,39 +347,80 @@ impl Problem {
     /// The matrix K + R of all rows, R of `joints`.
     fn couple(&mut self, bodies: &[BodyRow], joints: &[RowBlock]) {
         let n = self.rows.len();
-        self.matrix = vec![0.0; n * n];
-        for (i, p) in self.rows.iter().enumerate() {
-            for (j, q) in self.rows.iter().enumerate() {
-                for (side, body) in p.bodies.into_iter().enumerate() {
-                    let Some(other) = q.bodies.into_iter().position(|b| b == body) else { continue };
-                    let Some(mass) = bodies.get(body as usize) else { continue };
-                    let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
-                    let (a, b) = (p.jacobian[side], q.jacobian[other]);
-                    self.matrix[i * n + j] += (0..3).map(|c| a[c] * inverse[c] * b[c]).sum::<f64>();
-                }
+        // Rows of each body, ascending: those that a row couples with are in the lists of its two bodies.
+        let mut sides: Vec<(u32, usize, usize)> = vec![];
+        for (i, row) in self.rows.iter().enumerate() {
+            sides.extend(row.bodies.into_iter().enumerate().map(|(side, body)| (body, i, side)));
+        }
+        sides.sort_unstable();
+        let mut lists: Vec<[(&[(u32, usize, usize)], [f64; 3]); 2]> = vec![[(&[], [0.0; 3]); 2]; n];
+        for of_body in sides.chunk_by(|one, other| one.0 == other.0) {
+            let Some(mass) = bodies.get(of_body[0].0 as usize) else { continue };
+            let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
+            if inverse != [0.0; 3] {
+                of_body.iter().for_each(|&(_, i, side)| lists[i][side] = (of_body, inverse));
             }
         }
+        for (i, [(mut of_a, mass_a), (mut of_b, mass_b)]) in lists.into_iter().enumerate() {
+            self.begins.push(self.entries.len());
+            let product = |side: usize, inverse: [f64; 3], j: usize, other: usize| {
+                let (a, b) = (self.rows[i].jacobian[side], self.rows[j].jacobian[other]);
+                (0..3).map(|c| a[c] * inverse[c] * b[c]).sum::<f64>()
+            };
+            let mut diagonal = 0.0;
+            while let Some(j) = of_a.first().into_iter().chain(of_b.first()).map(|entry| entry.1).min() {
+                let mut sum = 0.0;
+                for (side, list, mass) in [(0, &mut of_a, mass_a), (1, &mut of_b, mass_b)] {
+                    if let Some((&(_, at, other), rest)) = list.split_first()
+                        && at == j
+                    {
+                        sum += product(side, mass, j, other);
+                        *list = rest;
+                    }
+                }
+                self.entries.push((j, sum));
+                diagonal = if i == j { sum } else { diagonal };
+            }
+            if self.begins[i] == self.entries.len() {
+                self.entries.push((i, 0.0));
+            }
+            self.diagonal.push(diagonal);
+        }
+        self.begins.push(self.entries.len());
         let mut first = 2 * self.points.len();
-        for block in joints {
+        for block in joints.iter() {
             let softness = f64::from(block.softness());
-            for r in 0..block.size {
-                for c in 0..block.size {
-                    self.matrix[(first + r) * n + first + c] += softness * f64::from(block.response[r][c]);
+            for r in (0..block.size).filter(|_| softness > 0.0).map(|r| first + r) {
+                let row = self.begins[r]..self.begins[r + 1];
+                for (j, value) in &mut self.entries[row] {
+                    if (first..first + block.size).contains(j) {
+                        *value += softness * f64::from(block.response[r - first][*j - first]);
+                    }
+                    self.diagonal[r] = if *j == r { *value } else { self.diagonal[r] };
                 }
             }
             first += block.size;
         }
         // What nothing can move keeps its impulse.
-        for i in 2 * self.points.len()..n {
-            if self.matrix[i * (n + 1)] <= 0.0 {
-                self.matrix[i * (n + 1)] = 1.0;
-                self.velocity[i] = 0.0;
-            }
+        for i in (2 * self.points.len()..n).filter(|&i| self.diagonal[i] <= 0.0).collect::<Vec<_>>() {
+            (self.diagonal[i], self.velocity[i]) = (1.0, 0.0);
+            let row = self.begins[i]..self.begins[i + 1];
+            self.entries[row].iter_mut().for_each(|(j, value)| *value = f64::from(*j == i));
         }
     }
 
+    /// Entries of a row, columns ascending.
+    fn row(&self, i: usize) -> &[(usize, f64)] {
+        &self.entries[self.begins[i]..self.begins[i + 1]]
+    }
+
+    /// Product of a row and a vector.
+    fn times(&self, i: usize, x: &[f64]) -> f64 {
+        self.row(i).iter().map(|&(j, k)| k * x[j]).sum()
+    }
+
     fn diagonal(&self, i: usize) -> f64 {
-        self.matrix[i * (self.start.len() + 1)]
+        self.diagonal[i]
     }
 
     /// λ − (u + ε D (λ − λ₀))/D, row by row.
@@ -374,8 +428,7 @@ impl Problem {
         let n = impulses.len();
         let change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
         let argument = |i: usize| {
-            let row = &self.matrix[i * n..(i + 1) * n];
-            let u = self.velocity[i] + row.iter().zip(&change).map(|(k, c)| k * c).sum::<f64>();
+            let u = self.velocity[i] + self.times(i, &change);
             impulses[i] - u / self.diagonal(i) - SHIFT * change[i]
         };
         (0..n).map(argument).collect()
@@ -449,21 +502,32 @@ impl Problem {
         let mut impulses: Vec<f64> =
             states.iter().map(|state| if let State::Fixed(value) = state { *value } else { 0.0 }).collect();
         let scale = |i: usize| 1.0 / self.diagonal(i).sqrt();
-        let m = unknowns.len();
-        let (mut a, mut b) = (vec![0.0; m * m], vec![0.0; m]);
+        const KNOWN: usize = usize::MAX;
+        let mut number = vec![KNOWN; n];
+        unknowns.iter().enumerate().for_each(|(r, &i)| number[i] = r);
+        // A slipping point acts along n + s µ t: its tangential column belongs to the normal one.
+        let column = |j: usize| match states[j] {
+            State::Slips(slope) => (number[j - 1], j - 1, slope),
+            _ => (number[j], j, 1.0),
+        };
+        let coupled = |r: usize| {
+            self.row(unknowns[r]).iter().map(|&(j, _)| column(j).0).filter(|&number| number != KNOWN)
+        };
+        let mut system = Envelope::default();
+        system.begin(unknowns.len(), coupled);
+        let mut b = vec![0.0; unknowns.len()];
+        let change: Vec<f64> = self.start.iter().zip(&impulses).map(|(l, fixed)| l - fixed).collect();
         for (r, &i) in unknowns.iter().enumerate() {
-            let row = &self.matrix[i * n..(i + 1) * n];
-            for (c, &j) in unknowns.iter().enumerate() {
-                // A slipping point acts along n + s µ t.
-                let along = row[j] + slope(j).map_or(0.0, |slope| slope * row[j + 1]);
-                a[r * m + c] = scale(i) * along * scale(j);
+            for &(j, k) in self.row(i) {
+                let (number, j, factor) = column(j);
+                if number != KNOWN {
+                    system.add(r, number, scale(i) * k * factor * scale(j));
+                }
             }
-            a[r * m + r] += SHIFT;
-            let from_start: f64 =
-                row.iter().zip(&self.start).zip(&impulses).map(|((k, l), fixed)| k * (l - fixed)).sum();
-            b[r] = scale(i) * (from_start - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
+            system.add(r, r, SHIFT);
+            b[r] = scale(i) * (self.times(i, &change) - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
         }
-        if !solve_in_place(&mut a, &mut b, 1e-14) {
+        if !system.solve(&mut b, 1e-14) {
             return None;
         }
         for (&i, y) in unknowns.iter().zip(&b) {
@@ -485,12 +549,12 @@ impl Problem {
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();
         // u without impulses, pulled toward λ₀ as in Newton's problem.
         let free = |i: usize| {
-            let held: f64 = self.matrix[i * n..(i + 1) * n].iter().zip(&self.start).map(|(k, l)| k * l).sum();
-            self.velocity[i] - held - SHIFT * self.diagonal(i) * self.start[i]
+            self.velocity[i] - self.times(i, &self.start) - SHIFT * self.diagonal(i) * self.start[i]
         };
         let entry = |i: usize, j: usize| {
             let shift = if i == j { 1.0 + SHIFT } else { 1.0 };
-            shift * self.matrix[i * n + j]
+            let row = self.row(i);
+            row.binary_search_by_key(&j, |entry| entry.0).map_or(0.0, |at| shift * row[at].1)
         };
         let lcp = CoulombLcp::new(&self.friction, &pair(&|i| self.diagonal(i)), &pair(&free), entry);
         let found = lcp.solve(&vec![1.0; lcp.rows()], PIVOTS * lcp.rows()).ok()?;
