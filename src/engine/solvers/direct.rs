@@ -12,17 +12,15 @@
 //! [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
 //! finds nothing better, and in scenes with more than `largest` points, they are the answer.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then, for m points, a matrix of
-//! 4m² entries (32m² B) and up to `velocity_iterations` factorizations of 16m³/3 operations in `f64`, one lane.
-//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 27, 85, 250 and 890 µs where
-//! eight sweeps take 4 to 9 µs. Sweeps of moderate accuracy are always cheaper; sweeps of
-//! [`super::anderson`] from a cold start to a residual of 10⁻⁴ take 60, 96 and 319 µs for 10, 20 and 40
-//! boxes, so that it loses to those, too, from some 40 points on. Lemke's method takes 79 and 520 µs for
-//! stacks of 5 and 10 boxes where Newton's takes 11 and 28: a pivot goes through a tableau of 16m² entries, and there
-//! are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
+//! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
+//! within the envelope of the matrix (`numerics/envelope.rs`), n b² operations in `f64` for n rows in a band of b, one lane.
+//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 31, 48, 72 and 121 µs where eight sweeps take 4
+//! to 13 µs and fall from 20 boxes on (AMD EPYC, AVX2, 2026-11-23). Bands of pyramids are wide: with `largest` at 2000,
+//! `pyramid:10` takes 5.6 ms and `pyramid:20` 72 ms. Lemke's method takes 79 and 520 µs for stacks of 5 and 10 boxes: a
+//! pivot goes through a tableau of 16m² entries for m points, and there are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
 //! loses from the first point on. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** there are many points (a factorization grows by m³), and where friction lets a point
+//! **Fails when** there are many points in wide bands, and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
 //!
 //! # The method
