@@ -29,7 +29,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::point_vector::{
-    Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, update,
+    PointEntry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, update,
 };
 use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::lanes::Lanes;
@@ -142,7 +142,7 @@ fn velocity(system: &mut System<'_>, bias: &PointVector, to: &mut PointVector) {
 }
 
 /// u + (µ |ut|, 0), the second entry of `bias` being µ.
-fn with_slide(u: Entry, bias: Entry) -> Entry {
+fn with_slide(u: PointEntry, bias: PointEntry) -> PointEntry {
     [bias[1].mul_add(Lanes::max(u[1], -u[1]), u[0]), u[1]]
 }
 

@@ -125,7 +125,7 @@ impl Demand {
 
 /// Watches a run from before its first step.
 #[derive(Clone, Debug)]
-pub struct Watch {
+pub struct HoldWatch {
     demands: Vec<Demand>,
     start: Vec<DVec2>,
     previous: Vec<DVec2>,
@@ -140,7 +140,7 @@ pub struct Watch {
     broken: Option<Broken>,
 }
 
-impl Watch {
+impl HoldWatch {
     /// For a world that has not taken a step yet.
     pub fn new(world: &World, demands: impl Into<Vec<Demand>>) -> Self {
         let demands = demands.into();
@@ -165,7 +165,7 @@ impl Watch {
         touching.sort();
         touching.dedup();
         let kinetic = energies(world);
-        Watch {
+        HoldWatch {
             demands,
             previous: start.clone(),
             start,
@@ -378,7 +378,7 @@ mod tests {
     /// What is broken once body `i` is at `place`.
     fn moved(name: &str, demands: &[Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
         let mut world = build(&load(name).unwrap().scene);
-        let mut watch = Watch::new(&world, demands);
+        let mut watch = HoldWatch::new(&world, demands);
         watch.observe(&world);
         assert_eq!(watch.broken(), None, "{name}");
         [world.bodies.position_x[i], world.bodies.position_y[i]] = place;
@@ -418,7 +418,7 @@ mod tests {
     #[test]
     fn energy_from_nowhere_is_a_blow_up() {
         let mut world = build(&load("bounce").unwrap().scene);
-        let mut watch = Watch::new(&world, [Demand::GainsNoEnergy]);
+        let mut watch = HoldWatch::new(&world, [Demand::GainsNoEnergy]);
         let fall = |world: &mut World, y: f32, v: f32| {
             (world.bodies.position_y[1], world.bodies.velocity_y[1]) = (y, v);
         };
@@ -455,7 +455,7 @@ mod tests {
         let door = SceneBody::new(BodyKind::Kinematic, [0.0, 0.0], SceneShape::rectangle(0.5, 5.0));
         let ball = SceneBody::dynamic([2.0, 0.0], SceneShape::disc(0.1));
         let mut world = build(&Scene::new("x", vec![door, ball]));
-        let mut watch = Watch::new(&world, []);
+        let mut watch = HoldWatch::new(&world, []);
         let mut observe = |door: f32, ball: f32| {
             (world.bodies.position_x[0], world.bodies.position_x[1]) = (door, ball);
             watch.observe(&world);
