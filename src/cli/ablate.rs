@@ -4,7 +4,7 @@ use super::output::{note, print, print_json, value};
 use super::progress::Bar;
 use super::values;
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
-use crate::lab::ablate::{self, Plan};
+use crate::lab::ablate::{self, AblationPlan};
 use crate::lab::error::Error;
 use crate::lab::estimate::Estimate;
 use crate::lab::verify;
@@ -67,7 +67,7 @@ pub fn run(args: &AblateArgs) -> Result<ExitCode, Error> {
         true => (0..solver.mechanisms.len()).collect(),
         false => args.mechanisms.iter().map(|name| solver.mechanism(name)).collect::<Result<Vec<_>, _>>()?,
     };
-    let plan = Plan {
+    let plan = AblationPlan {
         solver,
         mechanisms,
         cases: verify::select(&args.cases)?,

@@ -7,7 +7,7 @@ use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::advise::limits::Limits;
-use crate::lab::advise::{Advice, Plan, Setting, Time, Trial, advise};
+use crate::lab::advise::{Advice, FoundTime, SearchPlan, SearchSetting, Trial, advise};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::profile::waiting;
@@ -86,7 +86,7 @@ pub struct AdviseArgs {
 }
 
 impl AdviseArgs {
-    fn plan(&self) -> Result<Plan, Error> {
+    fn plan(&self) -> Result<SearchPlan, Error> {
         let loaded = open_scene(&self.scene, Some(self.seed), self.steps, None)?;
         let truth = loaded.truth.as_ref().map_or("", |t| t.unit);
         let read = |option: &str, text: &Option<String>, unit: &str| {
@@ -118,7 +118,7 @@ impl AdviseArgs {
         if !(self.seconds > 0.0 && self.seconds.is_finite()) {
             return Err(Error::invalid("seconds", format!("{} is not a positive number", self.seconds)));
         }
-        Ok(Plan {
+        Ok(SearchPlan {
             scene: self.scene.clone(),
             limits,
             impacts: self.impacts.impacts,
@@ -146,9 +146,9 @@ pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
 }
 
 /// The command that runs what was chosen.
-fn repeat(plan: &Plan, advice: &Advice) -> String {
+fn repeat(plan: &SearchPlan, advice: &Advice) -> String {
     let Some(chosen) = advice.best().or(advice.nearest()) else { return String::new() };
-    let Setting { solver, order, budget, parameters, impacts } = &chosen.setting;
+    let SearchSetting { solver, order, budget, parameters, impacts } = &chosen.setting;
     let mut words = vec!["simpulse run".to_string(), quoted(&plan.scene)];
     words.push(format!("--solver {}", solver.name));
     match order {
@@ -180,7 +180,7 @@ fn quoted(word: &str) -> String {
 }
 
 /// The limits in words.
-fn limits(plan: &Plan, unit: &str) -> String {
+fn limits(plan: &SearchPlan, unit: &str) -> String {
     let l = &plan.limits;
     let parts = [
         l.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
@@ -192,7 +192,7 @@ fn limits(plan: &Plan, unit: &str) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-fn text(plan: &Plan, advice: &Advice) -> String {
+fn text(plan: &SearchPlan, advice: &Advice) -> String {
     let unit = advice.trials.iter().find_map(|t| t.truth).map_or("", |t| t.unit);
     let mut text = String::new();
     match (advice.best(), advice.nearest()) {
@@ -231,7 +231,7 @@ fn text(plan: &Plan, advice: &Advice) -> String {
 }
 
 /// The advice: what it costs, and what was seen of it.
-fn sentence(plan: &Plan, best: &Trial) -> String {
+fn sentence(plan: &SearchPlan, best: &Trial) -> String {
     let mut text = format!("{}: ", name(best));
     if let Some(time) = best.time {
         text += &format!(
@@ -255,11 +255,11 @@ fn sentence(plan: &Plan, best: &Trial) -> String {
 }
 
 /// What is faster and was not taken, with the reason.
-fn rejected(plan: &Plan, advice: &Advice) -> String {
+fn rejected(plan: &SearchPlan, advice: &Advice) -> String {
     let mut rows = table(&["  rejected although faster", "µs/step", "longest", "why"]);
     let rejected = advice.rejected();
     for trial in &rejected {
-        let [median, longest] = [|t: Time| t.median_ns, |t: Time| t.worst_ns]
+        let [median, longest] = [|t: FoundTime| t.median_ns, |t: FoundTime| t.worst_ns]
             .map(|of| trial.time.map_or("–".into(), |t| digits(1e-3 * of(t))));
         let why = trial.fails(&plan.limits).unwrap_or_default();
         rows.add_row([format!("  {}", trial.setting.text()), median, longest, why]);
@@ -313,7 +313,7 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
 }
 
 /// Everything that was timed, a line each.
-fn finalists(plan: &Plan, advice: &Advice) -> String {
+fn finalists(plan: &SearchPlan, advice: &Advice) -> String {
     let rests = plan.limits.rest.is_some();
     let mut rows = table(&[
         "compared",
@@ -330,7 +330,8 @@ fn finalists(plan: &Plan, advice: &Advice) -> String {
     ]);
     let first = advice.finalists.first();
     for trial in &advice.finalists {
-        let time = |of: fn(Time) -> f64| trial.time.map_or("failed".to_string(), |t| digits(1e-3 * of(t)));
+        let time =
+            |of: fn(FoundTime) -> f64| trial.time.map_or("failed".to_string(), |t| digits(1e-3 * of(t)));
         let slower = |f: &Trial| Some((f.ties(trial), trial.time?.mean_ns / f.time?.mean_ns - 1.0));
         let slower = first.filter(|f| !std::ptr::eq(*f, trial)).and_then(slower);
         let error = |of: &dyn Fn(&crate::lab::metrics::Errors) -> String| {
@@ -358,8 +359,8 @@ fn finalists(plan: &Plan, advice: &Advice) -> String {
     finish(rows, 2)
 }
 
-fn json(plan: &Plan, advice: &Advice) -> Value {
-    let setting = |s: &Setting| {
+fn json(plan: &SearchPlan, advice: &Advice) -> Value {
+    let setting = |s: &SearchSetting| {
         json!({
             "solver": s.solver.name,
             "order": s.order,

@@ -1,7 +1,7 @@
 //! `simpulse compare`: two studies, and what became better or worse.
 
 use super::output::{print, print_json, value};
-use crate::lab::compare::{self, Options};
+use crate::lab::compare::{self, CompareOptions};
 use crate::lab::error::Error;
 use crate::lab::report::study_file::StudyFile;
 use clap::Args;
@@ -53,7 +53,7 @@ fn share(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub fn run(args: &CompareArgs) -> Result<ExitCode, Error> {
     let (before, after) = (StudyFile::read(&args.before)?, StudyFile::read(&args.after)?);
-    let options = Options { threshold: args.threshold, relative: args.relative };
+    let options = CompareOptions { threshold: args.threshold, relative: args.relative };
     let found = compare::compare(&before, &after, &options);
     if found.pairs.is_empty() {
         let message =

@@ -3,13 +3,13 @@
 use super::capture::freeze;
 use super::output::{note, print};
 use super::progress::Bar;
-use super::values::{self, Lanes, SettingArgs, Solvers};
-use crate::lab::converge::{Options, converge_watched, plot, summary, table};
+use super::values::{self, LaneArgs, SettingArgs, Solvers};
+use crate::lab::converge::{ConvergeOptions, converge_watched, plot, summary, table};
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
+use crate::lab::picture::axes::with_dark;
 use crate::lab::reference::frozen::Frozen;
-use crate::lab::report::axes::with_dark;
 use crate::lab::report::style::Style;
 use clap::Args;
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ pub struct ConvergeArgs {
     pub max_iterations: u32,
     /// Lanes in colored order
     #[command(flatten)]
-    pub lanes: Lanes,
+    pub lanes: LaneArgs,
     /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
@@ -74,10 +74,10 @@ pub struct ConvergeArgs {
 }
 
 impl ConvergeArgs {
-    fn options(&self) -> Result<Options, Error> {
+    fn options(&self) -> Result<ConvergeOptions, Error> {
         let solvers = self.solvers.chosen();
         overrides::check(&solvers, &self.set)?;
-        Ok(Options {
+        Ok(ConvergeOptions {
             solvers,
             max_iterations: self.max_iterations,
             seed: self.seed,

@@ -3,12 +3,12 @@
 use super::output::{note, print, print_json};
 use super::progress::Bar;
 use super::settled;
-use super::values::{self, Lanes, SettingArgs};
+use super::values::{self, LaneArgs, SettingArgs};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files;
-use crate::lab::profile::growth::{Entry, Measurement, measure, size_for, verdicts};
+use crate::lab::profile::growth::{GrowthWorld, Measurement, measure, size_for, verdicts};
 use crate::lab::profile::growth_report;
 use crate::lab::profile::islands::islands;
 use crate::lab::profile::records::growth_json;
@@ -51,7 +51,7 @@ pub struct GrowthArgs {
     pub setting: SettingArgs,
     /// Lanes
     #[command(flatten)]
-    pub lanes: Lanes,
+    pub lanes: LaneArgs,
     /// Steps before a scene is frozen
     #[arg(long, default_value_t = 8, value_name = "STEPS")]
     pub settle: u32,
@@ -73,14 +73,14 @@ const OBSERVED_STEPS: u32 = 2;
 const MEMORY_SHARE: f64 = 0.6;
 
 /// A scene that can be had with about so many contacts.
-enum Family {
+enum GrowthFamily {
     /// By its size: sizes it can have, and contacts at two of them.
     Sized { name: String, size: Size, known: [(f64, f64); 2] },
     /// By copies: the scene and its contacts.
     Copied { scene: Scene, contacts: usize },
 }
 
-impl Family {
+impl GrowthFamily {
     fn new(name: &str, settings: &Settings, settle: u32) -> Result<Self, Error> {
         let count = |scene: &Scene| -> Result<usize, Error> {
             let mut world = scene.build(settings.clone())?;
@@ -98,7 +98,7 @@ impl Family {
         let Some(size) = entry.and_then(|e| e.size) else {
             let scene = named(name)?;
             let contacts = count(&scene)?;
-            return Ok(Family::Copied { scene, contacts });
+            return Ok(GrowthFamily::Copied { scene, contacts });
         };
         let at = |size: u32| -> Result<(f64, f64), Error> {
             Ok((f64::from(size), count(&named(&format!("{name}:{size}"))?)? as f64))
@@ -109,20 +109,20 @@ impl Family {
             let message = format!("the contacts of {name} do not grow with its size; give one to copy it");
             return Err(Error::invalid("scene", message));
         }
-        Ok(Family::Sized { name: name.into(), size, known })
+        Ok(GrowthFamily::Sized { name: name.into(), size, known })
     }
 
     /// The scene nearest to `target` contacts; none if it cannot be that large.
     fn scene(&self, target: f64) -> Result<Option<Scene>, Error> {
         let made = match self {
-            Family::Sized { name, size, known } => {
+            GrowthFamily::Sized { name, size, known } => {
                 let wanted = size_for(target, *known).unwrap_or(0.0).round();
                 if !(f64::from(size.min)..=f64::from(size.max)).contains(&wanted) {
                     return Ok(None);
                 }
                 named(&format!("{name}:{wanted}"))?
             }
-            Family::Copied { scene, contacts } => {
+            GrowthFamily::Copied { scene, contacts } => {
                 let copies = (target / *contacts as f64).round().max(1.0) as usize;
                 if copies.saturating_mul(scene.bodies.len()) > MAX_BODIES {
                     return Ok(None);
@@ -181,11 +181,11 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
         named(&args.scene)?;
     }
-    let family = Family::new(&args.scene, &settings, args.settle)?;
+    let family = GrowthFamily::new(&args.scene, &settings, args.settle)?;
     let estimate = estimate(&targets, args, &settings);
     note(&estimate.note("growth", None)?);
     files::prepare_folder(&args.out)?;
-    let mut entries: Vec<Entry> = Vec::new();
+    let mut entries: Vec<GrowthWorld> = Vec::new();
     let mut notes = String::new();
     let bar = Bar::new();
     let parts = targets.len() + args.repeats as usize;
@@ -196,7 +196,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
             continue;
         };
         // What a contact took so far, what settling takes, and the scene itself.
-        let bytes = |e: &Entry| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
+        let bytes =
+            |e: &GrowthWorld| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
         let expected = entries.last().map_or(0.0, bytes) * target;
         if free_memory().is_some_and(|free| expected > MEMORY_SHARE * free) {
             notes +=
@@ -207,7 +208,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         bar.show(done, parts, what);
         let mut world: World = scene.build(settings.clone())?;
         match settled(&mut world, args.settle, OBSERVED_STEPS) {
-            Ok(errors) => entries.push(Entry { scene: scene.name, world, errors }),
+            Ok(errors) => entries.push(GrowthWorld { scene: scene.name, world, errors }),
             Err(failure) => notes += &format!("skipped: {}: {failure}\n", scene.name),
         }
     }

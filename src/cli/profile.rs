@@ -2,12 +2,12 @@
 
 use super::output::{note, print, print_json};
 use super::settled;
-use super::values::{self, Lanes, SettingArgs, scene_help};
+use super::values::{self, LaneArgs, SettingArgs, scene_help};
 use crate::engine::clock::Phase;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
-use crate::lab::profile::{Options, profile, records, roofline, text};
+use crate::lab::profile::{ProfileOptions, profile, records, roofline, text};
 use crate::lab::report::table::error_line;
 use crate::lab::study::open_scene;
 use clap::Args;
@@ -58,7 +58,7 @@ pub struct ProfileArgs {
     pub setting: SettingArgs,
     /// Lanes
     #[command(flatten)]
-    pub lanes: Lanes,
+    pub lanes: LaneArgs,
     /// Steps before the state is frozen
     #[arg(long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
@@ -151,7 +151,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     let what = if let [phase] = phases.as_slice() { phase.name() } else { "every phase in turn" };
     let rest = if args.no_ceilings { "nothing else" } else { "the machine's ceilings between" };
     note(&format!("repeating {what} for {} s, {rest} (process {})\n", args.seconds, std::process::id()));
-    let options = Options { phases, seconds: args.seconds, ceilings: !args.no_ceilings };
+    let options = ProfileOptions { phases, seconds: args.seconds, ceilings: !args.no_ceilings };
     let report = profile(&mut frozen, &probes, &scene.name, &options);
     let json = args.json.then(|| records::json(&report, errors.as_ref()));
     let mut out = text::head(&report) + &error_line(errors.as_ref()) + "\n" + &text::text(&report);

@@ -3,7 +3,7 @@
 use super::output::print_beside;
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::recording::page::{MOST, Panel, page};
+use crate::lab::recording::page::{MOST, RecordingPanel, page};
 use crate::lab::recording::read::{Recording, read_file};
 use crate::lab::report::style::Style;
 use clap::Args;
@@ -35,12 +35,12 @@ pub fn run(args: &ReplayArgs) -> Result<ExitCode, Error> {
         return Err(Error::invalid("replay", format!("{} recordings, at most {MOST} fit", args.files.len())));
     }
     let read = args.files.iter().map(|path| read_file(path)).collect::<Result<Vec<_>, _>>()?;
-    let panel = |(bytes, recording): &'_ (Vec<u8>, Recording)| Panel {
+    let panel = |(bytes, recording): &'_ (Vec<u8>, Recording)| RecordingPanel {
         bytes: bytes.clone(),
         header: recording.header.clone(),
         color: Style::of(&recording.header.solver).color.to_string(),
     };
-    let panels: Vec<Panel> = read.iter().map(panel).collect();
+    let panels: Vec<RecordingPanel> = read.iter().map(panel).collect();
     let text = page(&panels);
     files::write(&args.output, text.as_bytes())?;
     let size = text.len().div_ceil(1024);

@@ -18,9 +18,9 @@ use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{bodies, lanes, ratio, si};
 use crate::lab::scenes::Scene;
-use crate::lab::scenes::holds::{Broken, Watch};
+use crate::lab::scenes::holds::{Broken, HoldWatch};
 use crate::lab::study::cost::sweeps;
-use crate::lab::study::{Failure, TruthError, budget, open_scene};
+use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -88,7 +88,7 @@ pub struct RunArgs {
 }
 
 /// What a run found.
-struct Found {
+struct RunResult {
     times: Times,
     errors: Errors,
     truth: Option<TruthError>,
@@ -139,10 +139,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     });
     let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
-    let mut watch = Watch::new(&world, loaded.demands.clone());
+    let mut watch = HoldWatch::new(&world, loaded.demands.clone());
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
     let bar = Bar::new();
-    let diverged = |failure: Failure| {
+    let diverged = |failure: FailedAt| {
         note(&format!("failed: {} {failure}; nothing written\n", args.scene));
         if args.json {
             let message = failure.to_string();
@@ -188,7 +188,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let truth = loaded.truth.as_ref().map(TruthError::of);
     let (unchecked, rests) = (loaded.unchecked.clone(), loaded.rests());
     let found =
-        Found { times, errors: observation.errors(), truth, broken: watch.broken(), unchecked, rests };
+        RunResult { times, errors: observation.errors(), truth, broken: watch.broken(), unchecked, rests };
     let mut written = String::new();
     if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
         let outcome = found.broken.map_or("holds".to_string(), |broken| broken.to_string());
@@ -233,7 +233,7 @@ pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -
     Ok(Settings { order, record_impulses: true, ..own })
 }
 
-impl Found {
+impl RunResult {
     /// The eight key figures, and what to do about each.
     ///
     /// | figure | what to do about it |
@@ -315,7 +315,7 @@ impl Found {
 }
 
 /// Every phase, count and error.
-fn everything(world: &World, found: &Found) -> String {
+fn everything(world: &World, found: &RunResult) -> String {
     let mut text = found.times.table();
     text += &counts(world);
     text += "\nerrors\n";
@@ -331,7 +331,7 @@ fn everything(world: &World, found: &Found) -> String {
 }
 
 /// Everything that a run measured, and what was run.
-fn json(world: &World, scene: &Scene, found: &Found) -> Result<Value, Error> {
+fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error> {
     let s = &world.settings;
     let phases: serde_json::Map<String, Value> =
         found.times.by_phase().map(|(p, ns)| (p, ns.into())).collect();

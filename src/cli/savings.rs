@@ -2,7 +2,7 @@
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;
-use super::values::{self, ImpactArgs, Lanes, solver};
+use super::values::{self, ImpactArgs, LaneArgs, solver};
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
@@ -40,7 +40,7 @@ pub struct SavingsArgs {
     pub solver: &'static Variant,
     /// Lanes
     #[command(flatten)]
-    pub lanes: Lanes,
+    pub lanes: LaneArgs,
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,

@@ -16,7 +16,7 @@ use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::{self, answer, html, orders, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
-use crate::lab::study::sweep::Sweep;
+use crate::lab::study::sweep::QuantitySweep;
 use crate::lab::study::{self, Record, StudyPlan, telling};
 use crate::lab::units::quantity;
 use clap::Args;
@@ -85,7 +85,7 @@ pub struct StudyArgs {
     /// velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every shape), or mass-ratio
     /// (scene mass_ratio)
     #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
-    pub sweep: Option<Sweep>,
+    pub sweep: Option<QuantitySweep>,
     /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse scene NAME`
     /// lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
@@ -280,7 +280,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
 }
 
 /// Skips solvers that do not have the swept quantity, with a message.
-fn keep_concerned(sweep: &Sweep, solvers: &mut Vec<&'static Variant>) -> String {
+fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) -> String {
     let (own, others): (Vec<_>, Vec<_>) = solvers.iter().copied().partition(|v| sweep.concerns(v));
     if own.is_empty() {
         // The check names those that have it.

@@ -11,7 +11,7 @@ use crate::lab::report::environment::Environment;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimise::minimise;
 use crate::lab::torture::table::{lines, text};
-use crate::lab::torture::{Campaign, Row, family, run_solver};
+use crate::lab::torture::{Campaign, TortureRow, family, run_solver};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
@@ -102,7 +102,7 @@ fn family_value() -> impl TypedValueParser<Value = &'static Family> {
 }
 
 /// A scene in the queue.
-type Job = (&'static Family, u32, &'static Variant);
+type TortureJob = (&'static Family, u32, &'static Variant);
 
 /// Runs the command.
 pub fn run(args: &TortureArgs) -> Result<ExitCode, Error> {
@@ -127,7 +127,7 @@ pub fn run(args: &TortureArgs) -> Result<ExitCode, Error> {
     });
     let done: HashSet<(String, u32, String)> =
         rows.iter().map(|r| (r.family.clone(), r.number, r.solver.clone())).collect();
-    let jobs: Vec<Job> = scenes
+    let jobs: Vec<TortureJob> = scenes
         .iter()
         .flat_map(|&(family, number)| solvers.iter().map(move |&solver| (family, number, solver)))
         .filter(|(family, number, solver)| {
@@ -167,7 +167,7 @@ fn chosen(args: &TortureArgs) -> Result<Vec<(&'static Family, u32)>, Error> {
 }
 
 /// The rows of a log, and the log to append to. A truncated last line is dropped.
-fn opened(path: &Path) -> Result<(Vec<Row>, Option<File>), Error> {
+fn opened(path: &Path) -> Result<(Vec<TortureRow>, Option<File>), Error> {
     let text = match path.exists() {
         true => read_to_string(path).map_err(Error::io(path))?,
         false => String::new(),
@@ -187,7 +187,7 @@ fn opened(path: &Path) -> Result<(Vec<Row>, Option<File>), Error> {
 }
 
 /// Runs every job, on as many threads as there are cores; rows in the order of the jobs.
-fn run_all(args: &TortureArgs, jobs: &[Job], log: Option<File>) -> Result<Vec<Row>, Error> {
+fn run_all(args: &TortureArgs, jobs: &[TortureJob], log: Option<File>) -> Result<Vec<TortureRow>, Error> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.threads.map_or(cores, usize::from).min(jobs.len()).max(1);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -226,7 +226,7 @@ fn one(
     family: &'static Family,
     number: u32,
     solver: &'static Variant,
-) -> Result<Row, Error> {
+) -> Result<TortureRow, Error> {
     let case = family.case(args.seed, number);
     let settings = args.settings(solver)?;
     let outcome = run_solver(&case, &settings)?;
@@ -240,5 +240,5 @@ fn one(
         file.commit()?;
     }
     let (family, solver) = (family.name.to_string(), args.name(solver));
-    Ok(Row { seed: args.seed, family, number, solver, outcome })
+    Ok(TortureRow { seed: args.seed, family, number, solver, outcome })
 }

@@ -252,14 +252,14 @@ impl SettingArgs {
 
 /// `--lanes` of commands that run at one width.
 #[derive(Args, Clone, Debug)]
-pub struct Lanes {
+pub struct LaneArgs {
     /// Lanes per instruction [default: the widest that this build has instructions for; wider ones
     /// are emulated]
     #[arg(long, value_name = "N", value_parser = lanes())]
     pub lanes: Option<LaneWidth>,
 }
 
-impl Lanes {
+impl LaneArgs {
     /// The width given, or the widest native one.
     pub fn or_native(&self) -> LaneWidth {
         self.lanes.unwrap_or(native_width())

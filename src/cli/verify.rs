@@ -7,7 +7,9 @@ use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
 use crate::lab::estimate::Estimate;
-use crate::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, Required, Sweep, SweepRow};
+use crate::lab::verify::{
+    self, CASES, Case, Cell, Finding, Lab, LawOf, ParameterSweep, Required, SweepRow, VerifyMatrix,
+};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -69,7 +71,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     output::note(&Estimate { seconds, bytes: 0.0 }.time_note("verify"));
     let bar = Bar::new();
     let impacts = args.impacts.impacts;
-    let tell = |p: verify::Progress| bar.show(p.done, p.total, p.what);
+    let tell = |p: verify::CaseProgress| bar.show(p.done, p.total, p.what);
     let without = solvers
         .iter()
         .map(|v| Ok((v.name, args.without.of(v)?)))
@@ -88,14 +90,14 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
 const SECONDS_PER_CASE: f64 = 0.25;
 
 /// 1 if the default solver ran and failed a required case.
-fn exit_code(matrix: &Matrix) -> ExitCode {
+fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
     match matrix.broken_promises(DEFAULT) {
         Some(broken) if !broken.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     }
 }
 
-fn verdict(matrix: &Matrix) -> String {
+fn verdict(matrix: &VerifyMatrix) -> String {
     let required = matrix.cases.iter().filter(|case| case.required.is_required()).count();
     match matrix.broken_promises(DEFAULT) {
         None => format!("{DEFAULT}, the default solver, did not run: nothing was required\n"),
@@ -142,7 +144,7 @@ reference: what it should be.  n/a: the reference value is that of soft contacts
 *: required of the default solver; --list says why.
 ";
 
-fn text(matrix: &Matrix) -> String {
+fn text(matrix: &VerifyMatrix) -> String {
     let mut table = plain();
     let names = matrix.solvers.iter().map(|s| s.name.to_string());
     table.set_header(["case", "what", "reference", "tolerance"].map(String::from).into_iter().chain(names));
@@ -203,9 +205,9 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
 }
 
 /// The small table of a sweep, one column per solver.
-fn sweeps(matrix: &Matrix, row: usize, case: &Case) -> String {
+fn sweeps(matrix: &VerifyMatrix, row: usize, case: &Case) -> String {
     let columns = matrix.solvers.iter().zip(&matrix.cells[row]);
-    let found: Vec<(&str, &Sweep)> = columns
+    let found: Vec<(&str, &ParameterSweep)> = columns
         .filter_map(|(solver, cell)| match cell {
             Cell::Found(Finding { sweep: Some(sweep), .. }) => Some((solver.name, sweep)),
             _ => None,
@@ -253,7 +255,7 @@ fn number(value: f64) -> String {
     }
 }
 
-fn json(matrix: &Matrix, impacts: Impacts) -> Value {
+fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
             "case": case.id, "solver": solver.name, "budget": solver.budget,

@@ -7,7 +7,7 @@ use crate::lab::error::Error;
 use crate::lab::metrics::Observation;
 use crate::lab::report::table::{finish, table};
 use crate::lab::scenes;
-use crate::lab::verify::{self, Case, Lab, Matrix};
+use crate::lab::verify::{self, Case, Lab, VerifyMatrix};
 use std::time::Instant;
 
 /// What a scene was without a mechanism.
@@ -43,7 +43,7 @@ pub struct Ablated {
 }
 
 /// What is to be left out, and where it is looked at.
-pub struct Plan {
+pub struct AblationPlan {
     /// Solver.
     pub solver: &'static Variant,
     /// Places of mechanisms in its table.
@@ -59,13 +59,14 @@ pub struct Plan {
 }
 
 /// Leaves out each mechanism in turn. `tell` is given how many of how many are done, and what runs.
-pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Ablated>, Error> {
+pub fn run(plan: &AblationPlan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Ablated>, Error> {
     let total = plan.mechanisms.len() + 1;
     let passed = |without: Without, done: usize, name: &str| -> Vec<Option<bool>> {
         let lab = |solver| Lab::new(solver).without(without);
-        let found: Matrix = verify::run(plan.cases.clone(), vec![plan.solver], plan.threads, lab, &|p| {
-            tell(done, total, &format!("{name}: {}", p.what));
-        });
+        let found: VerifyMatrix =
+            verify::run(plan.cases.clone(), vec![plan.solver], plan.threads, lab, &|p| {
+                tell(done, total, &format!("{name}: {}", p.what));
+            });
         found.cells.iter().map(|cells| cells[0].passed()).collect()
     };
     let whole = passed(Without::default(), 0, "whole");
@@ -99,7 +100,7 @@ pub fn run(plan: &Plan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Ve
 }
 
 /// Steps a scene with all mechanisms and without some, in turns.
-fn on_scene(plan: &Plan, name: &str, without: Without) -> Result<OnScene, Error> {
+fn on_scene(plan: &AblationPlan, name: &str, without: Without) -> Result<OnScene, Error> {
     let scene = scenes::load(name)?.scene;
     let build = |without| {
         let settings = Settings { without, record_impulses: true, ..Settings::new(plan.solver) };

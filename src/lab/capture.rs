@@ -22,7 +22,7 @@
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::world::World;
-use crate::lab::reference::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+use crate::lab::reference::{ContactProblem, DPair, ProblemBody, ProblemContact, Velocity};
 use glam::Vec2;
 
 /// The problem of the coming step, under this name. Solve it with [`reference`](crate::lab::reference::certify::reference).
@@ -95,7 +95,7 @@ fn row(contact: &Contact, point: &ManifoldPoint, substeps: f64) -> ProblemContac
     let n = contact.manifold.normal;
     let t = Vec2::new(n.y, -n.x);
     let cross = |r: Vec2, u: Vec2| f64::from(r.x) * f64::from(u.y) - f64::from(r.y) * f64::from(u.x);
-    let arm = |r: Vec2| -> Pair { [cross(r, n), cross(r, t)] };
+    let arm = |r: Vec2| -> DPair { [cross(r, n), cross(r, t)] };
     ProblemContact {
         body_a: None,
         body_b: None,

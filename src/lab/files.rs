@@ -25,12 +25,12 @@ static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A file that does not exist under its name until [`Pending::commit`].
 pub struct Pending {
-    file: BufWriter<Target>,
+    file: BufWriter<WriteTarget>,
     path: PathBuf,
 }
 
 /// Where the bytes go.
-enum Target {
+enum WriteTarget {
     /// To a temporary file, which takes this name when it is whole.
     Whole(Temporary, PathBuf),
     /// Through, at once.
@@ -42,7 +42,7 @@ enum Target {
 impl Pending {
     /// Begins the file `path`, in a folder that exists.
     pub fn new(path: &Path) -> Result<Self, Error> {
-        let target = Target::of(path).map_err(Error::io(path))?;
+        let target = WriteTarget::of(path).map_err(Error::io(path))?;
         Ok(Pending { file: BufWriter::new(target), path: path.into() })
     }
 
@@ -52,8 +52,8 @@ impl Pending {
         let mut target = file.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
         target.flush().map_err(Error::io(&path))?;
         match target {
-            Target::Whole(temporary, place) => temporary.persist(&place).map_err(Error::io(&path)),
-            Target::Through(_) | Target::StandardOutput => Ok(()),
+            WriteTarget::Whole(temporary, place) => temporary.persist(&place).map_err(Error::io(&path)),
+            WriteTarget::Through(_) | WriteTarget::StandardOutput => Ok(()),
         }
     }
 }
@@ -67,37 +67,37 @@ impl Write for Pending {
     }
 }
 
-impl Target {
+impl WriteTarget {
     fn of(path: &Path) -> std::io::Result<Self> {
         if is_standard_output(path) {
-            return Ok(Target::StandardOutput);
+            return Ok(WriteTarget::StandardOutput);
         }
         let (place, own) = followed(path)?;
         match std::fs::metadata(&place) {
             Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
             // A regular file that somebody holds open under a name of the system's is not replaced either.
             Ok(found) if !found.is_file() || !own => {
-                Ok(Target::Through(OpenOptions::new().append(true).open(&place)?))
+                Ok(WriteTarget::Through(OpenOptions::new().append(true).open(&place)?))
             }
             Ok(found) if found.permissions().readonly() => Err(ErrorKind::PermissionDenied.into()),
-            _ => Ok(Target::Whole(Temporary::in_folder(folder_of(&place))?, place)),
+            _ => Ok(WriteTarget::Whole(Temporary::in_folder(folder_of(&place))?, place)),
         }
     }
 }
 
-impl Write for Target {
+impl Write for WriteTarget {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         match self {
-            Target::Whole(temporary, _) => temporary.file()?.write(bytes),
-            Target::Through(file) => file.write(bytes),
-            Target::StandardOutput => std::io::stdout().write(bytes),
+            WriteTarget::Whole(temporary, _) => temporary.file()?.write(bytes),
+            WriteTarget::Through(file) => file.write(bytes),
+            WriteTarget::StandardOutput => std::io::stdout().write(bytes),
         }
     }
     fn flush(&mut self) -> std::io::Result<()> {
         match self {
-            Target::Whole(temporary, _) => temporary.file()?.flush(),
-            Target::Through(file) => file.flush(),
-            Target::StandardOutput => std::io::stdout().flush(),
+            WriteTarget::Whole(temporary, _) => temporary.file()?.flush(),
+            WriteTarget::Through(file) => file.flush(),
+            WriteTarget::StandardOutput => std::io::stdout().flush(),
         }
     }
 }

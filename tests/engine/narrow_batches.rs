@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::{Contact, Manifold};
 use simpulse::engine::lanes::{LaneWidth, Quad};
-use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
+use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
 use simpulse::engine::narrowphase::lanes::Class;
 use simpulse::engine::narrowphase::lanes::PoseRow;
 use simpulse::engine::narrowphase::{collide, collide_in_step};
@@ -20,7 +20,7 @@ fn v(x: f32, y: f32) -> Vec2 {
 
 /// Pairs of one kind, body and shape 2i against 2i + 1, and what remembers their contacts.
 struct Scene {
-    kind: Kind,
+    kind: PairKind,
     shapes: Vec<Shape>,
     numbers: Vec<u32>,
     rows: Shapes,
@@ -30,7 +30,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(kind: Kind, shapes: Vec<Shape>) -> Self {
+    fn new(kind: PairKind, shapes: Vec<Shape>) -> Self {
         let mut rows = Shapes::default();
         let numbers = shapes.iter().map(|shape| rows.push(shape).1).collect();
         let contact = vec![NO_CONTACT; shapes.len() / 2];
@@ -151,25 +151,25 @@ fn straight() -> impl Strategy<Value = Shape> {
 }
 
 /// Shapes of some pairs of one kind: enough for a whole batch and a part of one, or less.
-fn pairs() -> impl Strategy<Value = (Kind, Vec<Shape>)> {
+fn pairs() -> impl Strategy<Value = (PairKind, Vec<Shape>)> {
     fn list(
-        kind: Kind,
+        kind: PairKind,
         a: impl Strategy<Value = Shape> + 'static,
         b: impl Strategy<Value = Shape> + 'static,
-    ) -> BoxedStrategy<(Kind, Vec<Shape>)> {
+    ) -> BoxedStrategy<(PairKind, Vec<Shape>)> {
         prop::collection::vec((a, b), 1..40)
             .prop_map(move |pairs| (kind, pairs.into_iter().flat_map(|(a, b)| [a, b]).collect()))
             .boxed()
     }
     prop_oneof![
-        1 => list(Kind::Rectangles, rectangle(), rectangle()),
-        1 => list(Kind::Circles, circle(), circle()),
-        3 => list(Kind::Hulls, straight(), hull()),
-        1 => list(Kind::Hulls, hull(), straight()),
-        1 => list(Kind::HullCircle, straight(), circle()),
-        1 => list(Kind::CircleHull, circle(), straight()),
+        1 => list(PairKind::Rectangles, rectangle(), rectangle()),
+        1 => list(PairKind::Circles, circle(), circle()),
+        3 => list(PairKind::Hulls, straight(), hull()),
+        1 => list(PairKind::Hulls, hull(), straight()),
+        1 => list(PairKind::HullCircle, straight(), circle()),
+        1 => list(PairKind::CircleHull, circle(), straight()),
         // All of one shape: the batch reads a single row.
-        1 => (hull(), 1usize..40).prop_map(|(shape, count)| (Kind::Hulls, vec![shape; 2 * count])),
+        1 => (hull(), 1usize..40).prop_map(|(shape, count)| (PairKind::Hulls, vec![shape; 2 * count])),
     ]
 }
 
@@ -256,8 +256,8 @@ fn alike_shapes_share_a_number_and_others_do_not() {
 
 #[test]
 fn two_segments_have_no_kernel() {
-    assert_eq!(Kind::of(Class::Segment, Class::Segment), None);
+    assert_eq!(PairKind::of(Class::Segment, Class::Segment), None);
     let classes = [Class::Rectangle, Class::Circle, Class::Hull, Class::Segment];
-    let kernels = classes.iter().flat_map(|&a| classes.map(|b| Kind::of(a, b))).flatten().count();
+    let kernels = classes.iter().flat_map(|&a| classes.map(|b| PairKind::of(a, b))).flatten().count();
     assert_eq!(kernels, 15);
 }

@@ -4,7 +4,7 @@
 
 use simpulse::engine::clock::{Clock, PhaseFilter};
 use simpulse::engine::constraints::ImpactLaw;
-use simpulse::engine::constraints::impacts::restitution::{self, Begin, Rebound};
+use simpulse::engine::constraints::impacts::restitution::{self, ReadApproach, Rebound};
 use simpulse::engine::constraints::kernels::position::position_sweep;
 use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
 use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep, sweep_store};
@@ -19,7 +19,7 @@ use simpulse::engine::lanes::{
     BodyRow, Counted, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns,
     RowStore, prefetch, prefetch_records,
 };
-use simpulse::engine::narrowphase::batch::{Input, Jobs, Kind, NO_CONTACT, Shapes, update};
+use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
 use simpulse::engine::narrowphase::hull::{Hull, HullRow};
 use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
 use simpulse::engine::params::{Budget, Without};
@@ -100,7 +100,7 @@ impl Given {
     fn prepare_bounces<L: Lanes>(&mut self) {
         let Given { rows, batches, bounces, contacts } = self;
         let rebound = Rebound { threshold: 1.0, only_new: false };
-        let begin = Begin { rebound, stride: ImpactLaw::BOX2D.stride(2), found: 0.0 };
+        let begin = ReadApproach { rebound, stride: ImpactLaw::BOX2D.stride(2), found: 0.0 };
         restitution::prepare::<L, Full>(rows, batches, bounces, contacts, &begin);
     }
 
@@ -392,13 +392,13 @@ fn a_step_says_what_is_wrong_before_it_begins() {
     panics("batches of 8 lanes for kernels of 1", || new(Batches::default(), good(8), CONTACTS));
 }
 
-const KINDS: [Kind; 5] = Kind::ALL;
+const KINDS: [PairKind; 5] = PairKind::ALL;
 
 /// `pairs` pairs of one body and shape, with one list changed by `spoil`.
-fn collide(kind: Kind, width: LaneWidth, pairs: u32, contacts: usize, spoil: impl Fn(&mut Jobs)) {
+fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil: impl Fn(&mut Jobs)) {
     let mut shapes = Shapes::default();
     let shape = match kind {
-        Kind::Circles => Shape::circle("c", glam::Vec2::ZERO, 0.5),
+        PairKind::Circles => Shape::circle("c", glam::Vec2::ZERO, 0.5),
         _ => Shape::rectangle("r", glam::Vec2::ONE, glam::Vec2::ZERO, 0.0, 0.0),
     };
     shapes.push(&shape.expect("valid"));

@@ -151,6 +151,39 @@ fn no_two_files_of_a_room_import_each_other() {
     }
 }
 
+/// The types that a line of code declares, private ones included; `type` inside a trait or an `impl` is no declaration.
+fn declared(line: &str) -> Option<&str> {
+    let rest = match line.trim_start().strip_prefix("pub") {
+        Some(rest) if rest.starts_with('(') => rest.split_once(')')?.1.trim_start(),
+        Some(rest) if rest.starts_with(' ') => rest.trim_start(),
+        _ => line.trim_start(),
+    };
+    let (kind, rest) = rest.strip_prefix("unsafe ").unwrap_or(rest).split_once(' ')?;
+    let is_type =
+        matches!(kind, "struct" | "enum" | "trait" | "union") || kind == "type" && !line.starts_with(' ');
+    is_type.then(|| rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next()).flatten()
+}
+
+/// One name, one thing: in the engine, the laboratory and the command line together.
+#[test]
+fn no_type_name_is_declared_twice() {
+    // Each layer has its errors; those of the laboratory hold those of the engine.
+    const TWICE: [&str; 1] = ["Error"];
+    let source = root().join("src");
+    let mut places = BTreeMap::<String, Vec<String>>::new();
+    for (path, text) in files(&source) {
+        let place = path.strip_prefix(&source).unwrap().display().to_string();
+        for name in code(&text).lines().filter_map(declared) {
+            places.entry(name.into()).or_default().push(place.clone());
+        }
+    }
+    assert!(places.len() > 400, "{} types found", places.len());
+    let twice: Vec<_> = places.iter().filter(|(_, p)| p.len() > 1).collect();
+    let unknown: Vec<_> = twice.iter().filter(|(name, _)| !TWICE.contains(&name.as_str())).collect();
+    assert!(unknown.is_empty(), "declared twice: {unknown:#?}");
+    assert_eq!(twice.len(), TWICE.len(), "names that are declared once are not in the list");
+}
+
 #[test]
 fn every_solver_file_has_a_row_and_every_row_a_file() {
     let folder = root().join("src/engine/solvers");

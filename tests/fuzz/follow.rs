@@ -10,7 +10,7 @@ use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
-use simpulse::lab::converge::{self, Options};
+use simpulse::lab::converge::{self, ConvergeOptions};
 use simpulse::lab::error::Error;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::overrides::{self, Override};
@@ -170,7 +170,13 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     };
     let mut random = Random::seed_from_u64(salt);
     let solvers = vec![bytes::one(&mut random, &VARIANTS)];
-    let options = Options { solvers, max_iterations: 6, rounds: 0, baseline: false, ..Options::default() };
+    let options = ConvergeOptions {
+        solvers,
+        max_iterations: 6,
+        rounds: 0,
+        baseline: false,
+        ..ConvergeOptions::default()
+    };
     let curves = match converge::converge(problem, known.as_ref(), &options) {
         Ok(report) => {
             converge::table::text(&report);

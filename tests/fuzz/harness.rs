@@ -58,7 +58,7 @@ pub fn run(target: &Target, inputs: u64) {
     let seconds = number("SIMPULSE_FUZZ_SECONDS").map(Duration::from_secs);
     let seed = number("SIMPULSE_FUZZ_SEED").unwrap_or(1);
     let mut random = Random::seed_from_u64(seed);
-    let watch = seconds.map(|_| Watch::start(target.name));
+    let watch = seconds.map(|_| HoldWatch::start(target.name));
 
     // What is refused leads to other refusals, and seldom to a scene.
     let (mut accepting, mut refusing) = (target.seeds.clone(), target.seeds.clone());
@@ -86,7 +86,7 @@ pub fn run(target: &Target, inputs: u64) {
             watch.begin(&input, salt);
         }
         let verdict = judge(target, &input, salt);
-        let took = watch.as_ref().map_or(Duration::ZERO, Watch::end);
+        let took = watch.as_ref().map_or(Duration::ZERO, HoldWatch::end);
         slowest = slowest.max(took);
         if took > SLOW {
             let path = folder().join(format!("fuzz-{}-{seed}-{count}-slow.input", target.name));
@@ -196,7 +196,7 @@ fn quiet_panics() {
 
 /// A second thread that ends the process if an input takes too long or too much memory. The input
 /// lies in a file before it is tried, so that an abort leaves it there, too.
-struct Watch {
+struct HoldWatch {
     path: PathBuf,
     file: Mutex<File>,
     begun: Arc<Mutex<Option<Duration>>>,
@@ -204,7 +204,7 @@ struct Watch {
     stop: Arc<AtomicBool>,
 }
 
-impl Watch {
+impl HoldWatch {
     fn start(name: &'static str) -> Self {
         let path = folder().join(format!("fuzz-{name}-current.input"));
         let file = Mutex::new(File::create(&path).expect("the target folder can be written"));
@@ -226,7 +226,7 @@ impl Watch {
                 }
             }
         });
-        Watch { path, file, begun, clock, stop }
+        HoldWatch { path, file, begun, clock, stop }
     }
 
     fn begin(&self, input: &[u8], salt: u64) {
@@ -249,7 +249,7 @@ impl Watch {
     }
 }
 
-impl Drop for Watch {
+impl Drop for HoldWatch {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         let _ = std::fs::remove_file(&self.path);

@@ -3,7 +3,7 @@
 use simpulse::engine::params::Without;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::Settings;
-use simpulse::lab::torture::{Verdict, family, run_solver};
+use simpulse::lab::torture::{TortureVerdict, family, run_solver};
 use simpulse::lab::verify::{self, Lab};
 
 /// Scenes of a family that are drawn.
@@ -22,7 +22,7 @@ fn every_mechanism_has_a_case_that_fails_without_it() {
             let (name, without) = (mechanism.name, Without::default().and(place));
             if let Some(of) = mechanism.case.strip_prefix("torture ") {
                 let (of, word) = of.split_once(' ').unwrap();
-                let verdict = Verdict::ALL.into_iter().find(|v| v.word() == word).unwrap();
+                let verdict = TortureVerdict::ALL.into_iter().find(|v| v.word() == word).unwrap();
                 let failing = |without| {
                     let settings = Settings { without, ..Settings::new(variant) };
                     let of = family(of).unwrap();

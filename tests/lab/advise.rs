@@ -3,7 +3,7 @@
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::find;
 use simpulse::lab::advise::limits::Limits;
-use simpulse::lab::advise::{Plan, Trial, advise};
+use simpulse::lab::advise::{SearchPlan, Trial, advise};
 use simpulse::lab::study::{observe, open_scene};
 use std::path::Path;
 use std::process::{Command, Output};
@@ -17,8 +17,8 @@ fn text(bytes: &[u8]) -> &str {
 }
 
 /// Nothing here may depend on the clock: the search never runs out of time.
-fn plan(scene: &str, limits: Limits) -> Plan {
-    Plan {
+fn plan(scene: &str, limits: Limits) -> SearchPlan {
+    SearchPlan {
         impacts: simpulse::engine::constraints::Impacts::Own,
         scene: scene.to_string(),
         limits,

@@ -6,7 +6,7 @@ use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
 use simpulse::engine::world::Settings;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
-use simpulse::lab::torture::{Verdict, family, run_solver};
+use simpulse::lab::torture::{TortureVerdict, family, run_solver};
 
 fn on(variant: &'static Variant) -> Settings {
     Settings { continuous: true, ..settings(variant) }
@@ -102,7 +102,7 @@ fn fast_bodies_stay_in_their_rooms() {
     let soft_step = find("soft_step").unwrap();
     let escapes = |settings: &Settings| {
         let case = |number| family("fast").unwrap().case(1, number);
-        (0..60).filter(|&n| run_solver(&case(n), settings).unwrap().has(Verdict::Escaped)).count()
+        (0..60).filter(|&n| run_solver(&case(n), settings).unwrap().has(TortureVerdict::Escaped)).count()
     };
     assert_eq!(escapes(&on(soft_step)), 0);
     // Else the scenes would be too easy.
@@ -139,7 +139,7 @@ fn what_a_door_presses_does_not_leave_through_the_wall() {
 #[test]
 fn what_stands_on_its_tip_tips_over() {
     let case = family("drops").unwrap().case(1, 19);
-    assert!(!run_solver(&case, &on(find("shim").unwrap())).unwrap().has(Verdict::Sunk));
+    assert!(!run_solver(&case, &on(find("shim").unwrap())).unwrap().has(TortureVerdict::Sunk));
 }
 
 #[test]
@@ -148,7 +148,8 @@ fn where_pistons_leave_no_room_nothing_is_flung_and_nothing_leaves() {
     assert!(shim.continuous);
     for number in 0..60 {
         let outcome = run_solver(&family("driven").unwrap().case(1, number), &shim).unwrap();
-        let fails = [Verdict::Diverged, Verdict::Flung, Verdict::Escaped].map(|verdict| outcome.has(verdict));
+        let fails = [TortureVerdict::Diverged, TortureVerdict::Flung, TortureVerdict::Escaped]
+            .map(|verdict| outcome.has(verdict));
         assert_eq!(fails, [false; 3], "driven:{number}: {:?}", outcome.faults);
     }
 }

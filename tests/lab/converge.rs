@@ -7,14 +7,14 @@ use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
 use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
-use simpulse::lab::converge::{Curve, Options, Report, converge, plot, table};
+use simpulse::lab::converge::{ConvergeOptions, ConvergeReport, ReplayCurve, converge, plot, table};
 use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, painleve_rod, sliding_box};
 use simpulse::lab::reference::residual::{Target, natural_map};
-use simpulse::lab::reference::sweeps::{Stop, Sweep, pgs};
-use simpulse::lab::reference::{ContactProblem, Pair, Velocity};
+use simpulse::lab::reference::sweeps::{Stop, SweepDirection, pgs};
+use simpulse::lab::reference::{ContactProblem, DPair, Velocity};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -27,19 +27,19 @@ fn frozen_files() -> Vec<PathBuf> {
 }
 
 /// Untimed runs of these solvers.
-fn options(solvers: &[&str]) -> Options {
+fn options(solvers: &[&str]) -> ConvergeOptions {
     let solvers = solvers.iter().map(|name| solvers::find(name).unwrap()).collect();
-    Options { solvers, rounds: 0, ..Options::default() }
+    ConvergeOptions { solvers, rounds: 0, ..ConvergeOptions::default() }
 }
 
-fn run(problem: &ContactProblem, solvers: &[&str]) -> Report {
+fn run(problem: &ContactProblem, solvers: &[&str]) -> ConvergeReport {
     converge(problem, Some(&reference(problem).unwrap()), &options(solvers)).unwrap()
 }
 
 /// Rates are fitted over one decade that ends 100 times above the rounding floor. There rounding
 /// may change a residual by 1 %; a line through a decade, its ends pulling 1.5 times as much as
 /// their share, then errs by 1.5 · 0.01/ln 10 = 0.7 % of ln ρ, some 0.7 % of 1 − ρ.
-fn assert_rate(curve: &Curve, exact: f64) {
+fn assert_rate(curve: &ReplayCurve, exact: f64) {
     let measured = curve.rigid.rate.unwrap();
     let (solver, order) = (&curve.solver, curve.order);
     assert!((measured - exact).abs() < 0.007 * (1.0 - exact), "{solver} {order}: {measured} is not {exact}");
@@ -50,7 +50,7 @@ fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
     // The graph of a column is a tree: all orders are consistent, so all have the same rate.
     for n in [5, 10, 15, 20] {
         let report = run(&disc_column(n), &["pgs"]);
-        let curves: Vec<&Curve> = report.curves.iter().filter(|c| c.arithmetic == "f32").collect();
+        let curves: Vec<&ReplayCurve> = report.curves.iter().filter(|c| c.arithmetic == "f32").collect();
         // Three orders, cold and warm.
         assert_eq!(curves.len(), 6);
         for curve in curves {
@@ -61,13 +61,14 @@ fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
             // The same to the iteration as f64 in the same order, as long as f32 is exact enough.
             // Cold, all orders begin with the same smooth error; warm, there is one of every wave length.
             let order = if curve.start == Start::Cold { Sequence::Natural } else { curve.order };
-            let of = |c: &&Curve| c.solver == "Gauss-Seidel" && c.start == curve.start && c.order == order;
+            let of =
+                |c: &&ReplayCurve| c.solver == "Gauss-Seidel" && c.start == curve.start && c.order == order;
             let Some(scalar) = report.curves.iter().find(of) else {
                 assert_eq!(curve.order, Sequence::Colored, "f64 goes in every other order");
                 continue;
             };
             for tolerance in 0..3 {
-                let count = |c: &Curve| c.points[c.rigid.first[tolerance].unwrap()].iterations;
+                let count = |c: &ReplayCurve| c.points[c.rigid.first[tolerance].unwrap()].iterations;
                 assert!(count(curve).abs_diff(count(scalar)) <= 1, "n {n}, {} {}", curve.order, curve.start);
             }
         }
@@ -114,7 +115,7 @@ fn files_converge_to_the_floor_and_to_their_certified_velocities() {
         let unit = problem.impulse_unit();
         let largest = reference.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
         let floor = 6e-8 * (largest / unit).max(1.0);
-        let settings = Options { max_iterations: 2000, ..options(&["pgs"]) };
+        let settings = ConvergeOptions { max_iterations: 2000, ..options(&["pgs"]) };
         let report = converge(&problem, Some(&reference), &settings).unwrap();
         for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
             let last = curve.points.last().unwrap();
@@ -182,7 +183,7 @@ fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
     // f64, by the law alone: the same velocities.
     let cold = vec![[0.0; 2]; problem.contacts.len()];
     let stop = Stop { tolerance: 1e-13, iterations: 10_000 };
-    let exact = pgs(&problem, target, &cold, Sweep::Forward, stop).velocities;
+    let exact = pgs(&problem, target, &cold, SweepDirection::Forward, stop).velocities;
     // The coefficients are known to a few roundings of f32.
     let error = problem.velocity_error(&outcome.velocities, &exact);
     assert!(error < 2e-6, "{error:e}");
@@ -213,8 +214,9 @@ fn a_point_whose_load_and_friction_are_one_problem_needs_one_iteration() {
         problem.contacts[0].friction = friction;
         let report = run(&problem, &["nsgs", "pgs"]);
         let first = |solver: &str| {
-            let own =
-                |c: &&Curve| c.solver == solver && c.order == Sequence::Natural && c.start == Start::Cold;
+            let own = |c: &&ReplayCurve| {
+                c.solver == solver && c.order == Sequence::Natural && c.start == Start::Cold
+            };
             let curve = report.curves.iter().find(own).unwrap();
             curve.rigid.first[4].map(|at| curve.points[at].iterations)
         };
@@ -229,7 +231,7 @@ fn every_solver_reaches_its_own_law_on_a_pyramid() {
     let Frozen { problem, reference } = Frozen::read(&file).unwrap();
     let promise = |v: &&&Variant| v.promises(Law::Converges);
     let names: Vec<&str> = VARIANTS.iter().filter(promise).map(|v| v.name).collect();
-    let settings = Options { max_iterations: 4000, ..options(&names) };
+    let settings = ConvergeOptions { max_iterations: 4000, ..options(&names) };
     let report = converge(&problem, reference.as_ref(), &settings).unwrap();
     for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
         assert!(curve.own.first[5].is_some(), "{} {} {:?}", curve.solver, curve.order, curve.own);
@@ -387,9 +389,9 @@ fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() 
     let problem = disc_column(20);
     let truth = reference(&problem).unwrap();
     let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; 20]));
-    let objective = |impulses: &[Pair]| {
+    let objective = |impulses: &[DPair]| {
         let product = problem.delassus_product(impulses);
-        let one = |((l, g), b): ((&Pair, &Pair), &Pair)| l[0] * (0.5 * g[0] + b[0]);
+        let one = |((l, g), b): ((&DPair, &DPair), &DPair)| l[0] * (0.5 * g[0] + b[0]);
         impulses.iter().zip(&product).zip(&free).map(one).sum::<f64>()
     };
     let least = objective(&truth.impulses);
@@ -433,10 +435,10 @@ fn split_masses_converge_without_rising_and_in_any_order() {
     for file in ["box-pyramid-5", "disc-column-10", "plank-4-supports"] {
         let file = frozen_files().into_iter().find(|f| f.ends_with(format!("{file}.frozen"))).unwrap();
         let Frozen { problem, reference } = Frozen::read(&file).unwrap();
-        let settings = Options { max_iterations: 500, ..options(&["mass_splitting"]) };
+        let settings = ConvergeOptions { max_iterations: 500, ..options(&["mass_splitting"]) };
         let report = converge(&problem, reference.as_ref(), &settings).unwrap();
-        let of = |c: &&Curve| c.solver == "mass_splitting" && c.start == Start::Cold;
-        let curves: Vec<&Curve> = report.curves.iter().filter(of).collect();
+        let of = |c: &&ReplayCurve| c.solver == "mass_splitting" && c.start == Start::Cold;
+        let curves: Vec<&ReplayCurve> = report.curves.iter().filter(of).collect();
         assert_eq!(curves.len(), 3);
         for curve in &curves {
             for pair in curve.points.windows(2).filter(|pair| pair[1].rigid > 1e-5) {
@@ -462,7 +464,7 @@ fn warm_starts_spare_block_descent_the_growth_of_its_penalties() {
     let report = run(&disc_column(5), &["avbd"]);
     for order in [Sequence::Natural, Sequence::Colored, Sequence::Shuffled(1)] {
         let residual_after_ten = |start| {
-            let of = |c: &&Curve| (c.arithmetic, c.order, c.start) == ("f32", order, start);
+            let of = |c: &&ReplayCurve| (c.arithmetic, c.order, c.start) == ("f32", order, start);
             report.curves.iter().find(of).unwrap().points[10].rigid
         };
         let (cold, warm) = (residual_after_ten(Start::Cold), residual_after_ten(Start::Warm));

@@ -555,7 +555,7 @@ fn geometry() -> impl Strategy<Value = Geometry> {
         (3..=8_usize, length(), length()).prop_map(|(n, size, radius)| {
             let at = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
             let points = (0..n).map(|i| [size * at(i).1, size * at(i).0]).collect();
-            Geometry::Polygon(Polygon { points, radius })
+            Geometry::Polygon(PolygonGeometry { points, radius })
         }),
     ]
 }

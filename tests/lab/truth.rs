@@ -8,8 +8,8 @@ use simpulse::lab::reference::newton::newton;
 use simpulse::lab::reference::nncg::nncg;
 use simpulse::lab::reference::residual::Target;
 use simpulse::lab::reference::stewart_trinkle::stewart_trinkle;
-use simpulse::lab::reference::sweeps::{Stop, Sweep, pgs};
-use simpulse::lab::reference::{ContactProblem, Pair};
+use simpulse::lab::reference::sweeps::{Stop, SweepDirection, pgs};
+use simpulse::lab::reference::{ContactProblem, DPair};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -56,8 +56,8 @@ fn stored_solutions_keep_their_certificates() {
 
 #[test]
 fn every_family_reproduces_the_stored_velocities() {
-    type Method = fn(&ContactProblem) -> Vec<Pair>;
-    fn cold(p: &ContactProblem) -> Vec<Pair> {
+    type Method = fn(&ContactProblem) -> Vec<DPair>;
+    fn cold(p: &ContactProblem) -> Vec<DPair> {
         vec![[0.0; 2]; p.contacts.len()]
     }
     const fn stop(iterations: usize) -> Stop {
@@ -65,7 +65,7 @@ fn every_family_reproduces_the_stored_velocities() {
     }
     let methods: [(&str, Method); 4] = [
         ("Lemke", |p| stewart_trinkle(p, Target::Rigid).unwrap()),
-        ("PGS", |p| pgs(p, Target::Rigid, &cold(p), Sweep::Symmetric, stop(20_000)).impulses),
+        ("PGS", |p| pgs(p, Target::Rigid, &cold(p), SweepDirection::Symmetric, stop(20_000)).impulses),
         ("NNCG", |p| nncg(p, Target::Rigid, &cold(p), stop(2_000)).impulses),
         ("Newton", |p| newton(p, Target::Rigid, &cold(p), stop(60)).impulses),
     ];

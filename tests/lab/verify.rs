@@ -4,7 +4,7 @@
 use simpulse::engine::constraints::Impacts;
 use simpulse::engine::solvers::{self, DEFAULT, VARIANTS, Variant};
 use simpulse::lab::scenes::Scene;
-use simpulse::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Matrix, Required};
+use simpulse::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Required, VerifyMatrix};
 use std::collections::BTreeSet;
 
 fn family(id: &str) -> &str {
@@ -16,13 +16,13 @@ fn run(
     solvers: &[&'static Variant],
     threads: usize,
     lab: impl Fn(&'static Variant) -> Lab + Sync,
-) -> Matrix {
+) -> VerifyMatrix {
     let ids: Vec<String> = ids.iter().map(|id| id.to_string()).collect();
     let cases = if ids.is_empty() { Vec::new() } else { verify::select(&ids).unwrap() };
     verify::run(cases, solvers.to_vec(), threads, lab, &|_| ())
 }
 
-fn failed(matrix: &Matrix) -> Vec<&'static str> {
+fn failed(matrix: &VerifyMatrix) -> Vec<&'static str> {
     let column = |(_, cells): &(&&Case, &Vec<Cell>)| cells[0].passed() == Some(false);
     matrix.cases.iter().zip(&matrix.cells).filter(column).map(|(case, _)| case.id).collect()
 }
@@ -213,7 +213,7 @@ fn only_broken_promises_of_the_solver_itself_count() {
     let free = CASES.iter().find(|case| !case.required.is_required()).unwrap();
     let (good, bad) =
         (|| Cell::Found(Finding::new(1.0, 1.0, 0.0)), || Cell::Found(Finding::new(2.0, 1.0, 0.5)));
-    let matrix = |cells| Matrix {
+    let matrix = |cells| VerifyMatrix {
         cases: vec![required, free],
         solvers: vec![solvers::find("pgs").unwrap(), solvers::find(DEFAULT).unwrap()],
         cells,

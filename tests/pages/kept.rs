@@ -1,7 +1,7 @@
 //! What an interrupt leaves behind, and what two runs of one program differ by.
 
 use crate::{simpulse, succeeds};
-use simpulse::lab::compare::{Comparison, Options, Verdict, compare};
+use simpulse::lab::compare::{CompareOptions, Comparison, Verdict, compare};
 use simpulse::lab::report::study_file::StudyFile;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn an_interrupt_keeps_what_was_there_and_leaves_nothing_behind() {
 /// Two studies as `simpulse compare` has them.
 fn compared(before: &Path, after: &StudyFile) -> Comparison {
     let before = StudyFile::read(before).unwrap();
-    compare(&before, after, &Options { threshold: 0.05, relative: false })
+    compare(&before, after, &CompareOptions { threshold: 0.05, relative: false })
 }
 
 /// Settings and solvers whose time is judged worse, and better.

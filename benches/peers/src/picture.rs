@@ -7,8 +7,8 @@ use crate::engine::{Contender, Maker};
 use crate::race::Outcome;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
-use simpulse::lab::report::axes::{
-    Area, Drawn, Edges, INK, Scale, color, marker, with_dark, wrapped, write, write_upwards,
+use simpulse::lab::picture::axes::{
+    Area, Drawn, Edges, INK, LogScale, color, marker, with_dark, wrapped, write, write_upwards,
 };
 use simpulse::lab::report::units::si_short;
 
@@ -89,8 +89,8 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     let (left, right) = (corner.0 + LEFT, corner.0 + PANEL.0 - RIGHT);
     let (top, bottom) = (corner.1 + TOP, corner.1 + PANEL.1 - BOTTOM);
     write(area, name, (left, top - 14), 15, HPos::Left)?;
-    let overlaps = Scale::of(shown.iter().map(|s| s.3), 5);
-    let times = Scale::of(shown.iter().map(|s| s.2), 6);
+    let overlaps = LogScale::of(shown.iter().map(|s| s.3), 5);
+    let times = LogScale::of(shown.iter().map(|s| s.2), 6);
     let labels: [&dyn Fn(f64) -> String; 2] =
         [&|overlap| si_short(overlap, "m"), &|ms| si_short(1e-3 * ms, "s")];
     Edges { left, right, top, bottom }.grid(area, [&overlaps, &times], 12, labels)?;

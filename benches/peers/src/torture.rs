@@ -3,7 +3,7 @@
 use crate::engine::{Contender, Engine, Maker};
 use crate::race::build;
 use simpulse::lab::torture::families::FAMILIES;
-use simpulse::lab::torture::{self, Campaign, Case, Outcome, Row, table};
+use simpulse::lab::torture::{self, Campaign, CaseOutcome, TortureCase, TortureRow, table};
 
 /// Another engine, as the judge sees it.
 struct Judged(Box<dyn Engine>);
@@ -31,7 +31,7 @@ fn engines() -> Vec<(&'static str, Contender)> {
 }
 
 /// One case in one engine. Errors: what it cannot hold.
-fn one(case: &Case, contender: &Contender) -> Result<Outcome, String> {
+fn one(case: &TortureCase, contender: &Contender) -> Result<CaseOutcome, String> {
     let contender = Contender { substeps: case.substeps.unwrap_or(contender.substeps), ..*contender };
     let mut engine = Judged(build(&contender, &case.scene)?);
     torture::run(case, &mut engine).map_err(|e| e.to_string())
@@ -46,7 +46,7 @@ pub fn run(seed: u64, scenes: u32) -> Result<(), String> {
         for (name, contender) in &engines {
             let (family, solver) = (family.name.to_string(), name.to_string());
             match one(&case, contender) {
-                Ok(outcome) => rows.push(Row { seed, family, number, solver, outcome }),
+                Ok(outcome) => rows.push(TortureRow { seed, family, number, solver, outcome }),
                 Err(message) => {
                     eprintln!("{}, {name}: {message}", case.scene.name);
                     refused += 1;

@@ -58,7 +58,7 @@ pub struct FatBoxes {
     /// The least of the body's shapes (m), infinite for a static body.
     slack: LaneVec,
     /// Each shape in lanes, `[shapes]`.
-    outlines: Vec<Outline>,
+    outlines: Vec<CoreOutline>,
     /// First shape of each body; its shapes follow one another.
     first_shape: Vec<u32>,
     /// Bodies that fail the test.
@@ -87,12 +87,12 @@ impl FatBoxes {
         }
         for (i, shape) in (first..).zip(shapes) {
             match self.outlines.get_mut(i) {
-                Some(outline) => *outline = Outline::new(shape),
-                None => self.outlines.push(Outline::new(shape)),
+                Some(outline) => *outline = CoreOutline::new(shape),
+                None => self.outlines.push(CoreOutline::new(shape)),
             }
         }
         let outlines = &self.outlines[first..first + shapes.len()];
-        self.reach[body] = outlines.iter().map(Outline::reach).fold(0.0, f32::max);
+        self.reach[body] = outlines.iter().map(CoreOutline::reach).fold(0.0, f32::max);
         self.forget(body);
     }
 
@@ -181,13 +181,13 @@ fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
 
 /// The core points of a shape, some of them repeated, and its radius (m).
 #[derive(Clone, Copy, Debug)]
-struct Outline {
+struct CoreOutline {
     x: [f32; MAX_POLYGON_VERTICES],
     y: [f32; MAX_POLYGON_VERTICES],
     radius: f32,
 }
 
-impl Outline {
+impl CoreOutline {
     fn new(shape: &Shape) -> Self {
         let ends = |a, b| std::array::from_fn(|i| if i % 2 == 0 { a } else { b });
         let (core, radius) = match *shape {
@@ -196,7 +196,7 @@ impl Outline {
             Shape::Segment { a, b } => (ends(a, b), 0.0),
             Shape::Polygon(polygon) => (polygon.vertices, polygon.radius),
         };
-        Outline { x: core.map(|c| c.x), y: core.map(|c| c.y), radius }
+        CoreOutline { x: core.map(|c| c.x), y: core.map(|c| c.y), radius }
     }
 
     /// r of (1).

@@ -44,7 +44,7 @@ thread_local! {
     };
 }
 
-enum Kind {
+enum OperationKind {
     Add,
     Multiply,
     MultiplyAdd,
@@ -54,14 +54,14 @@ enum Kind {
 
 // A call for every operation: inlined, the kernels that count were half of all code of all kernels.
 #[inline(never)]
-fn book(kind: Kind) {
+fn book(kind: OperationKind) {
     let mut operations = BOOK.get();
     let count = match kind {
-        Kind::Add => &mut operations.adds,
-        Kind::Multiply => &mut operations.multiplies,
-        Kind::MultiplyAdd => &mut operations.multiply_adds,
-        Kind::Divide => &mut operations.divisions,
-        Kind::Choose => &mut operations.choices,
+        OperationKind::Add => &mut operations.adds,
+        OperationKind::Multiply => &mut operations.multiplies,
+        OperationKind::MultiplyAdd => &mut operations.multiply_adds,
+        OperationKind::Divide => &mut operations.divisions,
+        OperationKind::Choose => &mut operations.choices,
     };
     *count += 1;
     BOOK.set(operations);
@@ -82,7 +82,7 @@ impl Counted {
 impl Add for Counted {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        book(Kind::Add);
+        book(OperationKind::Add);
         Counted(self.0 + other.0)
     }
 }
@@ -90,7 +90,7 @@ impl Add for Counted {
 impl Sub for Counted {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        book(Kind::Add);
+        book(OperationKind::Add);
         Counted(self.0 - other.0)
     }
 }
@@ -98,7 +98,7 @@ impl Sub for Counted {
 impl Mul for Counted {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        book(Kind::Multiply);
+        book(OperationKind::Multiply);
         Counted(self.0 * other.0)
     }
 }
@@ -106,7 +106,7 @@ impl Mul for Counted {
 impl Div for Counted {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        book(Kind::Divide);
+        book(OperationKind::Divide);
         Counted(self.0 / other.0)
     }
 }
@@ -128,32 +128,32 @@ impl Lanes for Counted {
     }
 
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        book(Kind::MultiplyAdd);
+        book(OperationKind::MultiplyAdd);
         Counted(Lanes::mul_add(self.0, factor.0, term.0))
     }
 
     fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        book(Kind::MultiplyAdd);
+        book(OperationKind::MultiplyAdd);
         Counted(Lanes::neg_mul_add(self.0, factor.0, term.0))
     }
 
     fn max(self, other: Self) -> Self {
-        book(Kind::Choose);
+        book(OperationKind::Choose);
         Counted(Lanes::max(self.0, other.0))
     }
 
     fn min(self, other: Self) -> Self {
-        book(Kind::Choose);
+        book(OperationKind::Choose);
         Counted(Lanes::min(self.0, other.0))
     }
 
     fn sqrt(self) -> Self {
-        book(Kind::Divide);
+        book(OperationKind::Divide);
         Counted(self.0.sqrt())
     }
 
     fn select_positive(self, positive: Self, otherwise: Self) -> Self {
-        book(Kind::Choose);
+        book(OperationKind::Choose);
         Counted(Lanes::select_positive(self.0, positive.0, otherwise.0))
     }
 
@@ -202,7 +202,7 @@ impl Lanes for Counted {
     }
 
     fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
-        book(Kind::Choose);
+        book(OperationKind::Choose);
         Counted(Lanes::select_equal(self.0, other.0, yes.0, no.0))
     }
 

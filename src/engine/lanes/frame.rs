@@ -10,7 +10,7 @@ use std::hint::black_box;
 
 /// Asks for the alignment of the frame that it lies in.
 #[repr(align(64))]
-struct Line(#[allow(dead_code, reason = "to have a place on the stack")] u8);
+struct CacheLine(#[allow(dead_code, reason = "to have a place on the stack")] u8);
 
 /// Aligns the frame of the calling function: for one that has a kernel's loop inlined in it, once before the loop.
 ///
@@ -19,5 +19,5 @@ struct Line(#[allow(dead_code, reason = "to have a place on the stack")] u8);
 #[inline(always)]
 pub fn align_frame() {
     // Mutable: a constant would not lie on the stack.
-    black_box(&mut Line(0));
+    black_box(&mut CacheLine(0));
 }

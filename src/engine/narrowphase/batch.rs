@@ -16,7 +16,7 @@ use wide::{f32x4, f32x8, f32x16};
 
 /// Which kernel a pair of shapes has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum PairKind {
     /// [`rectangles`]
     Rectangles,
     /// [`circles`]
@@ -29,20 +29,25 @@ pub enum Kind {
     CircleHull,
 }
 
-impl Kind {
+impl PairKind {
     /// Every kind.
-    pub const ALL: [Kind; 5] =
-        [Kind::Rectangles, Kind::Circles, Kind::Hulls, Kind::HullCircle, Kind::CircleHull];
+    pub const ALL: [PairKind; 5] = [
+        PairKind::Rectangles,
+        PairKind::Circles,
+        PairKind::Hulls,
+        PairKind::HullCircle,
+        PairKind::CircleHull,
+    ];
 
     /// The kernel of such a pair. Two segments have none, because they never touch.
     pub fn of(a: Class, b: Class) -> Option<Self> {
         match (a, b) {
-            (Class::Rectangle, Class::Rectangle) => Some(Kind::Rectangles),
-            (Class::Circle, Class::Circle) => Some(Kind::Circles),
+            (Class::Rectangle, Class::Rectangle) => Some(PairKind::Rectangles),
+            (Class::Circle, Class::Circle) => Some(PairKind::Circles),
             (Class::Segment, Class::Segment) => None,
-            (_, Class::Circle) => Some(Kind::HullCircle),
-            (Class::Circle, _) => Some(Kind::CircleHull),
-            _ => Some(Kind::Hulls),
+            (_, Class::Circle) => Some(PairKind::HullCircle),
+            (Class::Circle, _) => Some(PairKind::CircleHull),
+            _ => Some(PairKind::Hulls),
         }
     }
 }
@@ -154,7 +159,7 @@ pub struct Input<'a> {
 /// # Panics
 /// If a job names a body, shape or contact that does not exist, or lists are not equally long.
 pub fn update(
-    kind: Kind,
+    kind: PairKind,
     width: LaneWidth,
     jobs: &Jobs,
     input: Input,
@@ -198,21 +203,21 @@ struct JobIndices<'a> {
 }
 
 /// Collides the pairs of one kind; as [`update`], with room for a batch of new manifolds from a place on.
-type Run = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
+type CollideFn = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
 
 /// A function for each kind: in one for all, what one kernel needs of the stack makes others spill, and frames of circles
 /// that turn made rectangles 18 % slower.
-fn run_of<L: Lanes>(kind: Kind) -> Run {
+fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
     match kind {
-        Kind::Rectangles => run::<L, { Kind::Rectangles as usize }>,
-        Kind::Circles => run::<L, { Kind::Circles as usize }>,
-        Kind::Hulls => run::<L, { Kind::Hulls as usize }>,
-        Kind::HullCircle => run::<L, { Kind::HullCircle as usize }>,
-        Kind::CircleHull => run::<L, { Kind::CircleHull as usize }>,
+        PairKind::Rectangles => run::<L, { PairKind::Rectangles as usize }>,
+        PairKind::Circles => run::<L, { PairKind::Circles as usize }>,
+        PairKind::Hulls => run::<L, { PairKind::Hulls as usize }>,
+        PairKind::HullCircle => run::<L, { PairKind::HullCircle as usize }>,
+        PairKind::CircleHull => run::<L, { PairKind::CircleHull as usize }>,
     }
 }
 
-/// `KIND`: the place of the kind in [`Kind::ALL`].
+/// `KIND`: the place of the kind in [`PairKind::ALL`].
 #[inline(never)]
 fn run<L: Lanes, const KIND: usize>(
     jobs: &Jobs,
@@ -225,13 +230,13 @@ fn run<L: Lanes, const KIND: usize>(
     // Vectors that spill do so within cache lines; see `align_frame`.
     align_frame();
     let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, speculative } = input;
-    match const { Kind::ALL[KIND] } {
-        Kind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
+    match const { PairKind::ALL[KIND] } {
+        PairKind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
             (rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
         }),
-        Kind::Circles => {
+        PairKind::Circles => {
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::<L>::gather(poses, bodies);
                 let pair = ShapePair::gather(poses, rows, shapes);
@@ -239,7 +244,7 @@ fn run<L: Lanes, const KIND: usize>(
                 circles::in_step(&pair, ways, rolling, speculative)
             })
         }
-        Kind::Hulls => {
+        PairKind::Hulls => {
             let mut pair = Hulls::<L>::empty();
             run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
@@ -247,7 +252,7 @@ fn run<L: Lanes, const KIND: usize>(
                 (pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
             })
         }
-        Kind::HullCircle => {
+        PairKind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
@@ -257,7 +262,7 @@ fn run<L: Lanes, const KIND: usize>(
                 (touch.on_held(poses.held[0]).with_gap(gap), radii)
             })
         }
-        Kind::CircleHull => {
+        PairKind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();

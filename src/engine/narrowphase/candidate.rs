@@ -1,6 +1,6 @@
 //! A pair of shapes whose bounds overlap.
 
-use super::batch::Kind;
+use super::batch::PairKind;
 use super::lanes::PoseRow;
 use crate::engine::contacts::{Contact, pair_key};
 
@@ -48,15 +48,15 @@ impl Candidate {
 pub struct Candidates<'a> {
     /// Sorted by shape pair.
     pub all: &'a [Candidate],
-    /// Places in `all` by [`Kind`], sorted by pair.
-    pub of_kind: &'a [Vec<u32>; Kind::ALL.len()],
+    /// Places in `all` by [`PairKind`], sorted by pair.
+    pub of_kind: &'a [Vec<u32>; PairKind::ALL.len()],
     /// Poses by body.
     pub poses: &'a [PoseRow],
 }
 
 impl<'a> Candidates<'a> {
     /// Place, candidate and poses of all of a kind, sorted by pair.
-    pub fn of(self, kind: Kind) -> impl Iterator<Item = (u32, &'a Candidate, [&'a PoseRow; 2])> {
+    pub fn of(self, kind: PairKind) -> impl Iterator<Item = (u32, &'a Candidate, [&'a PoseRow; 2])> {
         self.of_kind[kind as usize].iter().map(move |&place| {
             let candidate = &self.all[place as usize];
             (place, candidate, candidate.bodies.map(|body| &self.poses[body as usize]))

@@ -15,7 +15,7 @@ use glam::DVec2;
 /// Nearest points of two cores (the shapes without their radii). Where the cores
 /// overlap, the points are any two vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
+pub struct CoreDistance {
     /// m; 0 where the cores share a point.
     pub distance: f64,
     /// Nearest point of a, from a's center of mass, world axes (m).
@@ -35,7 +35,7 @@ const TOLERANCE: f64 = 1.0e-14;
 const MAX_ITERATIONS: u32 = 64;
 
 /// Distance of the cores of `a` and `b`.
-pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Distance {
+pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> CoreDistance {
     let cores = Cores::new(a, pose_a, b, pose_b);
     let mut simplex = Simplex { support: [cores.support(DVec2::X); 2], weight: [1.0, 0.0] };
     let mut iterations = 0;
@@ -52,7 +52,7 @@ pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Distance 
             Some(_) => return simplex.distance(iterations),
             None => {
                 let zero = Simplex { support: [simplex.support[0]; 2], weight: [1.0, 0.0] };
-                return Distance { distance: 0.0, normal: DVec2::ZERO, ..zero.distance(iterations) };
+                return CoreDistance { distance: 0.0, normal: DVec2::ZERO, ..zero.distance(iterations) };
             }
         }
     }
@@ -60,7 +60,7 @@ pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Distance 
 
 /// A vertex of M with the points of a and b it is the difference of.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Support {
+pub(super) struct SupportVertex {
     pub position: DVec2,
     point_a: DVec2,
     point_b: DVec2,
@@ -87,7 +87,7 @@ impl Cores {
     }
 
     /// The vertex of M = B ⊖ A farthest along `direction`.
-    pub fn support(&self, direction: DVec2) -> Support {
+    pub fn support(&self, direction: DVec2) -> SupportVertex {
         let farthest = |vertices: &[DVec2], direction: DVec2| {
             let mut best = vertices[0];
             for &v in vertices {
@@ -98,7 +98,7 @@ impl Cores {
             best
         };
         let (point_a, point_b) = (farthest(&self.a, -direction), farthest(&self.b, direction));
-        Support { position: point_b - point_a, point_a, point_b }
+        SupportVertex { position: point_b - point_a, point_a, point_b }
     }
 }
 
@@ -106,7 +106,7 @@ impl Cores {
 /// barycentric weights of the nearest point.
 #[derive(Clone, Copy, Debug)]
 struct Simplex {
-    support: [Support; 2],
+    support: [SupportVertex; 2],
     weight: [f64; 2],
 }
 
@@ -116,7 +116,7 @@ impl Simplex {
     }
 
     /// The point of the segment p–q nearest to the origin.
-    fn segment(p: Support, q: Support) -> Simplex {
+    fn segment(p: SupportVertex, q: SupportVertex) -> Simplex {
         let edge = q.position - p.position;
         let t = -p.position.dot(edge) / edge.length_squared();
         // Not a number where p = q.
@@ -130,13 +130,13 @@ impl Simplex {
     }
 
     /// The nearest simplex of this one and `w`; `None` if the three surround the origin.
-    fn extended(&self, w: Support) -> Option<Simplex> {
+    fn extended(&self, w: SupportVertex) -> Option<Simplex> {
         let [p, q] = self.support;
         if self.weight[1] == 0.0 {
             return Some(Simplex::segment(p, w));
         }
         // The origin is inside if all three edges see it on the side of the third vertex.
-        let side = |u: Support, v: Support| u.position.perp_dot(v.position);
+        let side = |u: SupportVertex, v: SupportVertex| u.position.perp_dot(v.position);
         let (s0, s1, s2) = (side(p, q), side(q, w), side(w, p));
         if (s0 >= 0.0 && s1 >= 0.0 && s2 >= 0.0) || (s0 <= 0.0 && s1 <= 0.0 && s2 <= 0.0) {
             return None;
@@ -150,12 +150,12 @@ impl Simplex {
         })
     }
 
-    fn distance(&self, iterations: u32) -> Distance {
-        let mix = |of: fn(&Support) -> DVec2| {
+    fn distance(&self, iterations: u32) -> CoreDistance {
+        let mix = |of: fn(&SupportVertex) -> DVec2| {
             self.weight[0] * of(&self.support[0]) + self.weight[1] * of(&self.support[1])
         };
         let v = self.nearest();
-        Distance {
+        CoreDistance {
             distance: v.length(),
             point_a: mix(|s| s.point_a),
             point_b: mix(|s| s.point_b),

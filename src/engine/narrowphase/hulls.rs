@@ -57,7 +57,7 @@ impl<L: Lanes> Hulls<L> {
         let (zero, count) = (L::zero(), self.count);
         let [a, b] = &self.hulls;
         let (corners_a, corners_b) = (&a.corners[..count], &b.corners[..count]);
-        let (face_a, face_b) = (Face::best(corners_a, corners_b), Face::best(corners_b, corners_a));
+        let (face_a, face_b) = (HullFace::best(corners_a, corners_b), HullFace::best(corners_b, corners_a));
         let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
         let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE), zero);
         // Where positive, b's face is the reference.
@@ -74,7 +74,7 @@ impl<L: Lanes> Hulls<L> {
         for (incident, (a, b)) in incident.iter_mut().zip(corners_a.iter().zip(corners_b)) {
             *incident = std::array::from_fn(|k| pick(a[k], b[k]));
         }
-        let face_i = Face::opposed(incident, n);
+        let face_i = HullFace::opposed(incident, n);
         let [left, right] = [face_i.first, face_i.second].map(|v| [dot(v, n), dot(v, t)]);
         let faces = Faces {
             normal: rotate(poses.rotation[0], n),
@@ -113,7 +113,7 @@ impl Hulls<f32> {
 }
 
 /// A face of a hull: the best of those looked at by some measure, `gap`.
-struct Face<L> {
+struct HullFace<L> {
     gap: L,
     normal: [L; 2],
     first: [L; 2],
@@ -122,7 +122,7 @@ struct Face<L> {
     slot: L,
 }
 
-impl<L: Lanes> Face<L> {
+impl<L: Lanes> HullFace<L> {
     /// The face of `hull` from which `other` is farthest, and how far that is (m):
     /// max over faces i of min over vertices j of nᵢ·(wⱼ − vᵢ).
     #[inline(always)]
@@ -148,13 +148,13 @@ impl<L: Lanes> Face<L> {
     fn largest(hull: &[[L; 4]], gap: impl Fn([L; 4]) -> L) -> Self {
         let zero = [L::zero(); 2];
         let gap_0 = L::splat(f32::NEG_INFINITY);
-        let mut best = Face { gap: gap_0, normal: zero, first: zero, second: zero, slot: L::zero() };
+        let mut best = HullFace { gap: gap_0, normal: zero, first: zero, second: zero, slot: L::zero() };
         for (i, &[x, y, nx, ny]) in hull.iter().enumerate() {
             let [next_x, next_y, ..] = hull[if i + 1 == hull.len() { 0 } else { i + 1 }];
             let gap = gap([x, y, nx, ny]);
             let worse = best.gap - gap;
             let keep = |old: L, new: L| worse.select_positive(old, new);
-            best = Face {
+            best = HullFace {
                 gap: keep(best.gap, gap),
                 normal: [keep(best.normal[0], nx), keep(best.normal[1], ny)],
                 first: [keep(best.first[0], x), keep(best.first[1], y)],

@@ -39,7 +39,7 @@ pub mod rectangles;
 
 use crate::engine::contacts::Manifold;
 use crate::engine::shapes::{Pose, Shape};
-use batch::Kind;
+use batch::PairKind;
 use hull::HullRow;
 use hull_circle::HullCircle;
 use hulls::Hulls;
@@ -91,26 +91,26 @@ fn touch(
 ) -> Option<Touch<f32>> {
     // What lanes do in a step is done here with one lane: the same bits.
     let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
-    let kind = Kind::of(class_a, class_b)?;
+    let kind = PairKind::of(class_a, class_b)?;
     let poses = Poses::<f32>::new(pose_a, pose_b);
     let held = f32::from(u8::from(a_is_held));
     let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
     let touch = match kind {
-        Kind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
-        Kind::Circles => {
+        PairKind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
+        PairKind::Circles => {
             let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
             circles::in_step(&pair, ways, None, speculative_distance).0
         }
-        Kind::Hulls => {
+        PairKind::Hulls => {
             let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
             hulls.collide(&poses, speculative_distance).on_held(held)
         }
-        Kind::HullCircle => {
+        PairKind::HullCircle => {
             let pair = HullCircle::new(HullRow::new(a), row_b);
             let (touch, gap, _) = pair.in_step(&poses, ways, None, speculative_distance);
             touch.on_held(held).with_gap(gap)
         }
-        Kind::CircleHull => {
+        PairKind::CircleHull => {
             let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
             let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
             touch.swapped().on_held(held).with_gap(gap)

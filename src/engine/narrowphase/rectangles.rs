@@ -42,9 +42,9 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let (gap_ax, gap_ay) = (gap(ax, h_a[0], h_b[0], h_b[1]), gap(ay, h_a[1], h_b[1], h_b[0]));
     let (gap_bx, gap_by) = (gap(bx, h_b[0], h_a[0], h_a[1]), gap(by, h_b[1], h_a[1], h_a[0]));
     let (a_is_x, b_is_x) = (gap_ax - gap_ay, gap_bx - gap_by);
-    let face_a = Face::new(a_is_x, u_a, [ax, ay], h_a);
+    let face_a = RectangleFace::new(a_is_x, u_a, [ax, ay], h_a);
     // The face of b toward a looks against d.
-    let face_b = Face::new(b_is_x, u_b, [-bx, -by], h_b);
+    let face_b = RectangleFace::new(b_is_x, u_b, [-bx, -by], h_b);
     let (gap_a, gap_b) = (gap_ax.max(gap_ay), gap_bx.max(gap_by));
 
     let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
@@ -106,7 +106,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
 }
 
 /// The face of a rectangle that looks along `toward`, given by its parts along u and u⊥.
-struct Face<L> {
+struct RectangleFace<L> {
     normal: [L; 2],
     /// Half extent along the normal.
     across: L,
@@ -116,13 +116,13 @@ struct Face<L> {
     index: L,
 }
 
-impl<L: Lanes> Face<L> {
+impl<L: Lanes> RectangleFace<L> {
     #[inline(always)]
     fn new(is_x: L, u: [L; 2], toward: [L; 2], h: [L; 2]) -> Self {
         let one = L::splat(1.0);
         let sign = |x: L| x.select_positive(one, -one);
         let (x, y) = (sign(toward[0]), sign(toward[1]));
-        Face {
+        RectangleFace {
             normal: [is_x.select_positive(x * u[0], -(y * u[1])), is_x.select_positive(x * u[1], y * u[0])],
             across: is_x.select_positive(h[0], h[1]),
             along: is_x.select_positive(h[1], h[0]),

@@ -29,7 +29,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::point_vector::{
-    Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, sum_of_products, update,
+    PointEntry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, sum_of_products, update,
 };
 use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::lanes::Lanes;
@@ -163,7 +163,7 @@ fn velocity(system: &mut System<'_>, bias: &PointVector, lambda: &mut PointVecto
 }
 
 /// u + (µ |ut|, 0), the second entry of `bias` being µ.
-fn with_slide(u: Entry, bias: Entry) -> Entry {
+fn with_slide(u: PointEntry, bias: PointEntry) -> PointEntry {
     [bias[1].mul_add(Lanes::max(u[1], -u[1]), u[0]), u[1]]
 }
 

@@ -17,7 +17,7 @@ mod recycle;
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::constraints::{ImpactLaw, Passes, Solver};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
 use recycle::Recycled;
@@ -58,12 +58,12 @@ struct Box2d {
 }
 
 impl Solver for Box2d {
-    fn before_collision(&mut self, scene: &mut Scene<'_>, collision: &mut Collision) {
+    fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         let distance = scene.parameters[RECYCLE_DISTANCE];
         self.recycled.update(scene.candidates, scene.contacts, distance, &mut collision.keep);
     }
 
-    fn after_collision(&mut self, scene: &mut Scene<'_>) {
+    fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
         self.recycled.take_up(scene.candidates, scene.contacts);
     }
 

@@ -28,10 +28,10 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
 use crate::engine::lanes::{BodyRow, held};
-use crate::engine::narrowphase::batch::Kind;
+use crate::engine::narrowphase::batch::PairKind;
 use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::params::{Budget, Mechanism, Parameter, lines_of};
 use frames::Roll;
@@ -186,14 +186,14 @@ struct Shim {
 }
 
 impl Solver for Shim {
-    fn before_collision(&mut self, scene: &mut Scene<'_>, collision: &mut Collision) {
+    fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         if !scene.without.leaves_out(part::FRAMES) {
             collision.rolling = Some(Rolling { limit: frames::STEADY });
         }
     }
 
-    fn after_collision(&mut self, scene: &mut Scene<'_>) {
-        self.rolls = [Kind::Circles, Kind::HullCircle, Kind::CircleHull]
+    fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
+        self.rolls = [PairKind::Circles, PairKind::HullCircle, PairKind::CircleHull]
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         if !scene.without.leaves_out(part::JAMS) {
@@ -256,7 +256,7 @@ impl Solver for Shim {
 
 impl Shim {
     /// Contacts found in the first step of one of their bodies bear all of their load at once.
-    fn place(&self, scene: &mut Scene<'_>) {
+    fn place(&self, scene: &mut CollisionScene<'_>) {
         if self.stepped >= scene.bodies.len() {
             return;
         }

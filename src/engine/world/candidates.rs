@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::engine::contacts::pair_key;
-use crate::engine::narrowphase::batch::{Kind, NO_CONTACT};
+use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::engine::narrowphase::candidate::Candidate;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
@@ -43,7 +43,7 @@ impl World {
             kept += usize::from(candidate.contact != NO_CONTACT);
             let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
             // Two segments never touch.
-            let Some(kind) = Kind::of(a, b) else { continue };
+            let Some(kind) = PairKind::of(a, b) else { continue };
             if self.joints.keeps_apart(candidate.bodies) {
                 kept -= usize::from(candidate.contact != NO_CONTACT);
                 continue;

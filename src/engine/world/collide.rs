@@ -2,10 +2,10 @@
 
 use super::World;
 use crate::engine::constraints::Solver;
-use crate::engine::constraints::step::{Collision, Scene};
+use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Quad, held};
-use crate::engine::narrowphase::batch::{self, Input, Jobs, Kind, NO_CONTACT, Shapes};
+use crate::engine::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
 use crate::engine::narrowphase::candidate::{Candidate, Candidates};
 use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::narrowphase::lanes::PoseRow;
@@ -18,8 +18,8 @@ pub(super) struct Narrow {
     /// Sorted by shape pair.
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
-    /// Candidates by [`Kind`].
-    pub of_kind: [Vec<u32>; Kind::ALL.len()],
+    /// Candidates by [`PairKind`].
+    pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
     pub shapes: Shapes,
     /// The set of contacts differs from the one that the lanes hold.
@@ -30,7 +30,7 @@ pub(super) struct Narrow {
     asked: Collision,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,
-    jobs: [Jobs; Kind::ALL.len()],
+    jobs: [Jobs; PairKind::ALL.len()],
     /// New contacts, in the order in which they were met.
     fresh: Vec<Contact>,
     last_contacts: Vec<Contact>,
@@ -106,7 +106,7 @@ impl World {
         // Ways are longer than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
         let input = Input { poses, ways, rolling, shapes, speculative: SPECULATIVE_DISTANCE };
-        for (kind, jobs) in Kind::ALL.into_iter().zip(jobs) {
+        for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
         if narrow.is_changed {
@@ -141,9 +141,9 @@ impl World {
     }
 
     /// Calls a hook of the solver.
-    fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut Scene<'_>)) {
+    fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
         let Narrow { candidates, of_kind, poses, is_changed, .. } = &self.narrow;
-        let mut scene = Scene {
+        let mut scene = CollisionScene {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
             kept: &mut self.work.kept,

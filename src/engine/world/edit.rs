@@ -30,7 +30,7 @@ pub(super) struct Slots {
 /// Persistent forces of a body before others were applied for one step.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Standing {
+pub(super) struct StandingForces {
     pub(super) body: u32,
     force: Vec2,
     torque: f32,
@@ -302,8 +302,11 @@ impl World {
         finite_pair("force", [force.x, force.y].map(f64::from))?;
         finite("torque", f64::from(torque))?;
         let b = &mut self.bodies;
-        let standing =
-            Standing { body: body.index, force: Vec2::new(b.force_x[i], b.force_y[i]), torque: b.torque[i] };
+        let standing = StandingForces {
+            body: body.index,
+            force: Vec2::new(b.force_x[i], b.force_y[i]),
+            torque: b.torque[i],
+        };
         self.applied.push(standing);
         b.force_x[i] += force.x;
         b.force_y[i] += force.y;
@@ -322,7 +325,7 @@ impl World {
 
     /// After a step: forces that were applied for it go, and places of removed bodies may be taken.
     pub(super) fn end_edits(&mut self) {
-        while let Some(Standing { body, force, torque }) = self.applied.pop() {
+        while let Some(StandingForces { body, force, torque }) = self.applied.pop() {
             let i = body as usize;
             (self.bodies.force_x[i], self.bodies.force_y[i]) = (force.x, force.y);
             self.bodies.torque[i] = torque;

@@ -60,7 +60,7 @@ pub struct ContactPoint {
 /// Touching pairs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Touching {
+struct TouchingPair {
     key: u64,
     bodies: [BodyHandle; 2],
     shapes: [u32; 2],
@@ -73,9 +73,9 @@ pub(super) struct Events {
     #[cfg_attr(feature = "serde", serde(skip))]
     list: Vec<ContactEvent>,
     /// After the last step, sorted by key.
-    touching: Vec<Touching>,
+    touching: Vec<TouchingPair>,
     #[cfg_attr(feature = "serde", serde(skip))]
-    last_touching: Vec<Touching>,
+    last_touching: Vec<TouchingPair>,
     #[cfg_attr(feature = "serde", serde(skip))]
     /// Speed of approach before the step (m/s) and point (m) of each contact.
     approach: Vec<(f32, DVec2)>,
@@ -172,18 +172,18 @@ impl World {
         events.touching.clear();
         events.touching.extend(self.contacts.iter().map(|contact| {
             let handle = |index| BodyHandle { index, generation: self.slots.generation[index as usize] };
-            Touching {
+            TouchingPair {
                 key: contact.key(),
                 bodies: [contact.body_a, contact.body_b].map(handle),
                 shapes: [contact.shape_a, contact.shape_b],
             }
         }));
         let Events { list, touching, last_touching, approach } = &mut events;
-        let end = |&Touching { bodies, shapes, .. }: &Touching| ContactEvent::End { bodies, shapes };
+        let end = |&TouchingPair { bodies, shapes, .. }: &TouchingPair| ContactEvent::End { bodies, shapes };
         let mut last = last_touching.iter().peekable();
         for ((now, contact), &(approach_speed, point)) in touching.iter().zip(&self.contacts).zip(&*approach)
         {
-            let Touching { key, bodies, shapes } = *now;
+            let TouchingPair { key, bodies, shapes } = *now;
             while let Some(gone) = last.next_if(|old| old.key < key) {
                 list.push(end(gone));
             }

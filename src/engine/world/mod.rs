@@ -19,7 +19,7 @@ use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
-use edit::{Slots, Standing};
+use edit::{Slots, StandingForces};
 use events::Events;
 use joints::JointSlots;
 use std::fmt;
@@ -132,7 +132,7 @@ pub struct World {
     work: Workspace,
     slots: Slots,
     /// What is to be as it was before the next step.
-    applied: Vec<Standing>,
+    applied: Vec<StandingForces>,
     events: Events,
     joints: JointSlots,
 }

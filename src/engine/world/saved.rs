@@ -3,7 +3,7 @@
 //! Not in it: constraints of other types than contacts (saving them is an error), and state that a solver keeps in
 //! its own fields instead of per contact and body. Solvers without such fields continue with the same bits.
 
-use super::edit::{Slots, Standing};
+use super::edit::{Slots, StandingForces};
 use super::events::Events;
 use super::joints::SavedJoints;
 use super::traits::Traits;
@@ -131,7 +131,7 @@ struct SavedWorld {
     contacts: Vec<Contact>,
     impulses_of: Option<f32>,
     kept: Kept,
-    applied: Vec<Standing>,
+    applied: Vec<StandingForces>,
     events: Events,
     traits: Traits,
     #[serde(default)]

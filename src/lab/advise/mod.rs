@@ -30,14 +30,14 @@ use crate::lab::scenes::holds::Broken;
 use crate::lab::study::compare::compare;
 use crate::lab::study::interleave::{Sample, time_in_turns};
 use crate::lab::study::record::Later;
-use crate::lab::study::{Failure, Progress, TruthError, budget, open_scene};
+use crate::lab::study::{FailedAt, Progress, TruthError, budget, open_scene};
 use crate::lab::units::{ratio, si};
 use limits::Limits;
 use search::Search;
 
 /// What to search, and how long.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct SearchPlan {
     /// Name of the catalog with its size, or a `.json` file.
     pub scene: String,
     /// Limits of a good-enough setting.
@@ -67,7 +67,7 @@ const FINALISTS: usize = 4;
 
 /// A solver, an order, a budget and parameters.
 #[derive(Clone, Copy, Debug)]
-pub struct Setting {
+pub struct SearchSetting {
     /// Row of the table of solvers.
     pub solver: &'static Variant,
     /// Constraint order.
@@ -80,7 +80,7 @@ pub struct Setting {
     pub impacts: Impacts,
 }
 
-impl Setting {
+impl SearchSetting {
     /// The settings of a world, at this width.
     pub fn settings(&self, width: LaneWidth) -> Settings {
         Settings {
@@ -106,7 +106,7 @@ impl Setting {
 
 /// A time and where it was reached.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Time {
+pub struct FoundTime {
     /// Lanes per instruction.
     pub lanes: usize,
     /// Mean time of a step over the run (ns).
@@ -126,9 +126,9 @@ pub struct Time {
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// What was tried.
-    pub setting: Setting,
+    pub setting: SearchSetting,
     /// At the fastest width; none if the run failed.
-    pub time: Option<Time>,
+    pub time: Option<FoundTime>,
     /// Blocks of the final timing at that width; none before it.
     pub sample: Option<Sample>,
     /// None if the run failed.
@@ -136,7 +136,7 @@ pub struct Trial {
     /// Distance to what is known about the scene.
     pub truth: Option<TruthError>,
     /// Why there is no result.
-    pub failure: Option<Failure>,
+    pub failure: Option<FailedAt>,
     /// The first demand of the scene that was not met: no limit is kept by what fell.
     pub broken: Option<Broken>,
     /// Result of the one-minute run, if the scene has to rest and the run itself was within the limits.
@@ -252,7 +252,7 @@ impl Advice {
 /// Searches and times.
 ///
 /// Errors: an unknown scene; a bound on the reference error of a scene that has none.
-pub fn advise(plan: &Plan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
+pub fn advise(plan: &SearchPlan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
     for (name, missing) in [("solvers", plan.solvers.is_empty()), ("lanes", plan.widths.is_empty())] {
         if missing {
             return Err(Error::invalid(name, "none given"));
@@ -306,7 +306,7 @@ fn rank(trials: &mut [Trial]) {
 }
 
 /// Widths at which a setting may run.
-fn widths(plan: &Plan, order: Order) -> Vec<LaneWidth> {
+fn widths(plan: &SearchPlan, order: Order) -> Vec<LaneWidth> {
     match order {
         Order::Colored => plan.widths.clone(),
         _ => vec![LaneWidth::W1],
@@ -315,7 +315,7 @@ fn widths(plan: &Plan, order: Order) -> Vec<LaneWidth> {
 
 /// Times all finalists at all widths side by side, and judges them by that.
 fn race_again(
-    plan: &Plan,
+    plan: &SearchPlan,
     scene: &crate::lab::scenes::Scene,
     finalists: &mut [Trial],
     steps: u32,
@@ -339,9 +339,9 @@ fn race_again(
     Ok(())
 }
 
-fn fastest<'a>(samples: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(Time, &'a Sample)> {
+fn fastest<'a>(samples: impl Iterator<Item = (LaneWidth, &'a Sample)>) -> Option<(FoundTime, &'a Sample)> {
     let (width, sample) = samples.min_by(|a, b| a.1.median_ns.total_cmp(&b.1.median_ns))?;
-    let time = Time {
+    let time = FoundTime {
         lanes: width.lanes(),
         mean_ns: sample.mean_ns,
         median_ns: sample.median_ns,
@@ -370,9 +370,10 @@ mod tests {
     pub fn trial(time: f64, excess: f64) -> Trial {
         let solver = find("pgs").unwrap();
         let (budget, parameters) = (solver.budget, solver.defaults());
-        let setting = Setting { solver, order: Order::Colored, budget, parameters, impacts: Impacts::Own };
+        let setting =
+            SearchSetting { solver, order: Order::Colored, budget, parameters, impacts: Impacts::Own };
         let (mean_ns, median_ns, worst_ns) = (time, time, time);
-        let time = Some(Time { lanes: 8, mean_ns, median_ns, worst_ns, spread_ns: 0.0 });
+        let time = Some(FoundTime { lanes: 8, mean_ns, median_ns, worst_ns, spread_ns: 0.0 });
         Trial {
             setting,
             time,
@@ -429,7 +430,7 @@ mod tests {
         let mut parameters = soft.defaults();
         soft.set(&mut parameters, "contact_hertz", 60.0).unwrap();
         let (order, impacts) = (Order::Natural, Impacts::Own);
-        let setting = Setting { solver: soft, order, budget: soft.budget, parameters, impacts };
+        let setting = SearchSetting { solver: soft, order, budget: soft.budget, parameters, impacts };
         assert_eq!(setting.text(), "soft_step, 4 sub 1 vel 1 rel, contact_hertz 60 Hz");
         let settings = setting.settings(LaneWidth::W1);
         assert_eq!(

@@ -1,6 +1,6 @@
 //! The grid, the bisection, and what can be left out.
 
-use super::{Plan, Setting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
+use super::{SearchPlan, SearchSetting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
 use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
@@ -9,7 +9,7 @@ use crate::lab::scenes::Scene;
 use crate::lab::study::horizon;
 use crate::lab::study::interleave::time_in_turns;
 use crate::lab::study::search::parameters;
-use crate::lab::study::{Failure, Progress, observe, open_scene};
+use crate::lab::study::{FailedAt, Progress, observe, open_scene};
 use std::time::Instant;
 
 /// Most substeps, most sweeps per substep, and most sweeps of a kind per step of the grid.
@@ -26,7 +26,7 @@ const REFINED: usize = 4;
 
 /// A search under way.
 pub struct Search<'a> {
-    plan: &'a Plan,
+    plan: &'a SearchPlan,
     scene: &'a Scene,
     progress: &'a dyn Fn(Progress),
     start: Instant,
@@ -82,7 +82,7 @@ pub fn budgets(solver: &Variant) -> Vec<Budget> {
 
 impl<'a> Search<'a> {
     /// Nothing tried yet; the clock runs.
-    pub fn new(plan: &'a Plan, scene: &'a Scene, progress: &'a dyn Fn(Progress)) -> Self {
+    pub fn new(plan: &'a SearchPlan, scene: &'a Scene, progress: &'a dyn Fn(Progress)) -> Self {
         Search {
             plan,
             scene,
@@ -107,7 +107,7 @@ impl<'a> Search<'a> {
                 let h = self.scene.dt as f32 / budget.substeps as f32;
                 for parameters in parameters(solver, h, |p| p.trials) {
                     let impacts = self.plan.impacts;
-                    let of = |&order: &Order| Setting { solver, order, budget, parameters, impacts };
+                    let of = |&order: &Order| SearchSetting { solver, order, budget, parameters, impacts };
                     grid.extend(orders.iter().map(of));
                 }
             }
@@ -135,7 +135,7 @@ impl<'a> Search<'a> {
                     let middle = low + (high - low) / 2;
                     let mut lowered = parts(&setting.budget);
                     lowered[part] = middle;
-                    let candidate = Setting { budget: from_parts(lowered), ..setting };
+                    let candidate = SearchSetting { budget: from_parts(lowered), ..setting };
                     if !self.consider(candidate)? {
                         return Ok(());
                     }
@@ -151,12 +151,12 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn trial_of(&self, s: &Setting) -> Option<&Trial> {
+    fn trial_of(&self, s: &SearchSetting) -> Option<&Trial> {
         self.trials.iter().find(|t| same(&t.setting, s) && t.setting.budget == s.budget)
     }
 
     /// Tries a setting unless it is known or can be left out; says whether there is time for more.
-    fn consider(&mut self, setting: Setting) -> Result<bool, Error> {
+    fn consider(&mut self, setting: SearchSetting) -> Result<bool, Error> {
         if self.start.elapsed().as_secs_f64() > self.plan.seconds {
             self.is_cut_short = true;
             return Ok(false);
@@ -177,7 +177,7 @@ impl<'a> Search<'a> {
     }
 
     /// See the [module above](super).
-    fn can_only_cost_more(&self, s: &Setting) -> bool {
+    fn can_only_cost_more(&self, s: &SearchSetting) -> bool {
         let fastest =
             self.trials.iter().filter(|t| t.is_good()).map(Trial::time_ns).fold(f64::INFINITY, f64::min);
         let limit = fastest.min(self.plan.limits.time_ns.unwrap_or(f64::INFINITY)) * TOO_SLOW;
@@ -191,7 +191,7 @@ impl<'a> Search<'a> {
     }
 
     /// Errors from a whole run, time from a short interleaved timing of all widths.
-    fn run(&self, setting: Setting) -> Result<Trial, Error> {
+    fn run(&self, setting: SearchSetting) -> Result<Trial, Error> {
         let loaded = open_scene(&self.plan.scene, Some(self.plan.seed), self.plan.steps, None)?;
         let widths = widths(self.plan, setting.order);
         let widest = widths.iter().copied().max().unwrap_or(crate::engine::lanes::LaneWidth::W1);
@@ -202,7 +202,7 @@ impl<'a> Search<'a> {
             sample: None,
             errors: outcome.errors.ok(),
             truth: outcome.truth,
-            failure: outcome.errors.err().map(Failure::from),
+            failure: outcome.errors.err().map(FailedAt::from),
             broken: outcome.broken,
             later: None,
             excess: f64::INFINITY,
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
 }
 
 /// Whether two settings differ in their budget at most.
-fn same(a: &Setting, b: &Setting) -> bool {
+fn same(a: &SearchSetting, b: &SearchSetting) -> bool {
     a.solver.name == b.solver.name && a.order == b.order && a.parameters == b.parameters
 }
 
@@ -266,8 +266,8 @@ mod tests {
         assert_eq!(parameters(pgs, 0.01, |p| p.trials), [pgs.defaults()]);
     }
 
-    fn plan(limits: Limits) -> Plan {
-        Plan {
+    fn plan(limits: Limits) -> SearchPlan {
+        SearchPlan {
             scene: "stack:1".to_string(),
             impacts: Impacts::Own,
             limits,
@@ -292,7 +292,7 @@ mod tests {
         };
         let asked = |search: &Search, velocity: u32| {
             let setting = known(velocity, 0.0, 0.0).setting;
-            let natural = Setting { order: Order::Natural, ..setting };
+            let natural = SearchSetting { order: Order::Natural, ..setting };
             [search.can_only_cost_more(&setting), search.can_only_cost_more(&natural)]
         };
         search.trials = vec![known(8, 10.0, 2.0)];
@@ -313,7 +313,7 @@ mod tests {
     fn bisection_ends_at_the_least_that_is_good() {
         let scene = scenes::load("stack:4").unwrap().scene;
         let limits = Limits { penetration: Some(2e-3), ..Limits::default() };
-        let plan = Plan { scene: "stack:4".to_string(), steps: Some(60), ..plan(limits) };
+        let plan = SearchPlan { scene: "stack:4".to_string(), steps: Some(60), ..plan(limits) };
         let mut search = Search::new(&plan, &scene, &|_| ());
         // Known to be good, and so slow that no time leaves anything out.
         let mut known = trial(1e15, 0.5);
@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn no_time_is_no_trial() {
         let scene = scenes::load("stack:1").unwrap().scene;
-        let plan = Plan { seconds: -1.0, ..plan(Limits::default()) };
+        let plan = SearchPlan { seconds: -1.0, ..plan(Limits::default()) };
         let mut search = Search::new(&plan, &scene, &|_| ());
         search.coarse().unwrap();
         assert!(search.is_cut_short && search.trials.is_empty());

@@ -29,7 +29,7 @@ pub const NEGLIGIBLE: f64 = 0.01;
 
 /// How to judge.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct CompareOptions {
     /// Smallest increase of a time or an error that counts as a regression (1): 0.1 is 10 %.
     pub threshold: f64,
     /// Divide times by what all settings have in common.
@@ -38,7 +38,7 @@ pub struct Options {
 
 /// A setting in both studies.
 #[derive(Clone, Debug, Serialize)]
-pub struct Pair {
+pub struct SettingPair {
     /// Name with size.
     pub scene: String,
     /// Name of the solver.
@@ -181,7 +181,7 @@ impl TimeChange {
     }
 }
 
-impl Pair {
+impl SettingPair {
     /// Whether it holds no more, or again.
     pub fn holding(&self) -> Verdict {
         match self.marks.map(|m| m.is_none()) {
@@ -201,10 +201,10 @@ pub struct Comparison {
     pub common: Option<f64>,
     /// Whether times are divided by it.
     pub relative: bool,
-    /// See [`Options::threshold`].
+    /// See [`CompareOptions::threshold`].
     pub threshold: f64,
     /// Settings that both have.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<SettingPair>,
     /// Solvers against the others.
     pub solvers: Vec<SolverChange>,
     /// Settings that only the first has, and only the second.
@@ -216,7 +216,7 @@ pub struct Comparison {
 impl Comparison {
     /// Whether anything became worse.
     pub fn regressed(&self) -> bool {
-        let worse = |p: &Pair| {
+        let worse = |p: &SettingPair| {
             p.holding() == Verdict::Worse
                 || p.errors.iter().any(|e| e.verdict(self.threshold) == Verdict::Worse)
                 || p.time.is_some_and(|t| t.verdict(self.threshold) == Verdict::Worse)
@@ -227,8 +227,8 @@ impl Comparison {
 }
 
 /// Compares `after` with `before`.
-pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comparison {
-    let mut pairs: Vec<Pair> = Vec::new();
+pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) -> Comparison {
+    let mut pairs: Vec<SettingPair> = Vec::new();
     let mut alone = [before.records.len(), after.records.len()];
     for one in &before.records {
         if let Some(other) = after.records.iter().find(|r| key(r) == key(one)) {
@@ -264,7 +264,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &Options) -> Comp
 }
 
 /// What the two runs differ by where nothing was changed.
-fn noise(before: &StudyFile, after: &StudyFile, pairs: &[Pair]) -> Noise {
+fn noise(before: &StudyFile, after: &StudyFile, pairs: &[SettingPair]) -> Noise {
     let logs: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio.ln())).collect();
     let mean = |study: &StudyFile, of: fn(&Sample) -> f64| {
         let values: Vec<f64> = study.records.iter().filter_map(|r| r.sample.as_ref().map(of)).collect();
@@ -280,7 +280,7 @@ fn key(r: &Record) -> impl PartialEq {
     (&r.scene, r.setting(), r.lanes)
 }
 
-fn pair(one: &Record, other: &Record) -> Pair {
+fn pair(one: &Record, other: &Record) -> SettingPair {
     let errors = ErrorAxis::ALL.into_iter().filter_map(|axis| {
         let values = [axis.of(one)?, axis.of(other)?];
         let tolerances = &one.tolerances;
@@ -300,7 +300,7 @@ fn pair(one: &Record, other: &Record) -> Pair {
         let (cost_ns, longest_step_ns) = (samples.map(Sample::cost_ns), samples.map(|s| s.worst_ns));
         Some(TimeChange { cost_ns, longest_step_ns, ratio: median, interval })
     };
-    Pair {
+    SettingPair {
         scene: one.scene.clone(),
         solver: one.solver,
         order: one.order,
@@ -356,7 +356,7 @@ mod tests {
         StudyFile::new(&StudyPlan::default(), records, Vec::new())
     }
 
-    const STRICT: Options = Options { threshold: 0.1, relative: false };
+    const STRICT: CompareOptions = CompareOptions { threshold: 0.1, relative: false };
 
     #[test]
     fn a_study_is_as_good_as_itself() {
@@ -411,7 +411,7 @@ mod tests {
             c.pairs.iter().filter(|p| p.time.unwrap().verdict(0.1) == Verdict::Worse).count()
         };
         assert_eq!((raw.common, count(&raw)), (Some(1.5), 5));
-        let relative = compare(&before, &after, &Options { relative: true, ..STRICT });
+        let relative = compare(&before, &after, &CompareOptions { relative: true, ..STRICT });
         assert_eq!(count(&relative), 1);
     }
 
@@ -438,7 +438,7 @@ mod tests {
         };
         let before = run(1.0, 1.0);
         let after = run(machine, slower);
-        compare(&before, &after, &Options { threshold: 0.05, relative: false })
+        compare(&before, &after, &CompareOptions { threshold: 0.05, relative: false })
     }
 
     #[test]
@@ -471,7 +471,7 @@ mod tests {
             });
             study(vec![r])
         };
-        let found = compare(&noisy(1), &noisy(2), &Options { threshold: 0.01, relative: false });
+        let found = compare(&noisy(1), &noisy(2), &CompareOptions { threshold: 0.01, relative: false });
         assert_eq!(found.pairs[0].time.unwrap().verdict(0.01), Verdict::Same);
     }
 }

@@ -4,7 +4,7 @@
 //! of a setting from its scene's common ratio says what the solver did: the median over a solver's settings finds a
 //! slowdown that no single setting shows.
 
-use super::{FEWEST, Pair, Verdict, judged_within};
+use super::{FEWEST, SettingPair, Verdict, judged_within};
 use crate::lab::study::interleave::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ impl SolverChange {
 }
 
 /// By solver, where there are enough settings and solvers to say something.
-pub fn changes(pairs: &[Pair]) -> Vec<SolverChange> {
+pub fn changes(pairs: &[SettingPair]) -> Vec<SolverChange> {
     let mut scenes: BTreeMap<&str, BTreeMap<&'static str, Vec<f64>>> = BTreeMap::new();
     for pair in pairs {
         if let Some(time) = pair.time {
@@ -85,7 +85,7 @@ mod tests {
                         ratio,
                         interval: [ratio; 2],
                     };
-                    pairs.push(Pair {
+                    pairs.push(SettingPair {
                         scene: scene.to_string(),
                         solver,
                         order: Order::Colored,

@@ -1,6 +1,6 @@
 //! A comparison as text.
 
-use super::{Comparison, Pair, Verdict};
+use super::{Comparison, SettingPair, Verdict};
 use crate::engine::world::Order;
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, lanes, ratio, si};
@@ -9,7 +9,7 @@ use crate::lab::report::units::{digits, lanes, ratio, si};
 const ROWS: usize = 10;
 
 /// One change, and by how much it changed (1).
-struct Line {
+struct ChangeLine {
     cells: [String; 7],
     growth: f64,
     verdict: Verdict,
@@ -42,15 +42,15 @@ pub fn text(found: &Comparison, all: bool) -> String {
     );
     text += "\n";
     // The widths of a setting end in the same bits: one of them says what happened.
-    let own = |p: &Pair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);
-    let mut once: Vec<&Pair> = found.pairs.iter().collect();
+    let own = |p: &SettingPair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);
+    let mut once: Vec<&SettingPair> = found.pairs.iter().collect();
     once.dedup_by_key(|p| own(p));
     text += &section("Scenes that hold", once.iter().filter_map(|p| holding(p)).collect(), all);
-    let errors: Vec<Line> = once.iter().flat_map(|p| errors(p, found.threshold)).collect();
+    let errors: Vec<ChangeLine> = once.iter().flat_map(|p| errors(p, found.threshold)).collect();
     let changed = once.iter().flat_map(|p| &p.errors).filter(|e| e.changed()).count();
     let count = once.iter().map(|p| p.errors.len()).sum::<usize>();
     text += &section(&format!("Errors: {changed} of {count} are not bit-identical"), errors, all);
-    let times: Vec<Line> = found.pairs.iter().filter_map(|p| times(p, found.threshold)).collect();
+    let times: Vec<ChangeLine> = found.pairs.iter().filter_map(|p| times(p, found.threshold)).collect();
     let common = match (found.common, found.relative) {
         (None, _) => String::new(),
         (Some(common), false) => format!(": median {} times as long", digits(common)),
@@ -71,7 +71,7 @@ pub fn text(found: &Comparison, all: bool) -> String {
 }
 
 /// How many became better and worse, and the greatest changes.
-fn section(title: &str, mut lines: Vec<Line>, all: bool) -> String {
+fn section(title: &str, mut lines: Vec<ChangeLine>, all: bool) -> String {
     let count = |verdict| lines.iter().filter(|l| l.verdict == verdict).count();
     let mut text = format!("{title}; {} worse, {} better\n", count(Verdict::Worse), count(Verdict::Better));
     lines.retain(|l| l.verdict != Verdict::Same || all);
@@ -102,7 +102,7 @@ fn section(title: &str, mut lines: Vec<Line>, all: bool) -> String {
     text + "\n"
 }
 
-fn cells(pair: &Pair, what: &str, before: String, after: String) -> [String; 7] {
+fn cells(pair: &SettingPair, what: &str, before: String, after: String) -> [String; 7] {
     let width = match pair.order {
         Order::Colored => lanes(pair.lanes),
         order => order.name().to_string(),
@@ -110,28 +110,32 @@ fn cells(pair: &Pair, what: &str, before: String, after: String) -> [String; 7] 
     [pair.scene.clone(), pair.solver.into(), pair.budget.clone(), width, what.into(), before, after]
 }
 
-fn holding(pair: &Pair) -> Option<Line> {
+fn holding(pair: &SettingPair) -> Option<ChangeLine> {
     let [before, after] = pair.marks.map(|m| m.map_or("holds", |m| m.word()).to_string());
-    (before != after).then(|| Line {
+    (before != after).then(|| ChangeLine {
         verdict: pair.holding(),
         growth: f64::INFINITY,
         cells: cells(pair, "holds", before, after),
     })
 }
 
-fn errors(pair: &Pair, threshold: f64) -> Vec<Line> {
+fn errors(pair: &SettingPair, threshold: f64) -> Vec<ChangeLine> {
     // The widths of a setting have the same bits: one of them will do.
     let line = |e: &super::ErrorChange| {
         let [before, after] = e.values.map(|v| if e.unit.is_empty() { ratio(v) } else { si(v, e.unit) });
-        Line { cells: cells(pair, e.error, before, after), growth: e.growth(), verdict: e.verdict(threshold) }
+        ChangeLine {
+            cells: cells(pair, e.error, before, after),
+            growth: e.growth(),
+            verdict: e.verdict(threshold),
+        }
     };
     pair.errors.iter().filter(|e| e.changed()).map(line).collect()
 }
 
-fn times(pair: &Pair, threshold: f64) -> Option<Line> {
+fn times(pair: &SettingPair, threshold: f64) -> Option<ChangeLine> {
     let time = pair.time?;
     let [before, after] = time.cost_ns.map(|ns| si(1e-9 * ns, "s"));
-    Some(Line {
+    Some(ChangeLine {
         cells: cells(pair, "step", before, after),
         growth: time.ratio,
         verdict: time.verdict(threshold),

@@ -44,14 +44,14 @@ use serde::Serialize;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use timing::IterationTime;
-use warm::{WarmStart, Warmed};
+use warm::{WarmStartSource, Warmed};
 
 /// Residuals whose first iteration is reported (1).
 pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /// What to run.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ConvergeOptions {
     /// Solvers, in this order.
     pub solvers: Vec<&'static Variant>,
     /// Most iterations.
@@ -68,9 +68,9 @@ pub struct Options {
     pub baseline: bool,
 }
 
-impl Default for Options {
+impl Default for ConvergeOptions {
     fn default() -> Self {
-        Options {
+        ConvergeOptions {
             solvers: VARIANTS.to_vec(),
             max_iterations: 1000,
             seed: 1,
@@ -100,7 +100,7 @@ pub struct CurvePoint {
 /// The result of a curve under one law.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reached {
-    /// Index into [`Curve::points`] of the first point within each of [`TOLERANCES`].
+    /// Index into [`ReplayCurve::points`] of the first point within each of [`TOLERANCES`].
     pub first: [Option<usize>; TOLERANCES.len()],
     /// Smallest residual after at least one iteration (1): the start is no work of the solver. Infinite where there
     /// is none.
@@ -112,7 +112,7 @@ pub struct Reached {
 
 /// One solver in one order from one start.
 #[derive(Clone, Debug, Serialize)]
-pub struct Curve {
+pub struct ReplayCurve {
     /// Name of the solver, with its stage if it is only one of several.
     pub solver: String,
     /// Whether that is not its whole schedule.
@@ -137,7 +137,7 @@ pub struct Curve {
 
 /// All curves of one problem.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct ConvergeReport {
     /// Name of the problem.
     pub problem: String,
     /// Bodies that are not static.
@@ -149,7 +149,7 @@ pub struct Report {
     /// The reference's certificate; none if velocities could not be compared.
     pub certificate: Option<Certificate>,
     /// Where warm starts come from; without any there are no warm curves.
-    pub warm_start: WarmStart,
+    pub warm_start: WarmStartSource,
     /// Solvers without warm starting, if there are warm starts: they have no warm curves.
     pub forgetful: Vec<String>,
     /// Lanes in colored order.
@@ -160,23 +160,23 @@ pub struct Report {
     /// See [`TOLERANCES`].
     pub tolerances: [f64; TOLERANCES.len()],
     /// Curves, solver by solver.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<ReplayCurve>,
 }
 
 /// A solver's schedule as a function of the number of iterations.
-struct Schedule {
+struct IteratedSchedule {
     variant: &'static Variant,
     name: String,
     relaxes: bool,
 }
 
-impl Schedule {
+impl IteratedSchedule {
     /// The whole schedule, and the one without its relaxing sweeps, which would hide what the
     /// sweeps before them converge to.
-    fn of(variant: &'static Variant) -> Vec<Schedule> {
-        let whole = Schedule { variant, name: variant.name.into(), relaxes: variant.uses.relax };
+    fn of(variant: &'static Variant) -> Vec<IteratedSchedule> {
+        let whole = IteratedSchedule { variant, name: variant.name.into(), relaxes: variant.uses.relax };
         let name = format!("{} without relaxing", variant.name);
-        let bare = Schedule { variant, name, relaxes: false };
+        let bare = IteratedSchedule { variant, name, relaxes: false };
         if variant.uses.relax { vec![whole, bare] } else { vec![whole] }
     }
 
@@ -213,8 +213,8 @@ impl Schedule {
 pub fn converge(
     problem: &ContactProblem,
     reference: Option<&Reference>,
-    options: &Options,
-) -> Result<Report, Error> {
+    options: &ConvergeOptions,
+) -> Result<ConvergeReport, Error> {
     converge_watched(problem, reference, options, &|_, _, _| ())
 }
 
@@ -222,9 +222,9 @@ pub fn converge(
 pub fn converge_watched(
     problem: &ContactProblem,
     reference: Option<&Reference>,
-    options: &Options,
+    options: &ConvergeOptions,
     tell: &dyn Fn(usize, usize, &str),
-) -> Result<Report, Error> {
+) -> Result<ConvergeReport, Error> {
     problem.validate()?;
     if problem.contacts.is_empty() {
         return Err(Error::invalid("contacts", format!("'{}' has none", problem.name)));
@@ -235,7 +235,8 @@ pub fn converge_watched(
     let Warmed { origin, problem: warmed, before } = warm::warmed(problem, reference);
     let problem = &warmed;
     let orders = [Sequence::Natural, Sequence::Colored, Sequence::Shuffled(options.seed)];
-    let schedules: Vec<Schedule> = options.solvers.iter().flat_map(|v| Schedule::of(v)).collect();
+    let schedules: Vec<IteratedSchedule> =
+        options.solvers.iter().flat_map(|v| IteratedSchedule::of(v)).collect();
     let mut curves = Vec::new();
     let mut timers = Vec::new();
     // Every order of every schedule, then times, then methods in f64.
@@ -248,7 +249,7 @@ pub fn converge_watched(
             replay.follow(&before)?;
             let first = curves.len();
             curves.push(curve(problem, reference, schedule, order, Start::Cold, &mut replay, options));
-            if origin != WarmStart::None && remembers(schedule, &mut replay) {
+            if origin != WarmStartSource::None && remembers(schedule, &mut replay) {
                 curves.push(curve(problem, reference, schedule, order, Start::Warm, &mut replay, options));
             }
             timers.push((schedule, replay, first..curves.len()));
@@ -262,12 +263,13 @@ pub fn converge_watched(
             curves[range.clone()].iter_mut().for_each(|curve| curve.iteration = Some(time));
         }
     }
-    let has_warm = |name: &str| curves.iter().any(|c: &Curve| c.solver == name && c.start == Start::Warm);
-    let names = schedules.iter().filter(|s| origin != WarmStart::None && !has_warm(&s.name));
+    let has_warm =
+        |name: &str| curves.iter().any(|c: &ReplayCurve| c.solver == name && c.start == Start::Warm);
+    let names = schedules.iter().filter(|s| origin != WarmStartSource::None && !has_warm(&s.name));
     let forgetful = names.map(|s| s.name.clone()).collect();
     tell(parts - 1, parts, "methods in f64");
-    curves.extend(scalar::curves(problem, reference, origin != WarmStart::None, options));
-    Ok(Report {
+    curves.extend(scalar::curves(problem, reference, origin != WarmStartSource::None, options));
+    Ok(ConvergeReport {
         problem: problem.name.clone(),
         bodies: problem.bodies.len(),
         contacts: problem.contacts.len(),
@@ -283,7 +285,7 @@ pub fn converge_watched(
 }
 
 /// Whether warm-start impulses make a difference to this solver.
-fn remembers(schedule: &Schedule, replay: &mut Replay) -> bool {
+fn remembers(schedule: &IteratedSchedule, replay: &mut Replay) -> bool {
     let [cold, warm] =
         [Start::Cold, Start::Warm].map(|start| replay.run(schedule.variant, schedule.budget(1), start));
     cold.velocities != warm.velocities || cold.impulses != warm.impulses
@@ -326,12 +328,12 @@ const NEAR_FLOOR: f64 = 20.0;
 fn curve(
     problem: &ContactProblem,
     reference: Option<&Reference>,
-    schedule: &Schedule,
+    schedule: &IteratedSchedule,
     order: Sequence,
     start: Start,
     replay: &mut Replay,
-    options: &Options,
-) -> Curve {
+    options: &ConvergeOptions,
+) -> ReplayCurve {
     let mut own_is_rigid = true;
     let mut points = BTreeMap::new();
     // Changes below half a unit in the last place of the largest impulse are lost.
@@ -373,7 +375,7 @@ fn curve(
     }
     let points: Vec<CurvePoint> = points.into_values().collect();
     let [rigid, own] = LAWS.map(|law| reached(&points, law, floor.get()));
-    Curve {
+    ReplayCurve {
         solver: schedule.name.clone(),
         is_part: schedule.variant.uses.relax && !schedule.relaxes,
         arithmetic: "f32",

@@ -5,19 +5,16 @@
 //! time.
 
 use super::replay::{Sequence, Start};
-use super::warm::WarmStart;
-use super::{Curve, CurvePoint, Reached, Report};
+use super::warm::WarmStartSource;
+use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve};
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
 use crate::lab::picture;
+use crate::lab::picture::axes::{Area, Drawn, GRID, INK, write};
 use crate::lab::units::si_short;
-use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+use plotters::style::text_anchor::HPos;
 
 const PANEL: (i32, i32) = (560, 300);
 const LEGEND_LINE: i32 = 20;
@@ -26,32 +23,30 @@ const HEADING: i32 = 30;
 const LEFT: i32 = 64;
 const BOTTOM: i32 = 44;
 const RIGHT: i32 = 28;
-const INK: RGBColor = RGBColor(40, 40, 40);
-const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Decades of residuals that are shown; what is outside is drawn at the edge.
 const DECADES: (i32, i32) = (-8, 1);
 
 /// Value of a curve's point on the horizontal axis.
-type Across = fn(&Curve, &CurvePoint) -> Option<f64>;
+type Across = fn(&ReplayCurve, &CurvePoint) -> Option<f64>;
 
-struct Row {
+struct PanelRow {
     title: String,
     start: Start,
     residual: fn(&CurvePoint) -> Option<f64>,
-    reached: fn(&Curve) -> &Reached,
+    reached: fn(&ReplayCurve) -> &Reached,
 }
 
 /// The color of a solver by its name.
 pub type Colors<'a> = &'a dyn Fn(&str) -> picture::Color;
 
 /// The picture as SVG text.
-pub fn svg(report: &Report, colors: Colors) -> Result<String, Error> {
+pub fn svg(report: &ConvergeReport, colors: Colors) -> Result<String, Error> {
     let mut text = String::new();
     draw(report, colors, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
     Ok(text)
 }
 
-fn draw(report: &Report, colors: Colors, text: &mut String) -> Drawn {
+fn draw(report: &ConvergeReport, colors: Colors, text: &mut String) -> Drawn {
     let mut solvers: Vec<(&str, &str)> = Vec::new();
     for curve in &report.curves {
         if !solvers.contains(&(&curve.solver, curve.arithmetic)) {
@@ -85,19 +80,19 @@ fn draw(report: &Report, colors: Colors, text: &mut String) -> Drawn {
     Ok(())
 }
 
-fn rows(report: &Report) -> Vec<Row> {
+fn rows(report: &ConvergeReport) -> Vec<PanelRow> {
     let mut rows = Vec::new();
     for start in [Start::Cold, Start::Warm] {
-        if start == Start::Warm && report.warm_start == WarmStart::None {
+        if start == Start::Warm && report.warm_start == WarmStartSource::None {
             continue;
         }
-        rows.push(Row {
+        rows.push(PanelRow {
             title: format!("Rigid law, {start} start"),
             start,
             residual: |p| Some(p.rigid),
             reached: |c| &c.rigid,
         });
-        rows.push(Row {
+        rows.push(PanelRow {
             title: format!("Solver's own law, {start} start"),
             start,
             residual: |p| p.own,
@@ -113,17 +108,11 @@ fn color(solver: &str, colors: Colors) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
-    let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
-    area.draw(&Text::new(text.to_string(), at, style))?;
-    Ok(())
-}
-
 /// Solvers whose curves cover each other in a row, `a = b`.
-fn coinciding(report: &Report, row: &Row) -> Vec<String> {
-    let curves: Vec<&Curve> = report.curves.iter().filter(|c| c.start == row.start).collect();
-    let values = |c: &Curve| c.points.iter().map(|p| (p.sweeps, (row.residual)(p))).collect::<Vec<_>>();
-    let mut groups: Vec<(&Curve, Vec<&str>)> = Vec::new();
+fn coinciding(report: &ConvergeReport, row: &PanelRow) -> Vec<String> {
+    let curves: Vec<&ReplayCurve> = report.curves.iter().filter(|c| c.start == row.start).collect();
+    let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (row.residual)(p))).collect::<Vec<_>>();
+    let mut groups: Vec<(&ReplayCurve, Vec<&str>)> = Vec::new();
     for &curve in curves.iter().filter(|c| c.points.iter().any(|p| (row.residual)(p).is_some())) {
         let known =
             groups.iter_mut().find(|(first, _)| first.order == curve.order && values(first) == values(curve));
@@ -139,7 +128,7 @@ fn coinciding(report: &Report, row: &Row) -> Vec<String> {
     found
 }
 
-fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report, colors: Colors) -> Drawn {
+fn legend(area: &Area, solvers: &[(&str, &str)], report: &ConvergeReport, colors: Colors) -> Drawn {
     for (i, (solver, arithmetic)) in solvers.iter().enumerate() {
         let at = (12 + 275 * (i % 4) as i32, HEADING + 10 + LEGEND_LINE * (i / 4) as i32);
         let style = color(solver, colors).stroke_width(width(arithmetic));
@@ -189,20 +178,20 @@ fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBColor) -> Dra
 fn panel(
     area: &Area,
     corner: (i32, i32),
-    report: &Report,
+    report: &ConvergeReport,
     colors: Colors,
-    row: &Row,
+    row: &PanelRow,
     title: &str,
     across: Across,
 ) -> Drawn {
     let (left, top) = (corner.0 + LEFT, corner.1);
     let (right, bottom) = (corner.0 + PANEL.0 - RIGHT, corner.1 + PANEL.1 - BOTTOM);
     // Where the start makes no difference to a solver, its cold curve stands for both.
-    let remembers = |c: &Curve| {
-        let same = |o: &&Curve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
+    let remembers = |c: &ReplayCurve| {
+        let same = |o: &&ReplayCurve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
         report.curves.iter().any(|o| same(&o))
     };
-    let curves: Vec<&Curve> =
+    let curves: Vec<&ReplayCurve> =
         report.curves.iter().filter(|c| c.start == row.start || !remembers(c)).collect();
     let values = curves.iter().flat_map(|c| c.points.iter().filter_map(|p| across(c, p)));
     let (least, most) = values.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));

@@ -19,7 +19,7 @@ use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
 use crate::lab::reference::residual::OwnRow;
-use crate::lab::reference::{ContactProblem, Pair, ProblemContact, Velocity};
+use crate::lab::reference::{ContactProblem, DPair, ProblemContact, Velocity};
 use rand::{SeedableRng, seq::SliceRandom};
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -79,7 +79,7 @@ pub struct Replayed {
     /// v⁺, one per body.
     pub velocities: Vec<Velocity>,
     /// (λn, λt), one per contact point (N·s).
-    pub impulses: Vec<Pair>,
+    pub impulses: Vec<DPair>,
     /// Constraint sweeps of every kind.
     pub sweeps: usize,
     /// The law of the last velocity sweep, if there was one.
@@ -272,7 +272,7 @@ impl<'a> Replay<'a> {
         let rule = self.work.last_rule.as_ref()?;
         let diagonal = self.problem.delassus_diagonal();
         let moved = |c: &ProblemContact| {
-            let along = |body: Option<u32>, arm: Pair| {
+            let along = |body: Option<u32>, arm: DPair| {
                 let delta = body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
                 let turn = delta[2].sin() * arm[0] + (1.0 - delta[2].cos()) * arm[1];
                 c.normal[0] * delta[0] + c.normal[1] * delta[1] + turn
@@ -317,7 +317,7 @@ fn opposite(problem: &ContactProblem, body_a: u32) -> OppositeKind {
     }
 }
 
-fn impulse(contacts: &[Contact], (manifold, point): (usize, usize)) -> Pair {
+fn impulse(contacts: &[Contact], (manifold, point): (usize, usize)) -> DPair {
     let point = &contacts[manifold].manifold.points[point];
     [point.normal_impulse, point.tangent_impulse].map(f64::from)
 }

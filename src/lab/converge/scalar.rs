@@ -1,12 +1,12 @@
 //! Methods in `f64` that share no code with the solvers, as curves to compare with.
 
 use super::replay::{Sequence, Start};
-use super::{Curve, CurvePoint, LAWS, Options, reached};
+use super::{ConvergeOptions, CurvePoint, LAWS, ReplayCurve, reached};
 use crate::lab::reference::certify::Reference;
 use crate::lab::reference::nncg::nncg;
 use crate::lab::reference::residual::Target;
 use crate::lab::reference::sweeps::{self, Splitting, Stop};
-use crate::lab::reference::{ContactProblem, Pair, ProblemContact};
+use crate::lab::reference::{ContactProblem, DPair, ProblemContact};
 
 /// Scalar methods in `f64`, from `truth`. A contact is solved row by row there, so where there is
 /// friction the order of rows differs a little from the solvers'.
@@ -14,21 +14,21 @@ pub(super) fn curves(
     problem: &ContactProblem,
     reference: Option<&Reference>,
     has_warm_start: bool,
-    options: &Options,
-) -> Vec<Curve> {
+    options: &ConvergeOptions,
+) -> Vec<ReplayCurve> {
     let stop = Stop { tolerance: 1e-9, iterations: options.max_iterations as usize };
     let mut shuffled = problem.clone();
     let order = Sequence::Shuffled(options.seed);
     let manifolds: Vec<_> = problem.contacts.chunk_by(|p, q| p.manifold == q.manifold).collect();
     shuffled.contacts =
         order.order(manifolds.len()).iter().flat_map(|&i| manifolds[i as usize].iter().copied()).collect();
-    type Method = fn(&ContactProblem, &[Pair], Stop) -> sweeps::Run;
+    type Method = fn(&ContactProblem, &[DPair], Stop) -> sweeps::IterativeRun;
     let methods: [(&str, &ContactProblem, Sequence, usize, Method); 5] = [
         ("Gauss-Seidel", problem, Sequence::Natural, 1, |p, l, s| {
-            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
+            sweeps::pgs(p, Target::Rigid, l, sweeps::SweepDirection::Forward, s)
         }),
         ("Gauss-Seidel", &shuffled, order, 1, |p, l, s| {
-            sweeps::pgs(p, Target::Rigid, l, sweeps::Sweep::Forward, s)
+            sweeps::pgs(p, Target::Rigid, l, sweeps::SweepDirection::Forward, s)
         }),
         ("Jacobi", problem, Sequence::Natural, 1, |p, l, s| {
             sweeps::jacobi(p, Target::Rigid, l, Splitting::Whole, s)
@@ -57,7 +57,7 @@ pub(super) fn curves(
                 })
                 .collect();
             let [rigid, own] = LAWS.map(|law| reached(&points, law, 0.0));
-            curves.push(Curve {
+            curves.push(ReplayCurve {
                 solver: name.into(),
                 is_part: false,
                 arithmetic: "f64",

@@ -1,7 +1,7 @@
 //! Convergence in sentences.
 
 use super::replay::{Sequence, Start};
-use super::{Curve, Reached, Report, TOLERANCES};
+use super::{ConvergeReport, Reached, ReplayCurve, TOLERANCES};
 use crate::engine::lanes::native_width;
 
 /// Places in [`TOLERANCES`] of the two that are told.
@@ -9,8 +9,8 @@ const TOLD: [usize; 2] = [1, 3];
 
 /// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of
 /// Gauss–Seidel. Whole schedules in colored order.
-pub fn text(report: &Report) -> String {
-    let own: Vec<&Curve> = report
+pub fn text(report: &ConvergeReport) -> String {
+    let own: Vec<&ReplayCurve> = report
         .curves
         .iter()
         .filter(|c| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part)
@@ -23,7 +23,7 @@ pub fn text(report: &Report) -> String {
             text += &sentence(&own, at, start);
         }
     }
-    let changed: Vec<&Curve> = own.iter().copied().filter(|c| !c.own_is_rigid).collect();
+    let changed: Vec<&ReplayCurve> = own.iter().copied().filter(|c| !c.own_is_rigid).collect();
     if !changed.is_empty() {
         let each = changed.iter().filter(|c| c.start == Start::Cold).map(|c| {
             let sweeps = TOLD.map(|at| match to(c, &c.own, at) {
@@ -42,11 +42,11 @@ pub fn text(report: &Report) -> String {
 }
 
 /// Sweeps to a tolerance.
-fn to(curve: &Curve, law: &Reached, at: usize) -> Option<usize> {
+fn to(curve: &ReplayCurve, law: &Reached, at: usize) -> Option<usize> {
     law.first[at].map(|i| curve.points[i].sweeps)
 }
 
-fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
+fn sentence(curves: &[&ReplayCurve], at: usize, start: Start) -> String {
     let own = || curves.iter().filter(|c| c.start == start);
     let mut reached: Vec<(usize, &str)> =
         own().filter_map(|c| Some((to(c, &c.rigid, at)?, c.solver.as_str()))).collect();
@@ -81,7 +81,7 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
 }
 
 /// Measured rates beside that of Gauss–Seidel.
-fn baseline(report: &Report, curves: &[&Curve]) -> String {
+fn baseline(report: &ConvergeReport, curves: &[&ReplayCurve]) -> String {
     let Some(rate) = report.gauss_seidel_rate else {
         return "Gauss–Seidel in f64 has no rate here: it never converges, or at once.\n".into();
     };

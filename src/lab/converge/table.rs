@@ -1,7 +1,7 @@
-//! A [`Report`] as tables, CSV and JSON.
+//! A [`ConvergeReport`] as tables, CSV and JSON.
 
-use super::warm::{OFF, WarmStart};
-use super::{Curve, CurvePoint, Reached, Report, TOLERANCES};
+use super::warm::{OFF, WarmStartSource};
+use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
 use crate::lab::error::Error;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
@@ -10,7 +10,7 @@ use serde::Serialize;
 const NEVER: &str = "—";
 
 /// Human-readable tables: iterations to each tolerance, and times where they were measured.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &ConvergeReport) -> String {
     let mut out = format!(
         "{}: {} bodies, {} contact points; residuals in units of {:.4e} N·s\n{}\n",
         report.problem,
@@ -54,16 +54,16 @@ pub fn text(report: &Report) -> String {
 }
 
 /// Where warm starts come from, and which curves there are not.
-fn starts(report: &Report) -> String {
+fn starts(report: &ConvergeReport) -> String {
     let mut text = match report.warm_start {
-        WarmStart::Captured => {
+        WarmStartSource::Captured => {
             "Warm starts: the impulses of the previous step, stored in the problem.\n".into()
         }
-        WarmStart::Drawn => format!(
+        WarmStartSource::Drawn => format!(
             "Warm starts: the problem stores no impulses of a previous step; these are the impulses of the reference, each changed by up to {:.0} %.\n",
             100.0 * OFF
         ),
-        WarmStart::None => {
+        WarmStartSource::None => {
             "No warm starts: the problem has neither impulses of a previous step nor a certified reference.\n"
                 .into()
         }
@@ -87,7 +87,7 @@ fn starts(report: &Report) -> String {
     text
 }
 
-fn reference_line(report: &Report) -> String {
+fn reference_line(report: &ConvergeReport) -> String {
     match &report.certificate {
         Some(c) => format!(
             "Reference: {}, natural-map residual {:.1e}, velocities {}",
@@ -106,7 +106,7 @@ fn reference_line(report: &Report) -> String {
 }
 
 /// One row per curve, or two where the solver's own law is not the rigid one.
-fn laws(curve: &Curve) -> impl Iterator<Item = (&Curve, &'static str, &Reached)> {
+fn laws(curve: &ReplayCurve) -> impl Iterator<Item = (&ReplayCurve, &'static str, &Reached)> {
     let own = (!curve.own_is_rigid).then_some((curve, "own", &curve.own));
     [(curve, "rigid", &curve.rigid)].into_iter().chain(own)
 }
@@ -127,7 +127,7 @@ fn align(table: &mut Table) {
     }
 }
 
-fn head(curve: &Curve, law: &str) -> Vec<String> {
+fn head(curve: &ReplayCurve, law: &str) -> Vec<String> {
     let solver = match curve.arithmetic {
         "f32" => curve.solver.clone(),
         other => format!("{} ({other})", curve.solver),
@@ -158,7 +158,7 @@ fn duration(ns: f64) -> String {
 
 /// A state of a curve, as a line of CSV.
 #[derive(Serialize)]
-struct Line<'a> {
+struct StateLine<'a> {
     problem: &'a str,
     solver: &'a str,
     arithmetic: &'static str,
@@ -173,12 +173,12 @@ struct Line<'a> {
 }
 
 /// Every point of every curve, one per line, with a header.
-pub fn csv(report: &Report) -> Result<String, Error> {
+pub fn csv(report: &ConvergeReport) -> Result<String, Error> {
     let refuse = |e: String| Error::invalid("converge.csv", e);
     let mut writer = csv::Writer::from_writer(Vec::new());
     for curve in &report.curves {
         for p in &curve.points {
-            let line = Line {
+            let line = StateLine {
                 problem: &report.problem,
                 solver: &curve.solver,
                 arithmetic: curve.arithmetic,
@@ -199,7 +199,7 @@ pub fn csv(report: &Report) -> Result<String, Error> {
 }
 
 /// The whole report. Numbers that are not finite become null.
-pub fn json(report: &Report) -> Result<String, Error> {
+pub fn json(report: &ConvergeReport) -> Result<String, Error> {
     let text = serde_json::to_string(report);
     Ok(text.map_err(|e| Error::invalid("converge.json", e.to_string()))? + "\n")
 }

@@ -1,6 +1,6 @@
 //! The time of an iteration, measured separately from its results.
 
-use super::Schedule;
+use super::IteratedSchedule;
 use super::replay::{Replay, Start};
 
 /// Shortest difference of two runs that is timed (ns), far above the clock's resolution.
@@ -23,7 +23,7 @@ pub struct IterationTime {
 ///
 /// A solver that has found its answer may have nothing left to do, and iterations beyond it cost nothing. So where
 /// more iterations change no bit, those up to the answer are timed, again and again.
-pub(super) fn time(cases: &mut [(&Schedule, &mut Replay)], rounds: u32) -> Vec<IterationTime> {
+pub(super) fn time(cases: &mut [(&IteratedSchedule, &mut Replay)], rounds: u32) -> Vec<IterationTime> {
     let ranges: Vec<Range> = cases.iter_mut().map(|(schedule, replay)| Range::of(schedule, replay)).collect();
     let mut samples = vec![Vec::new(); cases.len()];
     for _ in 0..rounds {
@@ -49,7 +49,7 @@ struct Range {
 }
 
 impl Range {
-    fn of(schedule: &Schedule, replay: &mut Replay) -> Range {
+    fn of(schedule: &IteratedSchedule, replay: &mut Replay) -> Range {
         const FEW: u32 = 4;
         const MOST: f64 = 4096.0;
         let mut outcome = |k: u32| {
@@ -71,7 +71,7 @@ impl Range {
     }
 
     /// Time of an iteration (ns).
-    fn time(&self, schedule: &Schedule, replay: &mut Replay) -> f64 {
+    fn time(&self, schedule: &IteratedSchedule, replay: &mut Replay) -> f64 {
         let mut run = |k| replay.time(schedule.variant, schedule.budget(k), Start::Cold).as_nanos() as f64;
         let sum: f64 = (0..self.times).map(|_| run(self.few + self.more) - run(self.few)).sum();
         sum / f64::from(self.times) / f64::from(self.more)

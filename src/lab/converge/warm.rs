@@ -15,7 +15,7 @@
 //! have made [`STEPS`] steps on the step before, at their standard budget without substeps.
 
 use crate::lab::reference::certify::Reference;
-use crate::lab::reference::{ContactProblem, Pair};
+use crate::lab::reference::{ContactProblem, DPair};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub const STEPS: u32 = 60;
 /// Where the impulses of warm starts come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum WarmStart {
+pub enum WarmStartSource {
     /// The problem has them.
     Captured,
     /// Drawn around the reference, see the [module](self).
@@ -38,7 +38,7 @@ pub enum WarmStart {
 
 /// The problem with impulses for warm starts, and the step before it.
 pub(super) struct Warmed {
-    pub origin: WarmStart,
+    pub origin: WarmStartSource,
     /// The problem, with warm impulses if there are any.
     pub problem: ContactProblem,
     /// The problem of the step before, with the same contacts.
@@ -50,11 +50,11 @@ pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) ->
     let (mut warm, mut before) = (problem.clone(), problem.clone());
     let has = |c: &ContactProblem| c.contacts.iter().any(|c| c.warm_impulse != [0.0; 2]);
     let origin = match reference {
-        _ if has(problem) => WarmStart::Captured,
+        _ if has(problem) => WarmStartSource::Captured,
         Some(reference) => {
             // The same whatever the seed of the shuffled order is.
             let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
-            let changes: Vec<Pair> = reference
+            let changes: Vec<DPair> = reference
                 .impulses
                 .iter()
                 .map(|impulse| {
@@ -70,9 +70,9 @@ pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) ->
                 let start = [impulse[0] + change[0], impulse[1] + change[1]];
                 (warm.contacts[i].warm_impulse, before.contacts[i].warm_impulse) = (start, start);
             }
-            if has(&warm) { WarmStart::Drawn } else { WarmStart::None }
+            if has(&warm) { WarmStartSource::Drawn } else { WarmStartSource::None }
         }
-        None => WarmStart::None,
+        None => WarmStartSource::None,
     };
     Warmed { origin, problem: warm, before }
 }
@@ -89,8 +89,8 @@ mod tests {
         for problem in [sliding_box(), box_pyramid(3, 0.6)] {
             let Warmed { origin, problem: warm, before } =
                 warmed(&problem, Some(&reference(&problem).unwrap()));
-            assert_eq!(origin, WarmStart::Drawn);
-            let start: Vec<Pair> = warm.contacts.iter().map(|c| c.warm_impulse).collect();
+            assert_eq!(origin, WarmStartSource::Drawn);
+            let start: Vec<DPair> = warm.contacts.iter().map(|c| c.warm_impulse).collect();
             let residual = |p: &ContactProblem| {
                 natural_map(p, Target::Rigid, &p.velocities(&start), &start) / p.impulse_unit()
             };
@@ -103,9 +103,9 @@ mod tests {
     #[test]
     fn captured_impulses_are_left_as_they_are() {
         let mut problem = sliding_box();
-        assert_eq!(warmed(&problem, None).origin, WarmStart::None);
+        assert_eq!(warmed(&problem, None).origin, WarmStartSource::None);
         problem.contacts[1].warm_impulse = [0.25, 0.0];
         let Warmed { origin, problem: warm, before } = warmed(&problem, Some(&reference(&problem).unwrap()));
-        assert_eq!((origin, &warm, &before), (WarmStart::Captured, &problem, &problem));
+        assert_eq!((origin, &warm, &before), (WarmStartSource::Captured, &problem, &problem));
     }
 }

@@ -12,17 +12,18 @@ use super::state::BodyState;
 use glam::DVec2;
 
 /// Linear (m/s) and angular velocity (rad/s) of a body.
-pub type Velocity = (DVec2, f64);
+pub type BodyVelocity = (DVec2, f64);
 
 /// √(vᵀ M v) (√J, twice the kinetic energy under the root); `velocities` are one per body.
-pub fn mass_norm(bodies: &[BodyState], velocities: impl IntoIterator<Item = Velocity>) -> f64 {
-    let square = |(b, (v, w)): (&BodyState, Velocity)| b.mass() * v.length_squared() + b.inertia() * w * w;
+pub fn mass_norm(bodies: &[BodyState], velocities: impl IntoIterator<Item = BodyVelocity>) -> f64 {
+    let square =
+        |(b, (v, w)): (&BodyState, BodyVelocity)| b.mass() * v.length_squared() + b.inertia() * w * w;
     bodies.iter().zip(velocities).map(square).sum::<f64>().sqrt()
 }
 
 /// The relative error e of the bodies' velocities against `reference`, over a step of `dt` (s).
 /// Zero if nothing moves and nothing has weight.
-pub fn error(bodies: &[BodyState], reference: &[Velocity], dt: f64) -> f64 {
+pub fn error(bodies: &[BodyState], reference: &[BodyVelocity], dt: f64) -> f64 {
     let difference = bodies.iter().zip(reference).map(|(b, (v, w))| (b.velocity - v, b.angular_velocity - w));
     let mass: f64 = bodies.iter().map(BodyState::mass).sum();
     let by_weight = ratio(weight(bodies) * dt, mass.sqrt());

@@ -62,14 +62,14 @@ fn round_down(value: f64) -> f64 {
 }
 
 /// From meters on the stage to pixels.
-struct View {
+struct StageView {
     scale: f64,
     left: f64,
     bottom: f64,
     low: [f64; 2],
 }
 
-impl View {
+impl StageView {
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.left + self.scale * (x - self.low[0]), self.bottom - self.scale * (y - self.low[1])]
     }
@@ -127,7 +127,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     let inner = f64::from(width) - 2.0 * MARGIN;
     let height = inner * (h / w).clamp(ASPECT[0], ASPECT[1]);
     let scale = (inner / w).min(height / h);
-    let view = View {
+    let view = StageView {
         scale,
         left: MARGIN + 0.5 * (inner - scale * w),
         bottom: HEADER + height - 0.5 * (height - scale * h),
@@ -196,7 +196,7 @@ fn typical(stage: &Stage, scale: f64) -> f64 {
 
 /// Contact points, normals and impulses; returns an impulse for the legend (N·s) and the pixels of
 /// its arrow.
-fn points(picture: &mut Picture, stage: &Stage, frame: &Frame, view: &View, deepest: f64) -> (f64, f64) {
+fn points(picture: &mut Picture, stage: &Stage, frame: &Frame, view: &StageView, deepest: f64) -> (f64, f64) {
     let size = typical(stage, view.scale);
     let length = |p: &TouchPoint| p.impulse_vector()[0].hypot(p.impulse_vector()[1]);
     let largest = frame.points.iter().map(length).fold(0.0, f64::max);
@@ -258,7 +258,7 @@ const THREE_LABELS: f64 = 140.0;
 fn legend(
     picture: &mut Picture,
     top: f64,
-    view: &View,
+    view: &StageView,
     [darkest, deepest]: [f64; 2],
     arrow_at: (f64, f64),
     dt: f64,

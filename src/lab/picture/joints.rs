@@ -8,7 +8,7 @@ use crate::engine::world::World;
 /// How a joint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Mark {
+pub enum JointMark {
     /// A small circle.
     Revolute,
     /// Its axis, and a box on it.
@@ -31,7 +31,7 @@ pub enum Mark {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct JointRecord {
     /// How it is drawn.
-    pub mark: Mark,
+    pub mark: JointMark,
     /// a and b.
     pub bodies: [u32; 2],
     /// In the frames of the centers of mass of a and b (m).
@@ -54,14 +54,14 @@ const COLOR: Color = Color::rgb(0x7a3e9d);
 pub fn records(world: &World) -> Vec<JointRecord> {
     let of = |(_, joint): (_, &crate::engine::joints::Joint)| {
         let (mark, axis) = match &joint.kind {
-            JointKind::Revolute(_) => (Mark::Revolute, [0.0; 2]),
-            JointKind::Prismatic(joint) => (Mark::Prismatic, joint.axis),
-            JointKind::Distance(joint) if joint.spring.is_some() => (Mark::Spring, [0.0; 2]),
-            JointKind::Distance(_) => (Mark::Distance, [0.0; 2]),
-            JointKind::Weld(_) => (Mark::Weld, [0.0; 2]),
-            JointKind::Wheel(joint) => (Mark::Wheel, joint.axis),
-            JointKind::Motor(_) => (Mark::Motor, [0.0; 2]),
-            JointKind::Mouse(_) => (Mark::Mouse, [0.0; 2]),
+            JointKind::Revolute(_) => (JointMark::Revolute, [0.0; 2]),
+            JointKind::Prismatic(joint) => (JointMark::Prismatic, joint.axis),
+            JointKind::Distance(joint) if joint.spring.is_some() => (JointMark::Spring, [0.0; 2]),
+            JointKind::Distance(_) => (JointMark::Distance, [0.0; 2]),
+            JointKind::Weld(_) => (JointMark::Weld, [0.0; 2]),
+            JointKind::Wheel(joint) => (JointMark::Wheel, joint.axis),
+            JointKind::Motor(_) => (JointMark::Motor, [0.0; 2]),
+            JointKind::Mouse(_) => (JointMark::Mouse, [0.0; 2]),
             JointKind::Filter => return None,
         };
         let bodies = [joint.a.index(), joint.b.index()];
@@ -118,7 +118,7 @@ pub(super) fn draw(
             });
         };
         match joint.mark {
-            Mark::Revolute => {
+            JointMark::Revolute => {
                 line(picture, p, q);
                 for (k, end) in [p, q].into_iter().enumerate() {
                     let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
@@ -128,23 +128,23 @@ pub(super) fn draw(
                 }
                 ring(picture, 16, 0.0, 0.5 * size);
             }
-            Mark::Distance => {
+            JointMark::Distance => {
                 line(picture, p, q);
                 ring(picture, 12, 0.0, 0.3 * size);
             }
-            Mark::Spring => zigzag(p, q, 0.5 * size).windows(2).for_each(|w| line(picture, w[0], w[1])),
-            Mark::Prismatic => {
+            JointMark::Spring => zigzag(p, q, 0.5 * size).windows(2).for_each(|w| line(picture, w[0], w[1])),
+            JointMark::Prismatic => {
                 line(picture, ends[0], ends[1]);
                 ring(picture, 4, axis[1].atan2(axis[0]) + 0.25 * std::f64::consts::PI, 0.7 * size);
             }
-            Mark::Wheel => {
+            JointMark::Wheel => {
                 line(picture, ends[0], ends[1]);
                 ring(picture, 16, 0.0, 0.5 * size);
             }
-            Mark::Weld => ring(picture, 4, 0.25 * std::f64::consts::PI - a[2], 0.7 * size),
-            Mark::Motor | Mark::Mouse => {
+            JointMark::Weld => ring(picture, 4, 0.25 * std::f64::consts::PI - a[2], 0.7 * size),
+            JointMark::Motor | JointMark::Mouse => {
                 dashes(p, q, size).into_iter().for_each(|[from, to]| line(picture, from, to));
-                if joint.mark == Mark::Motor {
+                if joint.mark == JointMark::Motor {
                     ring(picture, 4, 0.0, 0.6 * size);
                 }
             }

@@ -5,6 +5,7 @@
 //!            [`frame`]       [`draw`]  └─► raster ─► png
 //! ```
 
+pub mod axes;
 pub mod draw;
 pub mod frame;
 pub mod joints;

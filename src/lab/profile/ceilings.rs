@@ -12,7 +12,7 @@ use wide::{f32x4, f32x8, f32x16};
 
 /// A level of the memory hierarchy.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Level {
+pub struct MemoryLevel {
     /// `L1`, `L2`, `L3`, `DRAM`
     pub name: String,
     /// Bytes of the buffer that is used to measure it.
@@ -27,15 +27,17 @@ const USUAL: [(&str, usize); 3] = [("L1", 32 << 10), ("L2", 1 << 20), ("L3", 16 
 
 /// The caches of the first processor and the memory behind them, each with a working set that it
 /// holds: half a cache, and four times the last one for memory.
-pub fn levels() -> Vec<Level> {
+pub fn levels() -> Vec<MemoryLevel> {
     let mut caches = system_caches();
     if caches.is_empty() {
         caches = USUAL.map(|(name, bytes)| (name.to_string(), bytes)).to_vec();
     }
     let last = caches.iter().map(|c| c.1).max().unwrap_or(0);
-    let mut levels: Vec<Level> =
-        caches.into_iter().map(|(name, bytes)| Level { name, bytes: (bytes / 2).min(LARGEST / 2) }).collect();
-    levels.push(Level { name: "DRAM".into(), bytes: (4 * last).min(LARGEST) });
+    let mut levels: Vec<MemoryLevel> = caches
+        .into_iter()
+        .map(|(name, bytes)| MemoryLevel { name, bytes: (bytes / 2).min(LARGEST / 2) })
+        .collect();
+    levels.push(MemoryLevel { name: "DRAM".into(), bytes: (4 * last).min(LARGEST) });
     levels
 }
 
@@ -81,7 +83,7 @@ pub struct Buffer {
 
 impl Buffer {
     /// A buffer that is at least as large as every level and `bytes`, up to a quarter gigabyte.
-    pub fn new(levels: &[Level], bytes: usize) -> Self {
+    pub fn new(levels: &[MemoryLevel], bytes: usize) -> Self {
         let most = levels.iter().map(|l| l.bytes).max().unwrap_or(0).max(bytes);
         // Every page is touched, and no number is subnormal.
         Buffer { blocks: vec![Block([1.0; 16]); blocks_of(most.min(LARGEST))] }

@@ -14,7 +14,7 @@ use crate::lab::study::interleave::median;
 use std::time::{Duration, Instant};
 
 /// A world that takes part.
-pub struct Entry {
+pub struct GrowthWorld {
     /// Name with its size.
     pub scene: String,
     /// Settled.
@@ -25,7 +25,7 @@ pub struct Entry {
 
 /// Of repeated steps (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Time {
+pub struct StepTime {
     /// Median.
     pub ns: f64,
     /// Mean.
@@ -36,19 +36,19 @@ pub struct Time {
     pub spread_ns: f64,
 }
 
-impl Time {
-    fn of(samples: &[f64]) -> Time {
+impl StepTime {
+    fn of(samples: &[f64]) -> StepTime {
         let ns = median(samples);
         let deviations: Vec<f64> = samples.iter().map(|t| (t - ns).abs()).collect();
         let mean_ns = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
         let longest_ns = samples.iter().copied().fold(0.0, f64::max);
-        Time { ns, mean_ns, longest_ns, spread_ns: median(&deviations) }
+        StepTime { ns, mean_ns, longest_ns, spread_ns: median(&deviations) }
     }
 }
 
 /// One size.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct SizeRow {
     /// Name with its size.
     pub scene: String,
     /// Bodies.
@@ -56,22 +56,22 @@ pub struct Row {
     /// Counts of the step that is repeated.
     pub counts: StepCounts,
     /// The whole step.
-    pub step: Time,
+    pub step: StepTime,
     /// Each phase, in the order of [`Phase::ALL`].
-    pub phases: [Time; Phase::ALL.len()],
+    pub phases: [StepTime; Phase::ALL.len()],
     /// What the world holds.
     pub memory: Memory,
     /// Errors beside the times.
     pub errors: Option<Errors>,
 }
 
-impl Row {
+impl SizeRow {
     /// Time per contact (ns).
-    pub fn per_contact(&self, time: Time) -> f64 {
+    pub fn per_contact(&self, time: StepTime) -> f64 {
         time.ns / self.counts.contacts.max(1) as f64
     }
 
-    fn phase(&self, phase: Phase) -> Time {
+    fn phase(&self, phase: Phase) -> StepTime {
         self.phases[phase as usize]
     }
 }
@@ -94,7 +94,7 @@ const STEPS: usize = 400;
 /// What was measured.
 pub struct Measurement {
     /// In the order of the entries.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SizeRow>,
     /// How fast memory was read, in the same rounds.
     pub memory: ReadCurve,
     /// Share of the time in which the thread waited for a processor, where that is known.
@@ -102,13 +102,13 @@ pub struct Measurement {
 }
 
 /// A step, and the share of its time in which the thread waited.
-type Sample = (Timings, f64);
+type StepSample = (Timings, f64);
 
 /// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
-pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> Measurement {
+pub fn measure(entries: &mut [GrowthWorld], repeats: u32, progress: &dyn Fn(u32)) -> Measurement {
     let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
     let mut memory = ReadCurve::new(largest);
-    let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); entries.len()];
+    let mut samples: Vec<Vec<StepSample>> = vec![Vec::new(); entries.len()];
     let (start, before) = (Instant::now(), waited());
     for round in 0..repeats {
         progress(round);
@@ -122,15 +122,15 @@ pub fn measure(entries: &mut [Entry], repeats: u32, progress: &dyn Fn(u32)) -> M
     Measurement { rows, memory, waiting }
 }
 
-fn row(entry: &Entry, mut samples: Vec<Sample>) -> Row {
+fn row(entry: &GrowthWorld, mut samples: Vec<StepSample>) -> SizeRow {
     // Steps without a pause, or those with the shortest ones.
     samples.sort_by(|a, b| a.1.total_cmp(&b.1));
     let whole = samples.iter().take_while(|s| s.1 <= PAUSE).count();
     samples.truncate(whole.max(FEWEST));
     let time = |of: &dyn Fn(&Timings) -> u64| {
-        Time::of(&samples.iter().map(|(timings, _)| of(timings) as f64).collect::<Vec<_>>())
+        StepTime::of(&samples.iter().map(|(timings, _)| of(timings) as f64).collect::<Vec<_>>())
     };
-    Row {
+    SizeRow {
         scene: entry.scene.clone(),
         bodies: entry.world.bodies.len(),
         counts: entry.world.counts,
@@ -142,7 +142,7 @@ fn row(entry: &Entry, mut samples: Vec<Sample>) -> Row {
 }
 
 /// One turn: a step that finds cold caches and is not timed, then as many as fit.
-fn turn(world: &mut World, samples: &mut Vec<Sample>) {
+fn turn(world: &mut World, samples: &mut Vec<StepSample>) {
     let mut frozen = world.hold();
     let net = frozen.step(false).step_ns > LONG_NS;
     let (start, mut steps) = (Instant::now(), 0);
@@ -215,7 +215,7 @@ pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Grow
 
 /// What is known of one phase over all sizes.
 #[derive(Clone, Debug)]
-pub struct Verdict {
+pub struct GrowthVerdict {
     /// None for the whole step.
     pub phase: Option<Phase>,
     /// p in time ~ contactsᵖ, least squares on logarithms.
@@ -232,11 +232,11 @@ pub struct Verdict {
 const NEGLIGIBLE: f64 = 0.5;
 
 /// Judges every phase and the whole step; rows are in ascending order of contacts.
-pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
+pub fn verdicts(rows: &[SizeRow], memory: &ReadCurve) -> Vec<GrowthVerdict> {
     let kinds = std::iter::once(None).chain(Phase::ALL.into_iter().map(Some));
     let mut verdicts = Vec::new();
     for phase in kinds {
-        let time = |row: &Row| phase.map_or(row.step, |p| row.phase(p));
+        let time = |row: &SizeRow| phase.map_or(row.step, |p| row.phase(p));
         let costs: Vec<f64> = rows.iter().map(|r| r.per_contact(time(r))).collect();
         let range =
             [costs.iter().copied().fold(f64::INFINITY, f64::min), costs.iter().copied().fold(0.0, f64::max)];
@@ -245,7 +245,7 @@ pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
         }
         let speeds: Vec<f64> = rows.iter().map(|r| memory.at(working_set(&r.memory, phase))).collect();
         let between = |i: usize, j: usize| {
-            let spread = |r: &Row| time(r).spread_ns / time(r).ns.max(1.0);
+            let spread = |r: &SizeRow| time(r).spread_ns / time(r).ns.max(1.0);
             judge(
                 [rows[i].counts.contacts, rows[j].counts.contacts],
                 costs[j] / costs[i],
@@ -257,7 +257,7 @@ pub fn verdicts(rows: &[Row], memory: &ReadCurve) -> Vec<Verdict> {
         let whole = between(0, rows.len() - 1);
         let points: Vec<[f64; 2]> =
             rows.iter().map(|r| [r.counts.contacts as f64, time(r).ns].map(|x| x.max(1.0).ln())).collect();
-        verdicts.push(Verdict { phase, exponent: slope(&points), range, steps, whole });
+        verdicts.push(GrowthVerdict { phase, exponent: slope(&points), range, steps, whole });
     }
     verdicts
 }

@@ -1,9 +1,9 @@
 //! Growth as tables, words, a file and a picture.
 
-use super::growth::{Change, Row, Verdict};
+use super::growth::{Change, GrowthVerdict, SizeRow};
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, with_dark, write, write_upwards};
+use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, color, with_dark, write, write_upwards};
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, ratio, si};
 use plotters::element::DashedPathElement;
@@ -11,13 +11,13 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 /// Phases that any of the rows spent time in.
-fn phases(rows: &[Row]) -> Vec<Phase> {
+fn phases(rows: &[SizeRow]) -> Vec<Phase> {
     let has = |p: &Phase| rows.iter().any(|r| r.phases[*p as usize].ns > 0.0);
     Phase::ALL.into_iter().filter(has).collect()
 }
 
 /// Times and memory per contact, and what that means.
-pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
+pub fn text(rows: &[SizeRow], verdicts: &[GrowthVerdict]) -> String {
     let phases = phases(rows);
     let mut header = vec!["scene", "bodies", "contacts", "step", "mean", "longest", "±"];
     header.extend(phases.iter().map(|p| p.name()));
@@ -64,7 +64,7 @@ pub fn text(rows: &[Row], verdicts: &[Verdict]) -> String {
 }
 
 /// One phase in words.
-pub(super) fn sentence(verdict: &Verdict) -> String {
+pub(super) fn sentence(verdict: &GrowthVerdict) -> String {
     let name = verdict.phase.map_or("whole step", Phase::name);
     let range = verdict.range.map(digits);
     let whole = &verdict.whole;
@@ -118,7 +118,7 @@ pub(super) fn sentence(verdict: &Verdict) -> String {
 }
 
 /// Everything, a row per size.
-pub fn csv(rows: &[Row]) -> Result<Vec<u8>, Error> {
+pub fn csv(rows: &[SizeRow]) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid("growth.csv", e.to_string());
     let mut writer = csv::Writer::from_writer(Vec::new());
     let phases = phases(rows);
@@ -178,27 +178,28 @@ const BOTTOM: i32 = 60;
 const LINE: i32 = 15;
 
 /// A curve: name, and a value per row.
-type Curve = (String, Vec<f64>);
+type NamedCurve = (String, Vec<f64>);
 
 /// Time and memory per contact against contacts, as SVG text.
-pub fn svg(rows: &[Row], title: &str) -> Result<String, Error> {
+pub fn svg(rows: &[SizeRow], title: &str) -> Result<String, Error> {
     let mut text = String::new();
     draw(rows, title, &mut text).map_err(|e| Error::invalid("growth.svg", e.to_string()))?;
     Ok(with_dark(&text))
 }
 
-fn draw(rows: &[Row], title: &str, text: &mut String) -> Drawn {
+fn draw(rows: &[SizeRow], title: &str, text: &mut String) -> Drawn {
     let root = SVGBackend::with_string(text, (2 * PANEL.0 as u32, PANEL.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
     write(&root, title, (12, 20), 17, HPos::Left)?;
-    let mut times: Vec<Curve> =
+    let mut times: Vec<NamedCurve> =
         vec![("whole step".into(), rows.iter().map(|r| r.per_contact(r.step)).collect())];
     for phase in phases(rows) {
         let costs: Vec<f64> = rows.iter().map(|r| r.per_contact(r.phases[phase as usize])).collect();
         times.push((phase.name().into(), costs));
     }
-    let per = |bytes: usize, r: &Row| bytes as f64 / r.counts.contacts.max(1) as f64;
-    let mut memory: Vec<Curve> = vec![("all".into(), rows.iter().map(|r| per(r.memory.held(), r)).collect())];
+    let per = |bytes: usize, r: &SizeRow| bytes as f64 / r.counts.contacts.max(1) as f64;
+    let mut memory: Vec<NamedCurve> =
+        vec![("all".into(), rows.iter().map(|r| per(r.memory.held(), r)).collect())];
     for (k, component) in rows.first().map_or(&[][..], |r| &r.memory.components).iter().enumerate() {
         let held = rows.iter().map(|r| per(r.memory.components[k].held, r)).collect();
         memory.push((component.name.into(), held));
@@ -217,8 +218,8 @@ fn digits_short(value: f64) -> String {
 fn panel(
     area: &Area,
     corner: i32,
-    rows: &[Row],
-    curves: &[Curve],
+    rows: &[SizeRow],
+    curves: &[NamedCurve],
     name: &str,
     label: &dyn Fn(f64) -> String,
 ) -> Drawn {
@@ -228,7 +229,7 @@ fn panel(
     // What is nothing at some size has no place on a logarithmic axis, and none matters below 0.1.
     let shown = |value: &f64| value.is_finite() && *value >= 0.1;
     let values: Vec<f64> = curves.iter().flat_map(|c| c.1.iter().copied().filter(shown)).collect();
-    let (x, y) = (Scale::of(contacts.iter().copied(), 7), Scale::of(values.iter().copied(), 8));
+    let (x, y) = (LogScale::of(contacts.iter().copied(), 7), LogScale::of(values.iter().copied(), 8));
     Edges { left, right, top, bottom }.grid(area, [&x, &y], 13, [&si_count, &label])?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write(area, "contacts", ((left + right) / 2, bottom + 34), 13, HPos::Center)?;

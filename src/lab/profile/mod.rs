@@ -27,13 +27,13 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;
 use crate::engine::world::{HeldWorld, Probe, StepCounts};
 use crate::lab::study::interleave::median;
-use ceilings::{Buffer, Level, levels, multiply_adds};
+use ceilings::{Buffer, MemoryLevel, levels, multiply_adds};
 use std::time::{Duration, Instant};
 use traffic::Traffic;
 
 /// What to repeat, and for how long.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ProfileOptions {
     /// Phases that take turns.
     pub phases: Vec<Phase>,
     /// Time of the whole measurement (s).
@@ -104,7 +104,7 @@ impl PhaseReport {
 
 /// Everything measured.
 #[derive(Clone, Debug)]
-pub struct Report {
+pub struct ProfileReport {
     /// Scene.
     pub scene: String,
     /// Solver.
@@ -122,7 +122,7 @@ pub struct Report {
     /// In the order of a step.
     pub phases: Vec<PhaseReport>,
     /// Bandwidth of each level of memory.
-    pub levels: Vec<(Level, Bandwidth)>,
+    pub levels: Vec<(MemoryLevel, Bandwidth)>,
     /// Rate of multiply-adds at the width of the run (GFLOP/s).
     pub multiply_adds: Option<f64>,
     /// Share of the time in which the state was brought back, between the timed repeats.
@@ -158,7 +158,12 @@ struct Entrant {
 /// Repeats phases in turn, and between them measures the ceilings.
 ///
 /// Phases that `probes` does not have are left out.
-pub fn profile(frozen: &mut HeldWorld<'_>, probes: &[Probe], scene: &str, options: &Options) -> Report {
+pub fn profile(
+    frozen: &mut HeldWorld<'_>,
+    probes: &[Probe],
+    scene: &str,
+    options: &ProfileOptions,
+) -> ProfileReport {
     let mut entrants: Vec<Entrant> = probes
         .iter()
         .filter(|probe| options.phases.contains(&probe.phase))
@@ -204,7 +209,7 @@ pub fn profile(frozen: &mut HeldWorld<'_>, probes: &[Probe], scene: &str, option
     let world = frozen.world();
     let contacts = world.counts.contacts as f64;
     let bandwidth = |read: &[f64], update: &[f64]| Bandwidth { read: median(read), update: median(update) };
-    Report {
+    ProfileReport {
         scene: scene.to_string(),
         solver: world.settings.solver.name,
         impacts: world.settings.impacts,

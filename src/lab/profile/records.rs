@@ -1,7 +1,7 @@
 //! Profiles and growth as JSON.
 
-use super::Report;
-use super::growth::{Row, Verdict};
+use super::ProfileReport;
+use super::growth::{GrowthVerdict, SizeRow};
 use super::growth_report::sentence;
 use super::limit::Limit;
 use crate::engine::clock::Phase;
@@ -10,7 +10,7 @@ use crate::lab::report::environment::Environment;
 use serde_json::{Value, json};
 
 /// Everything that `simpulse profile` measured.
-pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
+pub fn json(report: &ProfileReport, errors: Option<&Errors>) -> Value {
     let phase = |p: &super::PhaseReport| {
         json!({
             "phase": p.probe.phase.name(),
@@ -31,7 +31,7 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
             "limit": Limit::of(p, report.multiply_adds).map(Limit::word),
         })
     };
-    let level = |(level, b): &(super::ceilings::Level, super::Bandwidth)| json!({ "level": level.name, "bytes": level.bytes, "read_gb_per_s": b.read, "update_gb_per_s": b.update });
+    let level = |(level, b): &(super::ceilings::MemoryLevel, super::Bandwidth)| json!({ "level": level.name, "bytes": level.bytes, "read_gb_per_s": b.read, "update_gb_per_s": b.update });
     json!({
         "environment": Environment::current(),
         "scene": report.scene,
@@ -53,8 +53,8 @@ pub fn json(report: &Report, errors: Option<&Errors>) -> Value {
 }
 
 /// Everything that `simpulse growth` measured.
-pub fn growth_json(rows: &[Row], verdicts: &[Verdict], waited: Option<f64>) -> Value {
-    let row = |row: &Row| {
+pub fn growth_json(rows: &[SizeRow], verdicts: &[GrowthVerdict], waited: Option<f64>) -> Value {
+    let row = |row: &SizeRow| {
         let phases: serde_json::Map<String, Value> = Phase::ALL
             .into_iter()
             .filter(|p| row.phases[*p as usize].ns > 0.0)
@@ -81,7 +81,7 @@ pub fn growth_json(rows: &[Row], verdicts: &[Verdict], waited: Option<f64>) -> V
             "errors": row.errors,
         })
     };
-    let verdict = |v: &Verdict| {
+    let verdict = |v: &GrowthVerdict| {
         json!({
             "phase": v.phase.map_or("whole step", Phase::name),
             "ns_per_contact": v.range,

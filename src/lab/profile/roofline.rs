@@ -1,9 +1,9 @@
 //! The roofline as a picture: operations per byte against operations per second.
 
 use super::text::bytes;
-use super::{Bandwidth, PhaseReport, Report};
+use super::{Bandwidth, PhaseReport, ProfileReport};
 use crate::lab::error::Error;
-use crate::lab::report::axes::{Area, Drawn, Edges, INK, Scale, color, with_dark, write};
+use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, color, with_dark, write};
 use crate::lab::report::units::digits;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -17,7 +17,7 @@ const BOTTOM: i32 = 76;
 const LINE: i32 = 17;
 
 /// The picture as SVG text. Errors: a report without ceilings.
-pub fn svg(report: &Report) -> Result<String, Error> {
+pub fn svg(report: &ProfileReport) -> Result<String, Error> {
     let mut text = String::new();
     draw(report, &mut text).map_err(|e| Error::invalid("roofline", e.to_string()))?;
     Ok(with_dark(&text))
@@ -30,7 +30,7 @@ struct RooflinePoint<'a> {
     rate: f64,
 }
 
-fn draw(report: &Report, text: &mut String) -> Drawn {
+fn draw(report: &ProfileReport, text: &mut String) -> Drawn {
     let peak = report.multiply_adds.ok_or("a roofline needs ceilings")?;
     let point = |phase: &'_ PhaseReport| Some((phase.intensity()?, phase.flops_rate()?));
     let points: Vec<RooflinePoint> = report
@@ -49,11 +49,11 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
     let ridges = report.levels.iter().map(|(_, b)| peak / b.read).filter(|r| r.is_finite());
     let xs: Vec<f64> =
         points.iter().flat_map(|p| [p.intensity / 2.0, p.intensity * 2.0]).chain(ridges).collect();
-    let x = Scale::of(xs.iter().copied(), 6);
+    let x = LogScale::of(xs.iter().copied(), 6);
     let slowest = report.levels.iter().map(|l| l.1.read).fold(f64::INFINITY, f64::min);
     let ys = points.iter().map(|p| p.rate).chain([peak * 1.3, slowest * x.limits[0]]);
     let ys: Vec<f64> = ys.filter(|y| y.is_finite() && *y > 0.0).collect();
-    let y = Scale::of(ys.iter().copied(), 7);
+    let y = LogScale::of(ys.iter().copied(), 7);
     let (left, right, top, bottom) = (LEFT, SIZE.0 - RIGHT, TOP, SIZE.1 - BOTTOM);
     Edges { left, right, top, bottom }.grid(&root, [&x, &y], 14, [&number, &number])?;
     let at = |intensity: f64, rate: f64| (x.pixel(intensity, left, right), y.pixel(rate, bottom, top));
@@ -72,7 +72,7 @@ fn draw(report: &Report, text: &mut String) -> Drawn {
     write(&root, &format!("multiply-adds {} GFLOP/s", digits(peak)), (left + 8, py - 10), 12, HPos::Left)?;
     root.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write(&root, "operations per byte (flop/B)", ((left + right) / 2, bottom + 36), 13, HPos::Center)?;
-    crate::lab::report::axes::write_upwards(
+    crate::lab::picture::axes::write_upwards(
         &root,
         "operations per second (GFLOP/s)",
         (22, (top + bottom) / 2),
@@ -103,7 +103,7 @@ fn roof(
 /// Points, the roof over each, and their names beside the panel, joined by thin lines.
 fn labels(
     area: &Area,
-    report: &Report,
+    report: &ProfileReport,
     points: &[RooflinePoint],
     at: &impl Fn(f64, f64) -> (i32, i32),
 ) -> Drawn {

@@ -1,7 +1,7 @@
 //! What `simpulse profile` prints.
 
 use super::limit::Limit;
-use super::{PhaseReport, Report, waiting};
+use super::{PhaseReport, ProfileReport, waiting};
 use crate::engine::clock::Phase;
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::digits;
@@ -22,7 +22,7 @@ pub fn bytes(value: f64) -> String {
 }
 
 /// Everything: one phase at length, several as a table.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &ProfileReport) -> String {
     let mut text = match report.phases.as_slice() {
         [phase] => single(report, phase),
         phases => several(report, phases),
@@ -38,7 +38,7 @@ pub fn text(report: &Report) -> String {
 }
 
 /// What is held still.
-pub fn head(report: &Report) -> String {
+pub fn head(report: &ProfileReport) -> String {
     let c = &report.counts;
     format!(
         "{} · {}, {} substeps, {} · {} bodies, {} contacts, {} points, {} colors, {:.0} % of lanes filled\n",
@@ -58,7 +58,7 @@ fn per(total: f64, count: usize) -> String {
     if count == 0 { "–".to_string() } else { digits(total / count as f64) }
 }
 
-fn single(report: &Report, phase: &PhaseReport) -> String {
+fn single(report: &ProfileReport, phase: &PhaseReport) -> String {
     let probe = &phase.probe;
     let mut text = format!(
         "{}: {} µs a pass, ± {} (mean {}, longest {}); {} in a step; median of {} timed passes; {:.1} % of the time was spent \
@@ -121,7 +121,7 @@ width, reached in the same run.  limit: bandwidth- or compute-bound from half of
 latency-bound (dependent operations, gathers, branches); where noise decides, cannot tell.  – not counted or not measured.
 ";
 
-fn several(report: &Report, phases: &[PhaseReport]) -> String {
+fn several(report: &ProfileReport, phases: &[PhaseReport]) -> String {
     let mut rows = table(&[
         "phase",
         "passes",
@@ -182,7 +182,7 @@ fn several(report: &Report, phases: &[PhaseReport]) -> String {
 }
 
 /// What this machine reached in the same run.
-fn ceilings(report: &Report, multiply_adds: f64) -> String {
+fn ceilings(report: &ProfileReport, multiply_adds: f64) -> String {
     let mut rows = table(&["level", "working set", "read GB/s", "update GB/s"]);
     for (level, bandwidth) in &report.levels {
         rows.add_row([
@@ -201,7 +201,7 @@ fn ceilings(report: &Report, multiply_adds: f64) -> String {
 }
 
 /// The roofline in words.
-fn reading(report: &Report, phase: &PhaseReport) -> String {
+fn reading(report: &ProfileReport, phase: &PhaseReport) -> String {
     let (Some(peak), Some(bandwidth)) = (report.multiply_adds, phase.bandwidth) else {
         return String::new();
     };
@@ -237,7 +237,7 @@ fn reading(report: &Report, phase: &PhaseReport) -> String {
 }
 
 /// The level of memory that holds a working set: levels are measured at half of their size.
-fn level_of(report: &Report, bytes: f64) -> &str {
+fn level_of(report: &ProfileReport, bytes: f64) -> &str {
     let last = report.levels.last().map_or("memory", |l| l.0.name.as_str());
     let caches = report.levels.split_last().map_or(&[][..], |(_, caches)| caches);
     caches.iter().find(|(level, _)| bytes <= 2.0 * level.bytes as f64).map_or(last, |(level, _)| &level.name)

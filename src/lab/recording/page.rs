@@ -14,7 +14,7 @@ pub const STYLE: &str = include_str!("replay.css");
 pub const SCRIPT: &str = include_str!("replay.js");
 
 /// A recording on a page.
-pub struct Panel {
+pub struct RecordingPanel {
     /// The bytes of the file.
     pub bytes: Vec<u8>,
     /// What it is of.
@@ -27,9 +27,9 @@ pub struct Panel {
 /// it would play.
 ///
 /// It begins at a share of its time, in [0, 1].
-pub fn fragment(panels: &[Panel], share: f64) -> String {
+pub fn fragment(panels: &[RecordingPanel], share: f64) -> String {
     let mut text = format!("<div class=\"replay\" data-start=\"{share}\">\n<div class=\"panels\">\n");
-    for Panel { bytes, header, color } in panels {
+    for RecordingPanel { bytes, header, color } in panels {
         let outcome = if header.outcome == "holds" { "holds" } else { "broken" };
         text += &format!(
             "<figure style=\"--own: {}\"><figcaption><b>{}</b> · {} · {} <span class=\"{outcome}\">{}</span>\
@@ -47,7 +47,7 @@ pub fn fragment(panels: &[Panel], share: f64) -> String {
 }
 
 /// A page of its own.
-pub fn page(panels: &[Panel]) -> String {
+pub fn page(panels: &[RecordingPanel]) -> String {
     let mut scenes: Vec<&str> = panels.iter().map(|p| p.header.scene.as_str()).collect();
     scenes.dedup();
     let title = format!("Replay: {}", escaped(&scenes.join(", ")));
@@ -85,7 +85,7 @@ mod tests {
             contacts: false,
             curves: Vec::new(),
         };
-        let text = page(&[Panel { bytes: b"1234".to_vec(), header, color: "#123456".into() }]);
+        let text = page(&[RecordingPanel { bytes: b"1234".to_vec(), header, color: "#123456".into() }]);
         assert!(text.contains("&lt;script&gt;") && text.contains("a&amp;b") && text.contains("MTIzNA=="));
         assert!(text.contains("class=\"broken\">fell at step 3"));
         for outside in ["http://", "https://", "src=", "@import"] {

@@ -154,7 +154,7 @@ mod tests {
     use crate::engine::world::{Settings, World};
     use crate::lab::metrics::overlaps::Overlaps;
     use crate::lab::picture::frame::Stage;
-    use crate::lab::picture::joints::{JointRecord, Mark};
+    use crate::lab::picture::joints::{JointMark, JointRecord};
     use crate::lab::recording::record::{Caption, Recorder, file};
     use crate::lab::scenes;
 
@@ -280,7 +280,8 @@ mod tests {
         };
         assert!(read(&file(&good, frames).unwrap()).is_ok());
         type Lie<'a> = &'a dyn Fn(&mut Header);
-        let ghost = JointRecord { mark: Mark::Weld, bodies: [0, 9], anchors: [[0.0; 2]; 2], axis: [0.0; 2] };
+        let ghost =
+            JointRecord { mark: JointMark::Weld, bodies: [0, 9], anchors: [[0.0; 2]; 2], axis: [0.0; 2] };
         let liars: [(Lie, &str); 10] = [
             (&|h| h.joints.push(ghost.clone()), "a joint of a body"),
             (&|h| h.frames = 0, "no frames"),

@@ -9,7 +9,7 @@
 use super::problem::ContactProblem;
 use super::rates::rate;
 use super::residual::Target;
-use super::sweeps::{Stop, Sweep, pgs};
+use super::sweeps::{Stop, SweepDirection, pgs};
 
 /// Most rows that are updated on the way to the solution.
 const MOST_UPDATES: usize = 100_000_000;
@@ -20,7 +20,7 @@ pub fn gauss_seidel_rate(problem: &ContactProblem) -> Option<f64> {
     let count = problem.contacts.len();
     // Well above the rounding floor.
     let stop = Stop { tolerance: 1e-11, iterations: MOST_UPDATES / count.max(1) };
-    rate(&pgs(problem, Target::Rigid, &vec![[0.0; 2]; count], Sweep::Forward, stop).history)
+    rate(&pgs(problem, Target::Rigid, &vec![[0.0; 2]; count], SweepDirection::Forward, stop).history)
 }
 
 #[cfg(test)]

@@ -11,10 +11,10 @@
 
 use super::newton::newton;
 use super::nncg::nncg;
-use super::problem::{ContactProblem, Pair, Velocity};
+use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
 use super::stewart_trinkle::stewart_trinkle;
-use super::sweeps::{Stop, Sweep, pgs};
+use super::sweeps::{Stop, SweepDirection, pgs};
 use crate::lab::error::plain;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -98,7 +98,7 @@ pub struct Reference {
     /// v⁺ (m/s, m/s, rad/s), one per body.
     pub velocities: Vec<Velocity>,
     /// λ (N·s), one per contact; one of many if the problem is hyperstatic.
-    pub impulses: Vec<Pair>,
+    pub impulses: Vec<DPair>,
     /// Why it was accepted.
     pub certificate: Certificate,
 }
@@ -115,7 +115,7 @@ pub struct NoReference {
 
 /// Distance of a solution from a reference, in the quantities that the problem determines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Comparison {
+pub struct ReferenceErrors {
     /// [`ContactProblem::velocity_error`] (1).
     pub velocity: f64,
     /// ‖M⁻¹ Jᵀ (λ − λ_ref)‖ in the mass norm, by the same scale (1): like `velocity`, but read from
@@ -129,9 +129,9 @@ impl Reference {
         &self,
         problem: &ContactProblem,
         velocities: &[Velocity],
-        impulses: &[Pair],
-    ) -> Comparison {
-        Comparison {
+        impulses: &[DPair],
+    ) -> ReferenceErrors {
+        ReferenceErrors {
             velocity: problem.velocity_error(velocities, &self.velocities),
             body_impulse: problem.velocity_error(&problem.velocities(impulses), &self.velocities),
         }
@@ -170,22 +170,22 @@ impl Reference {
 /// Natural-map residual of impulses under the rigid law, relative to the larger of
 /// [`ContactProblem::impulse_unit`] and the largest impulse: both below the total load, so that the
 /// certificate of a large pile is no weaker than that of a small one.
-pub fn certify(problem: &ContactProblem, impulses: &[Pair]) -> f64 {
+pub fn certify(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
     let largest = impulses.iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
     let residual = natural_map(problem, Target::Rigid, &problem.velocities(impulses), impulses);
     residual / problem.impulse_unit().max(largest)
 }
 
-struct Candidate {
+struct Attempt {
     method: Method,
     natural_map: f64,
     velocities: Vec<Velocity>,
-    impulses: Vec<Pair>,
+    impulses: Vec<DPair>,
 }
 
 /// Solves by one method; none if it ended without impulses. Budgets grow no worse than linearly
 /// with the number of contacts.
-fn attempt(problem: &ContactProblem, method: Method) -> Option<Candidate> {
+fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
     let cold = vec![[0.0; 2]; problem.contacts.len()];
     // Two decades below the certificate, whose scale is at least as large as that of the history.
     let stop = |iterations| Stop { tolerance: 0.01 * CERTIFIED, iterations };
@@ -193,11 +193,11 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Candidate> {
         Method::StewartTrinkle => stewart_trinkle(problem, Target::Rigid).ok()?,
         Method::Newton => newton(problem, Target::Rigid, &cold, stop(60)).impulses,
         Method::Nncg => nncg(problem, Target::Rigid, &cold, stop(5_000)).impulses,
-        Method::Pgs => pgs(problem, Target::Rigid, &cold, Sweep::Symmetric, stop(5_000)).impulses,
+        Method::Pgs => pgs(problem, Target::Rigid, &cold, SweepDirection::Symmetric, stop(5_000)).impulses,
     };
     let natural_map = certify(problem, &impulses);
     let velocities = problem.velocities(&impulses);
-    natural_map.is_finite().then_some(Candidate { method, natural_map, velocities, impulses })
+    natural_map.is_finite().then_some(Attempt { method, natural_map, velocities, impulses })
 }
 
 /// A solution of the rigid contact law, with its certificate.
@@ -211,8 +211,8 @@ pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     if problem.contacts.len() <= LEMKE_CONTACTS {
         methods.insert(0, Method::StewartTrinkle);
     }
-    let mut found: Vec<Candidate> = Vec::new();
-    let certified = |c: &Candidate| c.natural_map <= CERTIFIED;
+    let mut found: Vec<Attempt> = Vec::new();
+    let certified = |c: &Attempt| c.natural_map <= CERTIFIED;
     for method in methods {
         found.extend(attempt(problem, method));
         if found.iter().filter(|c| certified(c)).count() >= 2 {
@@ -291,7 +291,7 @@ mod tests {
         // A squeeze between the walls of a wedge: λn ± equal, no net impulse.
         let p = wedge(0.0, 0.5);
         let r = reference(&p).unwrap();
-        let squeezed: Vec<Pair> = r.impulses.iter().map(|l| [l[0] + 1.0, l[1]]).collect();
+        let squeezed: Vec<DPair> = r.impulses.iter().map(|l| [l[0] + 1.0, l[1]]).collect();
         let c = r.compare(&p, &p.velocities(&squeezed), &squeezed);
         assert!(c.velocity < 1e-14 && c.body_impulse < 1e-14, "{c:?}");
         let mut pushed = r.velocities.clone();

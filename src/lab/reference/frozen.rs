@@ -58,7 +58,7 @@ pub struct Frozen {
 
 /// Later versions may add keys, so that unknown ones are let through until the version is known.
 #[derive(Serialize, Deserialize)]
-struct Header {
+struct FrozenHeader {
     format: String,
     version: u64,
     bytes: u64,
@@ -70,7 +70,7 @@ impl Frozen {
     pub fn to_text(&self) -> Result<String, Error> {
         self.validate()?;
         let payload = serde_json::to_string(self).map_err(|e| Error::invalid("payload", e.to_string()))?;
-        let header = Header {
+        let header = FrozenHeader {
             format: FORMAT.into(),
             version: VERSION,
             bytes: payload.len() as u64,
@@ -102,7 +102,8 @@ impl Frozen {
             Some(VERSION) => {}
             _ => return Err(refuse(format!("version is {}, must be {VERSION}", header["version"]))),
         }
-        let header: Header = serde_json::from_value(header).map_err(|e| refuse(format!("header: {e}")))?;
+        let header: FrozenHeader =
+            serde_json::from_value(header).map_err(|e| refuse(format!("header: {e}")))?;
         let payload = rest.strip_suffix('\n').unwrap_or(rest);
         let length = payload.len() as u64;
         if length < header.bytes {

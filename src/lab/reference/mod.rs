@@ -27,4 +27,4 @@ pub mod stewart_trinkle;
 pub mod sweeps;
 mod validate;
 
-pub use problem::{ContactProblem, Pair, ProblemBody, ProblemContact, Velocity};
+pub use problem::{ContactProblem, DPair, ProblemBody, ProblemContact, Velocity};

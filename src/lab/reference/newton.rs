@@ -24,10 +24,10 @@
 //! **Fails when** a pile is jammed by friction, so that G has eigenvalues near ε that matter; then
 //! it stalls at residuals around 10⁻⁶ and [`mod@super::certify`] refuses its answer.
 
-use super::problem::{Block, ContactProblem, Pair, ProblemContact};
+use super::problem::{ContactProblem, DPair, ProblemContact, SideRows};
 use super::residual::{OwnRow, Target, clamp, positive};
 use super::sparse;
-use super::sweeps::{Run, Status, Stop, Sweep, pgs};
+use super::sweeps::{IterativeRun, Status, Stop, SweepDirection, pgs};
 
 /// Symmetric sweeps before the first Newton step; doubled every time that a problem is left unsolved.
 const SWEEPS: usize = 20;
@@ -47,7 +47,7 @@ const HALVINGS: usize = 6;
 const INEXACT: f64 = 1e-2;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
+enum IterateState {
     Open,
     Stick,
     /// Direction of λt.
@@ -55,9 +55,15 @@ enum State {
 }
 
 /// Newton's method from `start`; one iteration is one proximal problem, or a bout of sweeps.
-pub fn newton(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop) -> Run {
-    let sweep = |from: &[Pair], n: usize| {
-        pgs(problem, target, from, Sweep::Symmetric, Stop { tolerance: stop.tolerance, iterations: n })
+pub fn newton(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
+    let sweep = |from: &[DPair], n: usize| {
+        pgs(
+            problem,
+            target,
+            from,
+            SweepDirection::Symmetric,
+            Stop { tolerance: stop.tolerance, iterations: n },
+        )
     };
     let (mut sweeps, mut shift) = (SWEEPS, FIRST_SHIFT);
     let mut run = sweep(start, sweeps);
@@ -77,7 +83,7 @@ pub fn newton(problem: &ContactProblem, target: Target, start: &[Pair], stop: St
         };
         let mut history = run.history;
         history.push(next.history[next.history.len() - 1]);
-        run = Run { history, ..next };
+        run = IterativeRun { history, ..next };
     }
     run
 }
@@ -86,19 +92,19 @@ pub fn newton(problem: &ContactProblem, target: Target, start: &[Pair], stop: St
 struct Proximal<'a> {
     problem: &'a ContactProblem,
     law: Vec<OwnRow>,
-    diagonal: Vec<Pair>,
+    diagonal: Vec<DPair>,
     shift: f64,
-    center: &'a [Pair],
+    center: &'a [DPair],
 }
 
 impl<'a> Proximal<'a> {
-    fn new(problem: &'a ContactProblem, target: Target, shift: f64, center: &'a [Pair]) -> Self {
+    fn new(problem: &'a ContactProblem, target: Target, shift: f64, center: &'a [DPair]) -> Self {
         let law = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
         Proximal { problem, law, diagonal: problem.delassus_diagonal(), shift, center }
     }
 
     /// Impulses that solve this problem well enough, or none.
-    fn solve(&self) -> Option<Vec<Pair>> {
+    fn solve(&self) -> Option<Vec<DPair>> {
         let mut impulses = self.center.to_vec();
         let mut now = self.merit(&impulses, &self.arguments(&impulses));
         let goal = INEXACT * INEXACT * now;
@@ -113,8 +119,8 @@ impl<'a> Proximal<'a> {
             let mut fraction = 1.0;
             let mut halvings = 0;
             (impulses, now) = loop {
-                let blend = |(l, g): (&Pair, &Pair)| [0, 1].map(|k| l[k] + fraction * (g[k] - l[k]));
-                let trial: Vec<Pair> = impulses.iter().zip(&target).map(blend).collect();
+                let blend = |(l, g): (&DPair, &DPair)| [0, 1].map(|k| l[k] + fraction * (g[k] - l[k]));
+                let trial: Vec<DPair> = impulses.iter().zip(&target).map(blend).collect();
                 let merit = self.merit(&trial, &self.arguments(&trial));
                 // The directional derivative of the merit along a Newton step is −2 merit.
                 if merit <= (1.0 - 2e-4 * fraction) * now {
@@ -132,7 +138,7 @@ impl<'a> Proximal<'a> {
     }
 
     /// (λn − ρn un, λt − ρt ut) of every contact.
-    fn arguments(&self, impulses: &[Pair]) -> Vec<Pair> {
+    fn arguments(&self, impulses: &[DPair]) -> Vec<DPair> {
         let velocities = self.problem.velocities(impulses);
         let one = |(i, c): (usize, &ProblemContact)| {
             let ([ln, lt], [cn, ct], [gn, gt]) = (impulses[i], self.center[i], self.diagonal[i]);
@@ -145,7 +151,7 @@ impl<'a> Proximal<'a> {
     }
 
     /// Energy-weighted square of the natural map ∑ G_ii r_i² (J): the same in all units of mass.
-    fn merit(&self, impulses: &[Pair], arguments: &[Pair]) -> f64 {
+    fn merit(&self, impulses: &[DPair], arguments: &[DPair]) -> f64 {
         let one = |(i, c): (usize, &ProblemContact)| {
             let ([ln, lt], [yn, yt], [gn, gt]) = (impulses[i], arguments[i], self.diagonal[i]);
             let radius = c.friction * positive(yn);
@@ -154,29 +160,29 @@ impl<'a> Proximal<'a> {
         self.problem.contacts.iter().enumerate().map(one).sum()
     }
 
-    fn states(&self, arguments: &[Pair]) -> Vec<State> {
-        let one = |(&[normal, tangent], c): (&Pair, &ProblemContact)| {
+    fn states(&self, arguments: &[DPair]) -> Vec<IterateState> {
+        let one = |(&[normal, tangent], c): (&DPair, &ProblemContact)| {
             if normal <= 0.0 {
-                State::Open
+                IterateState::Open
             } else if tangent.abs() < c.friction * normal {
-                State::Stick
+                IterateState::Stick
             } else {
-                State::Slip(tangent.signum())
+                IterateState::Slip(tangent.signum())
             }
         };
         arguments.iter().zip(&self.problem.contacts).map(one).collect()
     }
 
     /// Solves the linear problem of fixed states; none if it cannot be factorized.
-    fn solve_states(&self, states: &[State]) -> Option<Vec<Pair>> {
+    fn solve_states(&self, states: &[IterateState]) -> Option<Vec<DPair>> {
         // Unknowns (contact, direction); `index` finds them again.
         let mut unknowns: Vec<(usize, usize)> = Vec::new();
         let mut index = vec![[usize::MAX; 2]; states.len()];
         for (i, state) in states.iter().enumerate() {
             let directions = match state {
-                State::Open => 0,
-                State::Slip(_) => 1,
-                State::Stick => 2,
+                IterateState::Open => 0,
+                IterateState::Slip(_) => 1,
+                IterateState::Stick => 2,
             };
             for (direction, index) in index[i].iter_mut().enumerate().take(directions) {
                 *index = unknowns.len();
@@ -187,11 +193,11 @@ impl<'a> Proximal<'a> {
         // Rows and columns scaled by 1/√G_ii: unit diagonal.
         let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / self.diagonal[i][d].sqrt()).collect();
         let slope = |i: usize| match states[i] {
-            State::Slip(sign) => sign * self.problem.contacts[i].friction,
+            IterateState::Slip(sign) => sign * self.problem.contacts[i].friction,
             _ => 0.0,
         };
 
-        let mut entries: Vec<sparse::Entry> = Vec::new();
+        let mut entries: Vec<sparse::Triplet> = Vec::new();
         for (body, touching) in contacts_of_bodies(self.problem, states).iter().enumerate() {
             let b = &self.problem.bodies[body];
             let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
@@ -204,7 +210,7 @@ impl<'a> Proximal<'a> {
                         let normal = index[*j][0];
                         let value = (g(d, 0) + slope(*j) * g(d, 1)) * scale[row] * scale[normal];
                         entries.push((normal, row, value));
-                        if states[*j] == State::Stick {
+                        if states[*j] == IterateState::Stick {
                             let tangent = index[*j][1];
                             entries.push((tangent, row, g(d, 1) * scale[row] * scale[tangent]));
                         }
@@ -226,7 +232,7 @@ impl<'a> Proximal<'a> {
             impulses[i][d] = x[u] * scale[u];
         }
         for (i, l) in impulses.iter_mut().enumerate() {
-            if matches!(states[i], State::Slip(_)) {
+            if matches!(states[i], IterateState::Slip(_)) {
                 l[1] = slope(i) * l[0];
             }
         }
@@ -235,10 +241,10 @@ impl<'a> Proximal<'a> {
 }
 
 /// Closed contacts of every body, with their rows on that body.
-fn contacts_of_bodies(problem: &ContactProblem, states: &[State]) -> Vec<Vec<(usize, Block)>> {
+fn contacts_of_bodies(problem: &ContactProblem, states: &[IterateState]) -> Vec<Vec<(usize, SideRows)>> {
     let mut touching = vec![Vec::new(); problem.bodies.len()];
     for (i, c) in problem.contacts.iter().enumerate() {
-        if states[i] != State::Open {
+        if states[i] != IterateState::Open {
             c.sides().for_each(|(body, block)| touching[body].push((i, block)));
         }
     }
@@ -253,7 +259,7 @@ mod tests {
 
     const TIGHT: Stop = Stop { tolerance: 1e-13, iterations: 60 };
 
-    fn solve(p: &ContactProblem) -> Run {
+    fn solve(p: &ContactProblem) -> IterativeRun {
         let run = newton(p, Target::Rigid, &vec![[0.0; 2]; p.contacts.len()], TIGHT);
         assert_eq!(run.status, Status::Converged, "{}: {:?}", p.name, run.history);
         run

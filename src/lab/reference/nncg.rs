@@ -8,12 +8,12 @@
 //! **Fails when** friction keeps switching: β > 1 restarts so often that it falls back to
 //! Gauss–Seidel.
 
-use super::problem::{ContactProblem, Pair};
+use super::problem::{ContactProblem, DPair};
 use super::residual::Target;
-use super::sweeps::{Run, ScalarRows, Stop, gauss_seidel, iterate};
+use super::sweeps::{IterativeRun, ScalarRows, Stop, gauss_seidel, iterate};
 
 /// NNCG from `start`; one iteration is a sweep and an extrapolation.
-pub fn nncg(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop) -> Run {
+pub fn nncg(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
     let rows = ScalarRows::new(problem, target);
     let n = problem.contacts.len();
     let mut direction = vec![[0.0; 2]; n];
@@ -21,7 +21,7 @@ pub fn nncg(problem: &ContactProblem, target: Target, start: &[Pair], stop: Stop
     iterate(problem, target, start, stop, |impulses, velocities| {
         let before = impulses.clone();
         gauss_seidel(problem, &rows, 0..n, impulses, velocities);
-        let descent: Vec<Pair> =
+        let descent: Vec<DPair> =
             impulses.iter().zip(&before).map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let square: f64 = descent.iter().map(|d| d[0] * d[0] + d[1] * d[1]).sum();
         // β > 1 means that the last direction made things worse: start again from this sweep.
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
     use crate::lab::reference::gallery::disc_column;
     use crate::lab::reference::rates::iterations_to;
-    use crate::lab::reference::sweeps::{Status, Sweep, pgs};
+    use crate::lab::reference::sweeps::{Status, SweepDirection, pgs};
 
     #[test]
     fn beats_gauss_seidel_threefold_on_columns() {
@@ -50,7 +50,7 @@ mod tests {
             let cold = vec![[0.0; 2]; n];
             let stop = Stop { tolerance: 1e-12, iterations: 20_000 };
             let fast = nncg(&p, Target::Rigid, &cold, stop);
-            let slow = pgs(&p, Target::Rigid, &cold, Sweep::Symmetric, stop);
+            let slow = pgs(&p, Target::Rigid, &cold, SweepDirection::Symmetric, stop);
             assert_eq!(fast.status, Status::Converged);
             let sweeps = |history: &[f64]| iterations_to(history, 1e-4).unwrap();
             assert!(

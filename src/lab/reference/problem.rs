@@ -17,15 +17,14 @@
 //!
 //! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
 
+pub use crate::engine::constraints::numerics::coulomb_lcp::DPair;
 use crate::engine::constraints::numerics::matrix::Matrix;
 use serde::{Deserialize, Serialize};
 
 /// Velocity of a body: (m/s, m/s, rad/s).
 pub type Velocity = [f64; 3];
-/// Normal and tangential component of a contact: impulses (N·s) or velocities (m/s).
-pub type Pair = [f64; 2];
 /// Normal and tangential row of one side of a contact, sign included: (1, 1, m) each.
-pub type Block = [Velocity; 2];
+pub type SideRows = [Velocity; 2];
 
 /// A body of a contact problem.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,9 +54,9 @@ pub struct ProblemContact {
     /// Unit normal from a to b.
     pub normal: [f64; 2],
     /// (r × n, r × t) from the center of mass of a to the point (m).
-    pub arm_a: Pair,
+    pub arm_a: DPair,
     /// (r × n, r × t) from the center of mass of b to the point (m).
-    pub arm_b: Pair,
+    pub arm_b: DPair,
     /// Signed distance at the start of the step (m); negative is overlap.
     pub gap: f64,
     /// Coulomb coefficient (1).
@@ -65,7 +64,7 @@ pub struct ProblemContact {
     /// Separation speed that restitution demands (m/s), ≥ 0; zero for an inelastic contact.
     pub rebound: f64,
     /// Impulses that a warm-started solver begins with (N·s).
-    pub warm_impulse: Pair,
+    pub warm_impulse: DPair,
 }
 
 impl ProblemContact {
@@ -107,9 +106,9 @@ impl ProblemContact {
     }
 
     /// Each side that is not static: its body and its rows of J.
-    pub fn sides(&self) -> impl Iterator<Item = (usize, Block)> + use<> {
+    pub fn sides(&self) -> impl Iterator<Item = (usize, SideRows)> + use<> {
         let (n, t) = (self.normal, self.tangent());
-        let side = move |body: Option<u32>, arm: Pair, sign: f64| {
+        let side = move |body: Option<u32>, arm: DPair, sign: f64| {
             let block = [[n[0], n[1], arm[0]], [t[0], t[1], arm[1]]];
             body.map(|b| (b as usize, block.map(|row| row.map(|x| sign * x))))
         };
@@ -125,7 +124,7 @@ impl ProblemContact {
     }
 
     /// (un, ut) = J v of this contact (m/s).
-    pub fn velocity(&self, velocities: &[Velocity]) -> Pair {
+    pub fn velocity(&self, velocities: &[Velocity]) -> DPair {
         let mut u = [0.0; 2];
         for (body, block) in self.sides() {
             for (u, row) in u.iter_mut().zip(&block) {
@@ -156,7 +155,7 @@ pub struct ContactProblem {
 
 impl ContactProblem {
     /// Adds M⁻¹ Jᵀ of one contact times `impulse` to the velocities.
-    pub fn apply(&self, contact: &ProblemContact, impulse: Pair, velocities: &mut [Velocity]) {
+    pub fn apply(&self, contact: &ProblemContact, impulse: DPair, velocities: &mut [Velocity]) {
         for (body, [n, t]) in contact.sides() {
             let b = &self.bodies[body];
             let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
@@ -167,7 +166,7 @@ impl ContactProblem {
     }
 
     /// v⁺ = v* + M⁻¹ Jᵀ λ.
-    pub fn velocities(&self, impulses: &[Pair]) -> Vec<Velocity> {
+    pub fn velocities(&self, impulses: &[DPair]) -> Vec<Velocity> {
         let mut v: Vec<Velocity> = self.bodies.iter().map(|b| b.free_velocity).collect();
         for (c, &impulse) in self.contacts.iter().zip(impulses) {
             self.apply(c, impulse, &mut v);
@@ -176,13 +175,13 @@ impl ContactProblem {
     }
 
     /// J v: (un, ut) of every contact (m/s).
-    pub fn contact_velocities(&self, velocities: &[Velocity]) -> Vec<Pair> {
+    pub fn contact_velocities(&self, velocities: &[Velocity]) -> Vec<DPair> {
         self.contacts.iter().map(|c| c.velocity(velocities)).collect()
     }
 
     /// Jᵀ λ: what the contacts give each body (N·s, N·s, N·m·s). Unlike single impulses of a
     /// hyperstatic pile, this is determined by the velocities.
-    pub fn body_impulses(&self, impulses: &[Pair]) -> Vec<Velocity> {
+    pub fn body_impulses(&self, impulses: &[DPair]) -> Vec<Velocity> {
         let mut p = vec![[0.0; 3]; self.bodies.len()];
         for (c, impulse) in self.contacts.iter().zip(impulses) {
             for (body, [n, t]) in c.sides() {
@@ -195,7 +194,7 @@ impl ContactProblem {
     }
 
     /// G λ = J M⁻¹ Jᵀ λ (m/s).
-    pub fn delassus_product(&self, impulses: &[Pair]) -> Vec<Pair> {
+    pub fn delassus_product(&self, impulses: &[DPair]) -> Vec<DPair> {
         let mut v = vec![[0.0; 3]; self.bodies.len()];
         for (c, &impulse) in self.contacts.iter().zip(impulses) {
             self.apply(c, impulse, &mut v);
@@ -224,7 +223,7 @@ impl ContactProblem {
     }
 
     /// (G_nn, G_tt) of one contact (1/kg).
-    pub(super) fn delassus_block(&self, contact: &ProblemContact) -> Pair {
+    pub(super) fn delassus_block(&self, contact: &ProblemContact) -> DPair {
         let mut g = [0.0; 2];
         for (body, block) in contact.sides() {
             let b = &self.bodies[body];
@@ -236,7 +235,7 @@ impl ContactProblem {
     }
 
     /// Diagonal of G, a (normal, tangential) pair per contact (1/kg).
-    pub fn delassus_diagonal(&self) -> Vec<Pair> {
+    pub fn delassus_diagonal(&self) -> Vec<DPair> {
         self.contacts.iter().map(|c| self.delassus_block(c)).collect()
     }
 }
@@ -334,7 +333,7 @@ mod tests {
     #[test]
     fn dense_delassus_equals_its_product() {
         let p = box_pyramid(3, 0.5);
-        let l: Vec<Pair> =
+        let l: Vec<DPair> =
             (0..p.contacts.len()).map(|i| [(i as f64).sin(), (2.0 * i as f64).cos()]).collect();
         let g = p.delassus();
         for (i, u) in p.delassus_product(&l).iter().enumerate() {

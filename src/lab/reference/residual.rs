@@ -18,7 +18,7 @@
 //!
 //! With ρ = 1/G_ii it is an impulse: how much one exact sweep over this row alone would change it.
 
-use super::problem::{ContactProblem, Pair, Velocity};
+use super::problem::{ContactProblem, DPair, Velocity};
 
 /// The right-hand side b of un = Jn v + b that a residual is measured against.
 ///
@@ -84,7 +84,7 @@ pub fn contact_residuals(
     problem: &ContactProblem,
     target: Target,
     velocities: &[Velocity],
-    impulses: &[Pair],
+    impulses: &[DPair],
 ) -> Vec<ContactResidual> {
     let diagonal = problem.delassus_diagonal();
     let one = |i: usize| {
@@ -100,7 +100,7 @@ pub fn contact_residuals(
 }
 
 /// Residuals of one contact with relative velocity `u` (m/s), impulse `l` (N·s) and ρ (kg).
-pub fn law_residual(mu: f64, [un, ut]: Pair, [ln, lt]: Pair, [rho_n, rho_t]: Pair) -> ContactResidual {
+pub fn law_residual(mu: f64, [un, ut]: DPair, [ln, lt]: DPair, [rho_n, rho_t]: DPair) -> ContactResidual {
     let radius = mu * positive(ln);
     // One ρ for both components: P_K is the Euclidean projection only in an unscaled plane.
     let rho = rho_n.min(rho_t);
@@ -121,7 +121,7 @@ pub fn law_residual(mu: f64, [un, ut]: Pair, [ln, lt]: Pair, [rho_n, rho_t]: Pai
 ///
 /// Inside, it is the identity; in the polar wedge {µ|λt| ≤ −λn}, the apex; else the point of the
 /// nearer edge, whose direction is (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
-pub fn project_cone(mu: f64, [ln, lt]: Pair) -> Pair {
+pub fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
     if lt.abs() <= mu * ln {
         [ln, lt]
     } else if mu * lt.abs() <= -ln {
@@ -153,7 +153,7 @@ pub fn natural_map(
     problem: &ContactProblem,
     target: Target,
     velocities: &[Velocity],
-    impulses: &[Pair],
+    impulses: &[DPair],
 ) -> f64 {
     let residuals = contact_residuals(problem, target, velocities, impulses);
     let parts: Vec<f64> = residuals.iter().flat_map(|r| [r.normal, r.tangent]).collect();
@@ -161,7 +161,7 @@ pub fn natural_map(
 }
 
 /// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): velocities that do not follow from the impulses.
-pub fn momentum_defect(problem: &ContactProblem, velocities: &[Velocity], impulses: &[Pair]) -> f64 {
+pub fn momentum_defect(problem: &ContactProblem, velocities: &[Velocity], impulses: &[DPair]) -> f64 {
     let follow = problem.velocities(impulses);
     let difference: Vec<Velocity> =
         velocities.iter().zip(&follow).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect();

@@ -15,11 +15,11 @@ use rsparse::data::Sprs;
 const DIAGONAL: f64 = 0.1;
 
 /// An entry of a matrix: column, row, value.
-pub type Entry = (usize, usize, f64);
+pub type Triplet = (usize, usize, f64);
 
 /// x of A x = `right`, where entries of A at the same place add up; none if A is singular to working
 /// precision. All rows and columns must be less than the length of `right`.
-pub fn solve(entries: Vec<Entry>, right: &[f64]) -> Option<Vec<f64>> {
+pub fn solve(entries: Vec<Triplet>, right: &[f64]) -> Option<Vec<f64>> {
     let n = right.len();
     let matrix = compressed(entries, n);
     // The library's ordering (0: of A + Aᵀ; −1: none) needs at least two columns.
@@ -61,7 +61,7 @@ fn remainder(matrix: &Sprs<f64>, x: &[f64], right: &[f64]) -> Vec<f64> {
 }
 
 /// Compressed columns of a square matrix, rows ascending.
-fn compressed(mut entries: Vec<Entry>, n: usize) -> Sprs<f64> {
+fn compressed(mut entries: Vec<Triplet>, n: usize) -> Sprs<f64> {
     entries.sort_by_key(|&(column, row, _)| (column, row));
     entries.dedup_by(|next, kept| {
         let same = (next.0, next.1) == (kept.0, kept.1);

@@ -7,10 +7,10 @@
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
 
-use super::problem::{ContactProblem, Pair};
+use super::problem::{ContactProblem, DPair};
 use super::residual::{Target, natural_map};
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::numerics::lemke::Outcome;
+use crate::engine::constraints::numerics::lemke::LemkeOutcome;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
@@ -24,16 +24,16 @@ const EXACT: f64 = 1e-13;
 /// On ill-conditioned problems (jammed piles whose G has eigenvalues down to 10⁻⁶) rounding can end
 /// one of Lemke's paths on a spurious ray or at an inaccurate basis; then other covering vectors are
 /// tried and the answer with the least residual returned.
-pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<Pair>, Outcome> {
+pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<DPair>, LemkeOutcome> {
     let rows: Vec<_> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
     let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; rows.len()]));
-    let free: Vec<Pair> = free.iter().zip(&rows).map(|(u, row)| [u[0] + row.bias, u[1]]).collect();
+    let free: Vec<DPair> = free.iter().zip(&rows).map(|(u, row)| [u[0] + row.bias, u[1]]).collect();
     let friction: Vec<f64> = problem.contacts.iter().map(|c| c.friction).collect();
     let g = problem.delassus();
     let lcp = CoulombLcp::new(&friction, &problem.delassus_diagonal(), &free, |i, j| {
         g[(i, j)] + if i == j && i % 2 == 0 { rows[i / 2].compliance } else { 0.0 }
     });
-    let mut best: Result<(f64, Vec<Pair>), Outcome> = Err(Outcome::Ray);
+    let mut best: Result<(f64, Vec<DPair>), LemkeOutcome> = Err(LemkeOutcome::Ray);
     for path in 0..PATHS {
         match lcp.solve(&covering_vector(lcp.rows(), path), PIVOTS_PER_ROW * lcp.rows() + 100) {
             Ok(l) => {
@@ -65,7 +65,7 @@ mod tests {
     use crate::lab::reference::residual::natural_map;
 
     /// Impulses, certified by the residual code, which shares nothing with the LCP.
-    fn solve(problem: &ContactProblem) -> Vec<Pair> {
+    fn solve(problem: &ContactProblem) -> Vec<DPair> {
         problem.validate().unwrap();
         let impulses = stewart_trinkle(problem, Target::Rigid).unwrap();
         let residual = natural_map(problem, Target::Rigid, &problem.velocities(&impulses), &impulses);

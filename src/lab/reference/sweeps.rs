@@ -14,7 +14,7 @@
 //! with D_i = ∑_sides k J_i M⁻¹ J_iᵀ, and since (∑ᵢ xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G: it
 //! converges.
 
-use super::problem::{ContactProblem, Pair, Velocity};
+use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{OwnRow, Target, clamp, natural_map, positive};
 
 /// When an iteration ends.
@@ -41,9 +41,9 @@ pub enum Status {
 
 /// What an iterative method found.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct IterativeRun {
     /// Last impulses (N·s).
-    pub impulses: Vec<Pair>,
+    pub impulses: Vec<DPair>,
     /// v⁺ that follows from them.
     pub velocities: Vec<Velocity>,
     /// Relative natural-map residual: of the start, then after every iteration.
@@ -55,7 +55,7 @@ pub struct Run {
 /// Constants of all rows.
 pub(super) struct ScalarRows {
     /// 1/(G_ii + compliance), normal and tangential (kg).
-    inverse: Vec<Pair>,
+    inverse: Vec<DPair>,
     law: Vec<OwnRow>,
 }
 
@@ -64,9 +64,9 @@ impl ScalarRows {
         Self::with_diagonal(problem, target, &problem.delassus_diagonal())
     }
 
-    fn with_diagonal(problem: &ContactProblem, target: Target, diagonal: &[Pair]) -> Self {
+    fn with_diagonal(problem: &ContactProblem, target: Target, diagonal: &[DPair]) -> Self {
         let law: Vec<OwnRow> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-        let invert = |(g, row): (&Pair, &OwnRow)| [1.0 / (g[0] + row.compliance), 1.0 / g[1]];
+        let invert = |(g, row): (&DPair, &OwnRow)| [1.0 / (g[0] + row.compliance), 1.0 / g[1]];
         ScalarRows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
     }
 
@@ -87,7 +87,7 @@ pub(super) fn gauss_seidel(
     problem: &ContactProblem,
     rows: &ScalarRows,
     order: impl Iterator<Item = usize>,
-    impulses: &mut [Pair],
+    impulses: &mut [DPair],
     velocities: &mut [Velocity],
 ) {
     for i in order {
@@ -106,7 +106,7 @@ pub(super) fn gauss_seidel(
 
 /// Direction of Gauss–Seidel sweeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sweep {
+pub enum SweepDirection {
     /// In the order of the contacts.
     Forward,
     /// Forward, then backward; counts as one iteration.
@@ -117,10 +117,10 @@ pub enum Sweep {
 pub(super) fn iterate(
     problem: &ContactProblem,
     target: Target,
-    start: &[Pair],
+    start: &[DPair],
     stop: Stop,
-    mut step: impl FnMut(&mut Vec<Pair>, &mut Vec<Velocity>),
-) -> Run {
+    mut step: impl FnMut(&mut Vec<DPair>, &mut Vec<Velocity>),
+) -> IterativeRun {
     let unit = problem.impulse_unit();
     let mut impulses = start.to_vec();
     let mut history = Vec::new();
@@ -139,17 +139,23 @@ pub(super) fn iterate(
             step(&mut impulses, &mut velocities);
             continue;
         };
-        return Run { impulses, velocities, history, status };
+        return IterativeRun { impulses, velocities, history, status };
     }
 }
 
 /// Projected Gauss–Seidel from `start`.
-pub fn pgs(problem: &ContactProblem, target: Target, start: &[Pair], sweep: Sweep, stop: Stop) -> Run {
+pub fn pgs(
+    problem: &ContactProblem,
+    target: Target,
+    start: &[DPair],
+    sweep: SweepDirection,
+    stop: Stop,
+) -> IterativeRun {
     let rows = ScalarRows::new(problem, target);
     let n = problem.contacts.len();
     iterate(problem, target, start, stop, |impulses, velocities| {
         gauss_seidel(problem, &rows, 0..n, impulses, velocities);
-        if sweep == Sweep::Symmetric {
+        if sweep == SweepDirection::Symmetric {
             gauss_seidel(problem, &rows, (0..n).rev(), impulses, velocities);
         }
     })
@@ -165,7 +171,13 @@ pub enum Splitting {
 }
 
 /// Projected Jacobi from `start`.
-pub fn jacobi(problem: &ContactProblem, target: Target, start: &[Pair], split: Splitting, stop: Stop) -> Run {
+pub fn jacobi(
+    problem: &ContactProblem,
+    target: Target,
+    start: &[DPair],
+    split: Splitting,
+    stop: Stop,
+) -> IterativeRun {
     let diagonal = match split {
         Splitting::Whole => problem.delassus_diagonal(),
         Splitting::Mass => split_diagonal(problem),
@@ -181,7 +193,7 @@ pub fn jacobi(problem: &ContactProblem, target: Target, start: &[Pair], split: S
 }
 
 /// ∑_sides k J_i M⁻¹ J_iᵀ with k the number of rows on that body: two per contact with friction.
-fn split_diagonal(problem: &ContactProblem) -> Vec<Pair> {
+fn split_diagonal(problem: &ContactProblem) -> Vec<DPair> {
     let mut count = vec![0.0; problem.bodies.len()];
     for c in &problem.contacts {
         for (body, _) in c.sides() {
@@ -209,7 +221,7 @@ mod tests {
     use crate::lab::reference::rates::rate;
     use std::f64::consts::PI;
 
-    fn cold(p: &ContactProblem) -> Vec<Pair> {
+    fn cold(p: &ContactProblem) -> Vec<DPair> {
         vec![[0.0; 2]; p.contacts.len()]
     }
 
@@ -220,7 +232,7 @@ mod tests {
     fn gauss_seidel_on_a_column_has_the_rate_of_its_walk() {
         for n in [5, 10, 15, 20] {
             let p = disc_column(n);
-            let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Forward, DEEP);
+            let run = pgs(&p, Target::Rigid, &cold(&p), SweepDirection::Forward, DEEP);
             assert_eq!(run.status, Status::Converged);
             let exact = (PI / (2.0 * n as f64)).cos().powi(2);
             let measured = rate(&run.history).unwrap();
@@ -245,7 +257,7 @@ mod tests {
     fn mass_ratio_sets_the_rate_both_ways() {
         for r in [1.0, 10.0, 100.0, 1000.0] {
             for (p, exact) in [(heavy_on_light(r), r / (1.0 + r)), (light_on_heavy(r), 1.0 / (1.0 + r))] {
-                let run = pgs(&p, Target::Rigid, &cold(&p), Sweep::Forward, DEEP);
+                let run = pgs(&p, Target::Rigid, &cold(&p), SweepDirection::Forward, DEEP);
                 assert_eq!(run.status, Status::Converged);
                 // Light on heavy gains more than a decade per sweep or two: nothing to fit.
                 if exact > 0.2 {
@@ -281,8 +293,13 @@ mod tests {
     #[test]
     fn symmetric_sweeps_solve_friction() {
         let p = sliding_box();
-        let run =
-            pgs(&p, Target::Rigid, &cold(&p), Sweep::Symmetric, Stop { tolerance: 1e-14, iterations: 1000 });
+        let run = pgs(
+            &p,
+            Target::Rigid,
+            &cold(&p),
+            SweepDirection::Symmetric,
+            Stop { tolerance: 1e-14, iterations: 1000 },
+        );
         assert_eq!(run.status, Status::Converged);
         // 7 N and 13 N times h; the residual bounds the error up to the condition number, some 10.
         assert!((run.impulses[0][0] - 7.0 * p.h).abs() < 1e-12);

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 /// One line of the table file; every number is finite, and what there is not is empty.
 #[derive(serde::Serialize)]
-struct Line<'a> {
+struct TableLine<'a> {
     schema_version: u32,
     commit: &'a str,
     cpu: &'a str,
@@ -117,11 +117,11 @@ struct Line<'a> {
     failed_speed: Option<f32>,
 }
 
-impl<'a> Line<'a> {
+impl<'a> TableLine<'a> {
     fn of(r: &'a Record, environment: &'a Environment) -> Self {
         let (sample, errors, truth) = (r.sample.as_ref(), r.errors.as_ref(), r.truth.as_ref());
         let us = |ns: f64| ns / 1e3;
-        Line {
+        TableLine {
             schema_version: SCHEMA,
             commit: &environment.commit,
             cpu: &environment.cpu,
@@ -230,7 +230,7 @@ pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Err
     // Columns of the line, and one for each phase: no writer takes both at once.
     let mut line = csv::WriterBuilder::new().from_writer(Vec::new());
     for record in records {
-        line.serialize(Line::of(record, environment)).map_err(failed)?;
+        line.serialize(TableLine::of(record, environment)).map_err(failed)?;
     }
     let lines = line.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))?;
     let mut reader = csv::Reader::from_reader(&lines[..]);
@@ -259,14 +259,14 @@ fn decimal(value: f32) -> Value {
 /// Everything that was chosen, by the caller or by a constant.
 pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
-    struct Solver {
+    struct ExportedSolver {
         name: &'static str,
         source: &'static str,
         standard_budget: params::Budget,
         uses: Uses,
         parameters: serde_json::Map<String, Value>,
     }
-    let solver = |v: &&'static crate::engine::solvers::Variant| Solver {
+    let solver = |v: &&'static crate::engine::solvers::Variant| ExportedSolver {
         name: v.name,
         source: v.source,
         standard_budget: v.budget,

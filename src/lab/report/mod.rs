@@ -3,7 +3,6 @@
 #[doc(hidden)]
 pub mod answer;
 #[doc(hidden)]
-pub mod axes;
 pub mod columns;
 pub mod environment;
 pub mod export;

@@ -5,12 +5,12 @@
 //! shows the least time in which the solver has at most that error: settings are different runs,
 //! and between them there is nothing.
 
-use super::axes::{
-    Area, Drawn, Edges, INK, Scale, marker, solver_color, solver_legend, with_dark, wrapped, write,
-    write_upwards,
-};
+use super::style::{solver_color, solver_legend};
 use super::units::si_short;
 use crate::lab::error::Error;
+use crate::lab::picture::axes::{
+    Area, Drawn, Edges, INK, LogScale, marker, with_dark, wrapped, write, write_upwards,
+};
 use crate::lab::study::Record;
 use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of};
 use plotters::prelude::*;
@@ -76,8 +76,8 @@ fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -
         let text = if known { "nothing measured" } else { "no reference value" };
         return write(area, text, ((left + right) / 2, (top + bottom) / 2), 13, HPos::Center);
     }
-    let errors = Scale::of(samples().map(|s| s.error), 5);
-    let times = Scale::of(samples().map(|s| s.time), 6);
+    let errors = LogScale::of(samples().map(|s| s.error), 5);
+    let times = LogScale::of(samples().map(|s| s.time), 6);
     let unit = axis.unit(records);
     let labels: [&dyn Fn(f64) -> String; 2] = [&|error| label(error, unit), &|ns| si_short(1e-9 * ns, "s")];
     Edges { left, right, top, bottom }.grid(area, [&errors, &times], 12, labels)?;

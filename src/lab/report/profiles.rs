@@ -1,13 +1,12 @@
 //! `profiles.svg` and the slices: solvers compared over all scenes.
 
-use super::axes::{
-    Area, Drawn, GRID, INK, Scale, solver_color, solver_legend, with_dark, write, write_upwards,
-};
+use super::style::{solver_color, solver_legend};
 use super::table::{finish, table};
 use super::units::{digits, si};
 use crate::lab::error::Error;
+use crate::lab::picture::axes::{Area, Drawn, GRID, INK, LogScale, with_dark, write, write_upwards};
 use crate::lab::study::Record;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, Sample, solvers_of};
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, SettingSample, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::slices::{Slice, equal_error, equal_time};
 use plotters::prelude::*;
@@ -58,7 +57,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
     let (left, right, top, bottom) = (x + LEFT, x + PANEL_WIDTH - RIGHT, TOP, HEIGHT - BOTTOM);
     let all = || profile.ratios.iter().flat_map(|(_, r)| r.iter().copied());
     let most = all().fold(2.0, f64::max);
-    let mut scale = Scale::of([1.0, most].into_iter(), 5);
+    let mut scale = LogScale::of([1.0, most].into_iter(), 5);
     scale.limits[0] = 1.0;
     // Room for steps beside each other at both ends.
     let room = profile.ratios.len() as i32 + 2;
@@ -163,7 +162,7 @@ fn slice_column(slice: &Slice, solvers: &[&str], equal_time: bool) -> Vec<String
         text => text,
     };
     let time = |ns: f64| digits(1e-3 * ns);
-    let show = |s: &Sample| if equal_time { error(s.error) } else { time(s.time) };
+    let show = |s: &SettingSample| if equal_time { error(s.error) } else { time(s.time) };
     let cell = |solver: &&str| {
         let sample =
             slice.values.iter().find(|(name, _)| name == solver).and_then(|(_, sample)| sample.as_ref());

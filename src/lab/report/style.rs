@@ -7,7 +7,11 @@
 
 use crate::engine::solvers::VARIANTS;
 use crate::lab::picture::Color;
+use crate::lab::picture::axes::{Area, write};
 use crate::lab::study::DEFAULT_SOLVERS;
+use plotters::prelude::{PathElement, RGBColor};
+use plotters::style::Color as _;
+use plotters::style::text_anchor::HPos;
 
 const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222", "#8a7f00"];
@@ -123,6 +127,27 @@ impl Marker {
             ]),
         }
     }
+}
+
+/// The color of a solver, the same in every plot.
+pub fn solver_color(solver: &str) -> RGBColor {
+    let Color(r, g, b, _) = Style::of(solver).rgb();
+    RGBColor(r, g, b)
+}
+
+/// A name and a stroke per solver, from `x` on; returns where the next thing may stand.
+pub fn solver_legend(
+    area: &Area,
+    solvers: &[&str],
+    mut x: i32,
+    y: i32,
+) -> Result<i32, Box<dyn std::error::Error>> {
+    for name in solvers {
+        area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], solver_color(name).stroke_width(3)))?;
+        write(area, name, (x + 32, y), 14, HPos::Left)?;
+        x += 56 + 7 * name.chars().count() as i32;
+    }
+    Ok(x)
 }
 
 #[cfg(test)]

@@ -4,15 +4,16 @@ use super::holds::{Demand, Outside};
 use super::parts::{below_floor, yard};
 use super::tolerance::Tolerances;
 use super::truth::{Truth, Worst};
-use super::{Entry, Geometry, Scene, SceneBody, SceneShape, Segment};
+use super::{Entry, Geometry, Scene, SceneBody, SceneShape, SegmentGeometry};
 
 pub(super) const COMPOUNDS: Entry =
     Entry::new("compounds", "3000 bodies of two triangles each, in a box", |_| {
         let mut ground = yard(40, 100);
         // Catches what jumps over the walls.
-        ground
-            .shapes
-            .push(SceneShape::new(Geometry::Segment(Segment { a: [-800.0, -80.0], b: [800.0, -80.0] })));
+        ground.shapes.push(SceneShape::new(Geometry::Segment(SegmentGeometry {
+            a: [-800.0, -80.0],
+            b: [800.0, -80.0],
+        })));
         let mut bodies = vec![ground];
         for column in 0..20 {
             for row in 0..150 {

@@ -37,13 +37,13 @@ pub struct Expect {
     pub stays_inside: Option<[[f64; 2]; 2]>,
     /// The known value.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
-    pub reference: Option<Reference>,
+    pub reference: Option<KnownValue>,
 }
 
 /// A number that is known about the last second of a run, or about all of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
+pub struct KnownValue {
     /// What is measured.
     pub measure: Measure,
     /// Whose height.
@@ -93,7 +93,7 @@ impl Expect {
             let message = format!("the first corner must be below and left of the second: {low:?}, {high:?}");
             return Err(Error::invalid("stays_inside", message));
         }
-        let Some(Reference { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
+        let Some(KnownValue { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
         positive("reference.tolerance", *tolerance)?;
         if !(*value as f32).is_finite() {
             return Err(Error::invalid("reference.value", format!("must be finite, is {value}")));

@@ -1,6 +1,6 @@
 //! From what a scene expects to what a run is held to, and back.
 
-use super::expect::{Expect, Measure, Reference};
+use super::expect::{Expect, KnownValue, Measure};
 use super::holds::Demand;
 use super::tolerance::Tolerances;
 use super::truth::{Truth, greatest_drop, load_on_ground, rests_at};
@@ -24,7 +24,7 @@ impl Expect {
             }
         }
         let known = truth.and_then(|t| Some((t, t.measure?)));
-        expect.reference = known.map(|(truth, (measure, body))| Reference {
+        expect.reference = known.map(|(truth, (measure, body))| KnownValue {
             measure,
             body,
             value: truth.expected,
@@ -49,7 +49,7 @@ impl Expect {
     }
 }
 
-impl Reference {
+impl KnownValue {
     fn truth(&self, scene: &Scene) -> Truth {
         match self.measure {
             Measure::RestingHeight => rests_at(scene, self.body.unwrap_or(0), self.value),

@@ -119,11 +119,11 @@ pub enum Geometry {
     /// `{"box": …}`
     Box(Rectangle),
     /// `{"polygon": …}`
-    Polygon(Polygon),
+    Polygon(PolygonGeometry),
     /// `{"capsule": …}`
     Capsule(Capsule),
     /// `{"segment": …}`
-    Segment(Segment),
+    Segment(SegmentGeometry),
 }
 
 /// All points within `radius` of `center`.
@@ -157,7 +157,7 @@ pub struct Rectangle {
 /// A convex polygon of 3 to 8 vertices, grown by `radius`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Polygon {
+pub struct PolygonGeometry {
     /// Vertices in either winding (m).
     pub points: Vec<[f64; 2]>,
     /// m, ≥ 0
@@ -180,7 +180,7 @@ pub struct Capsule {
 /// A massless two-sided line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Segment {
+pub struct SegmentGeometry {
     /// m
     pub a: [f64; 2],
     /// m
@@ -197,11 +197,11 @@ struct ShapeObject {
     #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
     rectangle: Option<Rectangle>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    polygon: Option<Polygon>,
+    polygon: Option<PolygonGeometry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     capsule: Option<Capsule>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    segment: Option<Segment>,
+    segment: Option<SegmentGeometry>,
     #[serde(default = "default_density", skip_serializing_if = "is_default_density")]
     density: f64,
     #[serde(default = "default_friction", skip_serializing_if = "is_default_friction")]

@@ -39,7 +39,7 @@ pub(super) const SPIN: Entry = Entry::new("free_spin", "a box that spins freely 
 .sized(50, 1, 180, "rad/s")
 .known(|scene, spin| {
     let spin = f64::from(spin);
-    let mut turned = Turned::default();
+    let mut turned = TurnedAngle::default();
     let off = move |view: &View| {
         let angle = f64::from(view.bodies.rotation_sin[0]).atan2(f64::from(view.bodies.rotation_cos[0]));
         Some(turned.error(angle, spin * view.dt))
@@ -55,12 +55,12 @@ pub(super) const SPIN: Entry = Entry::new("free_spin", "a box that spins freely 
 /// does not turn at all is 3 < π off), so the errors of the steps are known and
 /// their sum is the error of the angle, however many turns it reaches.
 #[derive(Default)]
-struct Turned {
+struct TurnedAngle {
     last: f64,
     sum: f64,
 }
 
-impl Turned {
+impl TurnedAngle {
     /// The error after one more step, at `angle` (mod 2π), where the step should have turned by `turn` (rad).
     fn error(&mut self, angle: f64, turn: f64) -> f64 {
         self.sum += (angle - self.last - turn + PI).rem_euclid(TAU) - PI;
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn whole_turns_of_error_are_not_forgotten() {
-        let (mut exact, mut slow) = (Turned::default(), Turned::default());
+        let (mut exact, mut slow) = (TurnedAngle::default(), TurnedAngle::default());
         for step in 1..=100 {
             let wrap = |angle: f64| angle.sin().atan2(angle.cos());
             assert!(exact.error(wrap(0.8 * f64::from(step)), 0.8).abs() < 1e-12);

@@ -47,7 +47,8 @@ pub use check::{MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use expect::Measure;
 pub use expected::loaded as expecting;
 pub use format::{
-    Capsule, Circle, DEFAULT_STEPS, Geometry, Polygon, Rectangle, Scene, SceneBody, SceneShape, Segment,
+    Capsule, Circle, DEFAULT_STEPS, Geometry, PolygonGeometry, Rectangle, Scene, SceneBody, SceneShape,
+    SegmentGeometry,
 };
 pub use joints::SceneJoint;
 pub use truth::{Observer, Truth};

@@ -98,12 +98,12 @@ impl SceneShape {
 
     /// A convex polygon (m).
     pub fn polygon(points: Vec<[f64; 2]>) -> Self {
-        Self::new(Geometry::Polygon(Polygon { points, radius: 0.0 }))
+        Self::new(Geometry::Polygon(PolygonGeometry { points, radius: 0.0 }))
     }
 
     /// A horizontal line of half length `half` (m) through the origin.
     pub fn line(half: f64) -> Self {
-        Self::new(Geometry::Segment(Segment { a: [-half, 0.0], b: [half, 0.0] }))
+        Self::new(Geometry::Segment(SegmentGeometry { a: [-half, 0.0], b: [half, 0.0] }))
     }
 
     /// The same shape with a density (kg/m²).

@@ -6,7 +6,7 @@ use crate::lab::error::LONGEST_MISSPELT;
 const LONGEST_KEY: usize = 40;
 
 /// One open bracket on the way to a position in the text.
-enum Level {
+enum OpenBracket {
     /// `{`, with the last key read.
     Object { key: String, expects_key: bool },
     /// `[`, with the index of the current element.
@@ -42,17 +42,17 @@ fn offset_of(text: &str, line: usize, column: usize) -> usize {
 
 /// The brackets that are open at the end of `text`. The text may end anywhere;
 /// what is malformed only makes the place less exact.
-fn levels_at(text: &[u8]) -> Vec<Level> {
+fn levels_at(text: &[u8]) -> Vec<OpenBracket> {
     let mut levels = Vec::new();
     let mut i = 0;
     while i < text.len() {
         match text[i] {
-            b'{' => levels.push(Level::Object { key: String::new(), expects_key: true }),
-            b'[' => levels.push(Level::Array { index: 0 }),
+            b'{' => levels.push(OpenBracket::Object { key: String::new(), expects_key: true }),
+            b'[' => levels.push(OpenBracket::Array { index: 0 }),
             b'}' | b']' => drop(levels.pop()),
             b',' => match levels.last_mut() {
-                Some(Level::Object { expects_key, .. }) => *expects_key = true,
-                Some(Level::Array { index }) => *index += 1,
+                Some(OpenBracket::Object { expects_key, .. }) => *expects_key = true,
+                Some(OpenBracket::Array { index }) => *index += 1,
                 None => {}
             },
             b'"' => {
@@ -62,7 +62,8 @@ fn levels_at(text: &[u8]) -> Vec<Level> {
                     i += if text[i] == b'\\' { 2 } else { 1 };
                 }
                 let end = i.min(text.len());
-                if let Some(Level::Object { key, expects_key: expects_key @ true }) = levels.last_mut() {
+                if let Some(OpenBracket::Object { key, expects_key: expects_key @ true }) = levels.last_mut()
+                {
                     *key = String::from_utf8_lossy(&text[start..end]).into_owned();
                     *expects_key = false;
                 }
@@ -74,17 +75,17 @@ fn levels_at(text: &[u8]) -> Vec<Level> {
     levels
 }
 
-fn path(levels: &[Level]) -> String {
+fn path(levels: &[OpenBracket]) -> String {
     let mut path = String::new();
     for level in levels {
         match level {
-            Level::Object { key, .. } if key.is_empty() => {}
-            Level::Object { key, .. } => {
+            OpenBracket::Object { key, .. } if key.is_empty() => {}
+            OpenBracket::Object { key, .. } => {
                 path.push_str(if path.is_empty() { "" } else { "." });
                 path.extend(key.chars().take(LONGEST_KEY));
                 path.push_str(if key.chars().nth(LONGEST_KEY).is_some() { "…" } else { "" });
             }
-            Level::Array { index } => path.push_str(&format!("[{index}]")),
+            OpenBracket::Array { index } => path.push_str(&format!("[{index}]")),
         }
     }
     path

@@ -113,12 +113,12 @@ pub(super) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// A measurement of one view: the distance to the truth, if it can be told.
-pub(super) type Distance = Box<dyn FnMut(&View) -> Option<f64>>;
+pub(super) type TruthDistance = Box<dyn FnMut(&View) -> Option<f64>>;
 
 /// The worst distance to the truth over all steps from `from` on.
 pub(super) struct Worst {
     from: u64,
-    distance: Distance,
+    distance: TruthDistance,
     worst: Option<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! What a study will take, from its plan alone.
 
-use super::found::Candidate;
+use super::found::TunedBudget;
 use super::{StudyPlan, is_path};
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
@@ -48,7 +48,7 @@ pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
             let mut work = (0.0, 0.0);
             for solver in &plan.solvers {
                 let candidates = plan.candidates(&scene.name, solver, Impacts::Own, point)?;
-                for Candidate { budget, .. } in candidates {
+                for TunedBudget { budget, .. } in candidates {
                     let alone = plan.widest_alone(&scene.name, scene.bodies, scene.steps, &budget, solver);
                     let one = |lanes: usize| estimate::step(scene.bodies, sweeps(&budget, solver), lanes);
                     for order in &plan.orders {

@@ -76,7 +76,7 @@ impl ErrorAxis {
 
 /// A setting: a solver, an order and a budget, at its fastest lane width.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample<'a> {
+pub struct SettingSample<'a> {
     /// Its record.
     pub record: &'a Record,
     /// Which of the solver's budgets, in the order in which they were tried.
@@ -96,7 +96,7 @@ pub struct Curve<'a> {
     /// Name of the solver.
     pub solver: &'static str,
     /// Settings that do not hold, or have no such error, are left out.
-    pub samples: Vec<Sample<'a>>,
+    pub samples: Vec<SettingSample<'a>>,
 }
 
 /// Budgets of a solver, with its parameters, in the order in which they were tried.
@@ -126,14 +126,19 @@ pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
 pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
     let curve = |solver: &'static str| {
         let own = || records.iter().filter(|r| r.solver == solver);
-        let mut samples: Vec<Sample> = Vec::new();
+        let mut samples: Vec<SettingSample> = Vec::new();
         for (budget, value) in budgets_of(records, solver).iter().enumerate() {
             for order in Order::ALL {
                 let same = |r: &&Record| (r.budget, r.parameters.as_str()) == *value && r.order == order;
                 let widths = own().filter(same);
                 let timed = widths.filter(|r| r.holds()).filter_map(|record| {
                     let (sample, error) = (record.sample.as_ref()?, axis.of(record)?);
-                    Some(Sample { record, budget, time: sample.cost_ns(), error: error.max(ERROR_FLOOR) })
+                    Some(SettingSample {
+                        record,
+                        budget,
+                        time: sample.cost_ns(),
+                        error: error.max(ERROR_FLOOR),
+                    })
                 });
                 samples.extend(timed.min_by(|a, b| a.time.total_cmp(&b.time)));
             }
@@ -146,20 +151,20 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
 impl<'a> Curve<'a> {
     /// The setting of least error among those that take at most `time` (ns); of equal ones the
     /// fastest. None if all take longer.
-    pub fn best_within(&self, time: f64) -> Option<Sample<'a>> {
+    pub fn best_within(&self, time: f64) -> Option<SettingSample<'a>> {
         let within = self.samples.iter().filter(|s| s.time <= time);
         within.copied().min_by(|a, b| a.error.total_cmp(&b.error).then(a.time.total_cmp(&b.time)))
     }
 
     /// The fastest setting among those whose error is at most `error`; of equal ones that of
     /// least error. None if all have more.
-    pub fn fastest_within(&self, error: f64) -> Option<Sample<'a>> {
+    pub fn fastest_within(&self, error: f64) -> Option<SettingSample<'a>> {
         let within = self.samples.iter().filter(|s| s.error <= error);
         within.copied().min_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)))
     }
 
     /// The settings that no other one of the solver beats in both time and error, the fastest first.
-    pub fn front(&self) -> Vec<Sample<'a>> {
+    pub fn front(&self) -> Vec<SettingSample<'a>> {
         let mut sorted = self.samples.clone();
         sorted.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)));
         let mut least = f64::INFINITY;
@@ -182,7 +187,7 @@ pub(crate) mod tests {
         samples.iter().zip(1..).map(|(&(time, error), substeps)| record(8, substeps, time, error)).collect()
     }
 
-    fn at(sample: Option<Sample>) -> Option<(f64, f64)> {
+    fn at(sample: Option<SettingSample>) -> Option<(f64, f64)> {
         sample.map(|s| (s.time / 1e3, s.error))
     }
 

@@ -16,7 +16,7 @@ pub const NAME: &str = "budgets.csv";
 
 /// A budget with the solver's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
+pub struct TunedBudget {
     /// Work per step.
     pub budget: Budget,
     /// Values in the order of the solver's table.
@@ -25,7 +25,7 @@ pub struct Candidate {
 
 /// What was found for one solver on one scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct FoundBudgets {
     /// Name with size.
     pub scene: String,
     /// Who was searched for.
@@ -33,19 +33,19 @@ pub struct Entry {
     /// How impacts are solved.
     pub impacts: Impacts,
     /// The least work first.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<TunedBudget>,
 }
 
 /// A list of what was found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
     /// Scene by scene.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<FoundBudgets>,
 }
 
 /// A line of the file.
 #[derive(Serialize, Deserialize)]
-struct Line {
+struct BudgetLine {
     scene: String,
     solver: String,
     impacts: Impacts,
@@ -66,9 +66,10 @@ impl Found {
 
     /// What was found for a solver on a scene, with its own treatment of impacts where not with this one; none where
     /// nobody has searched.
-    pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<Candidate>> {
+    pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<TunedBudget>> {
         let with = |impacts: Impacts| {
-            let is = |e: &&Entry| (e.scene.as_str(), e.solver, e.impacts) == (scene, solver.name, impacts);
+            let is =
+                |e: &&FoundBudgets| (e.scene.as_str(), e.solver, e.impacts) == (scene, solver.name, impacts);
             self.entries.iter().find(is).map(|e| e.candidates.clone())
         };
         with(impacts).or_else(|| with(Impacts::Own))
@@ -76,11 +77,11 @@ impl Found {
 
     /// Reads the text of a list. Errors: a text that is none; solvers and parameters that do not exist.
     pub fn of_csv(text: &str) -> Result<Found, Error> {
-        let mut entries: Vec<Entry> = Vec::new();
+        let mut entries: Vec<FoundBudgets> = Vec::new();
         for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
-            let line: Line = line.map_err(|e| Error::invalid(NAME, e.to_string()))?;
+            let line: BudgetLine = line.map_err(|e| Error::invalid(NAME, e.to_string()))?;
             let solver = find(&line.solver)?;
-            let candidate = Candidate {
+            let candidate = TunedBudget {
                 budget: Budget {
                     substeps: line.substeps,
                     velocity_iterations: line.velocity_iterations,
@@ -96,7 +97,7 @@ impl Found {
                 {
                     last.candidates.push(candidate);
                 }
-                _ => entries.push(Entry {
+                _ => entries.push(FoundBudgets {
                     scene: line.scene,
                     solver: solver.name,
                     impacts: line.impacts,
@@ -110,9 +111,9 @@ impl Found {
     /// The text of the list: a line per setting.
     pub fn to_csv(&self) -> Result<Vec<u8>, Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        for Entry { scene, solver, impacts, candidates } in &self.entries {
-            for Candidate { budget, parameters } in candidates {
-                let line = Line {
+        for FoundBudgets { scene, solver, impacts, candidates } in &self.entries {
+            for TunedBudget { budget, parameters } in candidates {
+                let line = BudgetLine {
                     scene: scene.clone(),
                     solver: (*solver).into(),
                     impacts: *impacts,

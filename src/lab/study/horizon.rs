@@ -14,7 +14,7 @@ use crate::lab::metrics::Observation;
 use crate::lab::metrics::rest::REST_WINDOW;
 use crate::lab::overrides;
 use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::{Broken, HORIZON, Mark, Watch};
+use crate::lab::scenes::holds::{Broken, HORIZON, HoldWatch, Mark};
 use crate::lab::scenes::tolerance::Accuracy;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -29,7 +29,7 @@ pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
     let seconds = steps as f64 * scene.dt;
     let mut later = Later { steps, seconds, broken: None, rest_speed_m_s: None };
     let mut world = scene.build(Settings { record_impulses: false, timed: false, ..settings })?;
-    let mut watch = Watch::new(&world, loaded.demands.clone());
+    let mut watch = HoldWatch::new(&world, loaded.demands.clone());
     let mut observation = None;
     for step in 0..steps {
         if step + observed >= steps {

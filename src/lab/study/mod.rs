@@ -49,17 +49,17 @@ use crate::lab::estimate;
 use crate::lab::files;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides::{self, Override};
-use crate::lab::scenes::holds::{Broken, Watch};
+use crate::lab::scenes::holds::{Broken, HoldWatch};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::scenes::{self, Loaded, Scene};
 use budget::BudgetGrid;
 use compare::Ratio;
-use found::{Candidate, Found};
+use found::{Found, TunedBudget};
 use interleave::{Interleaved, Sample};
-pub use record::{Failure, Fronts, Record, TruthError, mark_fronts};
+pub use record::{FailedAt, Fronts, Record, TruthError, mark_fronts};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use sweep::{Sweep, Swept};
+use sweep::{QuantitySweep, Swept};
 
 /// Scenes of the default study: each shows something that the others do not.
 pub const DEFAULT_SCENES: [&str; 11] = [
@@ -116,7 +116,7 @@ pub struct StudyPlan {
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
     /// The swept quantity; none in a study of budgets.
-    pub sweep: Option<Sweep>,
+    pub sweep: Option<QuantitySweep>,
     /// Tolerances that override the scenes' own.
     pub tolerances: GivenTolerances,
     /// Steps of an error run; where none, the scene's own.
@@ -300,21 +300,21 @@ impl StudyPlan {
         solver: &'static Variant,
         impacts: Impacts,
         point: Option<Swept>,
-    ) -> Result<Vec<Candidate>, Error> {
+    ) -> Result<Vec<TunedBudget>, Error> {
         let found = self.found.of(scene, solver, impacts).filter(|_| self.searched());
         let Some(found) = found else {
             let parameters = overrides::values(solver, &self.overrides)?;
             let budgets = self.budgets(solver, point)?.into_iter();
-            return Ok(budgets.map(|budget| Candidate { budget, parameters }).collect());
+            return Ok(budgets.map(|budget| TunedBudget { budget, parameters }).collect());
         };
         let mut candidates = Vec::new();
-        for Candidate { budget, mut parameters } in found {
+        for TunedBudget { budget, mut parameters } in found {
             for Override { name, value } in
                 self.overrides.iter().filter(|o| solver.parameter(&o.name).is_ok())
             {
                 solver.set(&mut parameters, name, *value)?;
             }
-            let candidate = Candidate { budget, parameters };
+            let candidate = TunedBudget { budget, parameters };
             if !candidates.contains(&candidate) {
                 candidates.push(candidate);
             }
@@ -375,7 +375,7 @@ pub struct Progress {
 }
 
 /// The settings that share an error run per order, one per scene, value of a sweep, solver and budget.
-struct Cell<'a> {
+struct ErrorCell<'a> {
     /// Place of the scene, and of the value of the sweep.
     scene: [usize; 2],
     swept: Option<Swept>,
@@ -388,7 +388,7 @@ struct Cell<'a> {
     widest_alone: bool,
 }
 
-impl Cell<'_> {
+impl ErrorCell<'_> {
     /// Its budget, and those parameters that are not the solver's own.
     fn text(&self) -> String {
         let budget = budget::with_impacts(budget::brief(&self.budget, self.solver), self.impacts);
@@ -399,7 +399,7 @@ impl Cell<'_> {
 
 /// What an error run found.
 #[derive(Clone)]
-pub struct Outcome {
+pub struct RunOutcome {
     /// Those of the whole run; where it failed, by what.
     pub errors: Result<Errors, Divergence>,
     /// Distance to what is known about the scene.
@@ -432,11 +432,11 @@ pub fn run(
                 for &impacts in plan.impacts_on(&loaded.scene) {
                     let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?;
                     let (bodies, steps) = (loaded.scene.bodies.len(), loaded.scene.steps);
-                    for Candidate { budget, parameters } in candidates {
+                    for TunedBudget { budget, parameters } in candidates {
                         let widest_alone =
                             plan.widest_alone(&loaded.scene.name, bodies, steps, &budget, solver);
                         let scene = [i, k];
-                        cells.push(Cell {
+                        cells.push(ErrorCell {
                             scene,
                             swept,
                             name,
@@ -462,7 +462,7 @@ pub fn run(
     let mut records = Vec::new();
     for (i, variants) in scenes.iter().enumerate() {
         let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene[0] == i);
-        let rows: Vec<Row> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
+        let rows: Vec<RecordRow> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
         let mut own = timed_records(plan, variants, timed[i], &rows, &tell)?;
         if plan.steps.is_some() {
             leave_out_unseen(&mut own, &variants[0].scene);
@@ -491,7 +491,7 @@ fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
 }
 
 /// Settings of a cell in one order at one width.
-fn settings(plan: &StudyPlan, cell: &Cell, order: Order, width: LaneWidth) -> Settings {
+fn settings(plan: &StudyPlan, cell: &ErrorCell, order: Order, width: LaneWidth) -> Settings {
     let mut parameters = cell.parameters;
     if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
         // Checked with the plan.
@@ -514,10 +514,10 @@ fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene
 /// Every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each scene.
 fn error_runs(
     plan: &StudyPlan,
-    cells: &[Cell],
+    cells: &[ErrorCell],
     timed: &[u32],
     tell: &(dyn Fn(String) + Sync),
-) -> Result<Vec<Vec<Outcome>>, Error> {
+) -> Result<Vec<Vec<RunOutcome>>, Error> {
     let jobs: Vec<(usize, Order)> =
         (0..cells.len()).flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
     let next = AtomicUsize::new(0);
@@ -526,7 +526,7 @@ fn error_runs(
         loop {
             let job = next.fetch_add(1, Ordering::Relaxed);
             let Some(&(cell, order)) = jobs.get(job) else { return Ok::<(), Error>(()) };
-            let Cell { scene, name, solver, budget, .. } = &cells[cell];
+            let ErrorCell { scene, name, solver, budget, .. } = &cells[cell];
             tell(format!("errors {name} · {} · {}", solver.name, budget::brief(budget, solver)));
             let outcome = error_run(plan, &cells[cell], order, timed[scene[0]])?;
             if let Ok(mut found) = found.lock() {
@@ -542,11 +542,11 @@ fn error_runs(
             .try_for_each(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     })?;
     let found = found.into_inner().unwrap_or_default();
-    let outcomes: Vec<Outcome> = found.into_iter().flatten().collect();
-    Ok(outcomes.chunks(plan.orders.len()).map(<[Outcome]>::to_vec).collect())
+    let outcomes: Vec<RunOutcome> = found.into_iter().flatten().collect();
+    Ok(outcomes.chunks(plan.orders.len()).map(<[RunOutcome]>::to_vec).collect())
 }
 
-fn error_run(plan: &StudyPlan, cell: &Cell, order: Order, timed: u32) -> Result<Outcome, Error> {
+fn error_run(plan: &StudyPlan, cell: &ErrorCell, order: Order, timed: u32) -> Result<RunOutcome, Error> {
     let loaded = plan.open_at(cell.name, cell.swept)?;
     let width = match order {
         Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
@@ -556,12 +556,12 @@ fn error_run(plan: &StudyPlan, cell: &Cell, order: Order, timed: u32) -> Result<
 }
 
 /// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
-pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<Outcome, Error> {
+pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
     observe_while(loaded, settings, hash_at, &|_, _| true)
 }
 
 /// The same up to the first demand that is not met, and the work of a mean step: its sweeps and substeps.
-fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(Outcome, f64), Error> {
+fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
     let (steps, work) = (std::cell::Cell::new(0.0), std::cell::Cell::new(0.0));
     let substeps = f64::from(settings.budget.substeps);
     let outcome = observe_while(loaded, settings, 0, &|world, watch| {
@@ -577,14 +577,14 @@ fn observe_while(
     loaded: Loaded,
     settings: Settings,
     hash_at: u32,
-    goes_on: &dyn Fn(&World, &Watch) -> bool,
-) -> Result<Outcome, Error> {
+    goes_on: &dyn Fn(&World, &HoldWatch) -> bool,
+) -> Result<RunOutcome, Error> {
     let Loaded { scene, mut truth, demands, .. } = loaded;
     let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
     let mut observation = Observation::new(&world);
-    let mut watch = Watch::new(&world, demands);
+    let mut watch = HoldWatch::new(&world, demands);
     let mut hash = 0;
-    let failed = |divergence, hash| Outcome { errors: Err(divergence), truth: None, broken: None, hash };
+    let failed = |divergence, hash| RunOutcome { errors: Err(divergence), truth: None, broken: None, hash };
     for step in 1..=scene.steps {
         if let Err(divergence) = world.step() {
             return Ok(failed(divergence, hash));
@@ -604,7 +604,7 @@ fn observe_while(
             break;
         }
     }
-    Ok(Outcome {
+    Ok(RunOutcome {
         errors: Ok(observation.errors()),
         truth: truth.as_ref().map(TruthError::of),
         broken: watch.broken(),
@@ -613,15 +613,15 @@ fn observe_while(
 }
 
 /// What becomes a record.
-struct Row<'a> {
-    cell: &'a Cell<'a>,
+struct RecordRow<'a> {
+    cell: &'a ErrorCell<'a>,
     order: Order,
     width: LaneWidth,
-    outcome: &'a Outcome,
+    outcome: &'a RunOutcome,
 }
 
 /// The orders and widths of a cell.
-fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Row<'a>> {
+fn rows<'a>(plan: &StudyPlan, cell: &'a ErrorCell, outcomes: &'a [RunOutcome]) -> Vec<RecordRow<'a>> {
     let mut rows = Vec::new();
     for (&order, outcome) in plan.orders.iter().zip(outcomes) {
         let widths: &[LaneWidth] = match order {
@@ -630,7 +630,7 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a Cell, outcomes: &'a [Outcome]) -> Vec<Ro
             Order::Colored => &plan.widths,
             _ => &[LaneWidth::W1],
         };
-        rows.extend(widths.iter().map(|&width| Row { cell, order, width, outcome }));
+        rows.extend(widths.iter().map(|&width| RecordRow { cell, order, width, outcome }));
     }
     rows
 }
@@ -641,11 +641,11 @@ fn timed_records(
     plan: &StudyPlan,
     variants: &[Loaded],
     steps: u32,
-    rows: &[Row],
+    rows: &[RecordRow],
     tell: &dyn Fn(String),
 ) -> Result<Vec<Record>, Error> {
     let running: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
-    let variant = |row: &Row| &variants[row.cell.scene[1]];
+    let variant = |row: &RecordRow| &variants[row.cell.scene[1]];
     let chosen = running.iter().map(|&i| {
         let row = &rows[i];
         (&variant(row).scene, settings(plan, row.cell, row.order, row.width))
@@ -663,9 +663,9 @@ fn timed_records(
         Ok(_) => place(i).map_or(Err(untimed), |place| interleaved.sample(place)),
         Err(divergence) => Err(divergence),
     };
-    let record = |(i, row): (usize, &Row)| {
+    let record = |(i, row): (usize, &RecordRow)| {
         let sample = sample(&interleaved, i);
-        let failure = sample.as_ref().err().map(|&d| Failure::from(d));
+        let failure = sample.as_ref().err().map(|&d| FailedAt::from(d));
         record_of(plan, variant(row), row, sample.ok(), failure)
     };
     let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
@@ -688,11 +688,11 @@ fn timed_records(
 fn record_of(
     plan: &StudyPlan,
     loaded: &Loaded,
-    row: &Row,
+    row: &RecordRow,
     sample: Option<Sample>,
-    failure: Option<Failure>,
+    failure: Option<FailedAt>,
 ) -> Record {
-    let Row { cell, order, width, outcome } = row;
+    let RecordRow { cell, order, width, outcome } = row;
     let Loaded { scene, tolerances, unchecked, .. } = loaded;
     let parameters = settings(plan, cell, *order, *width).parameters;
     Record {

@@ -69,7 +69,7 @@ pub struct Record {
     /// Fronts that the setting is on; only its fastest width is.
     pub front: Fronts,
     /// Why there is no result.
-    pub failure: Option<Failure>,
+    pub failure: Option<FailedAt>,
 }
 
 /// In files as in the columns `holds` and `failed_step`.
@@ -218,7 +218,7 @@ pub struct Fronts {
 
 /// Body and step at which a run diverged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Failure {
+pub struct FailedAt {
     /// Step, from 1.
     pub step: u64,
     /// Body index.
@@ -233,16 +233,16 @@ pub struct Failure {
     pub speed: Option<f32>,
 }
 
-impl From<Divergence> for Failure {
+impl From<Divergence> for FailedAt {
     fn from(d: Divergence) -> Self {
         let speed = Some(d.speed).filter(|s| s.is_finite());
-        Failure { step: d.step, body: d.body, quantity: d.quantity, criterion: d.criterion, speed }
+        FailedAt { step: d.step, body: d.body, quantity: d.quantity, criterion: d.criterion, speed }
     }
 }
 
-impl std::fmt::Display for Failure {
+impl std::fmt::Display for FailedAt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let &Failure { step, body, quantity, criterion, speed } = self;
+        let &FailedAt { step, body, quantity, criterion, speed } = self;
         Divergence { step, body, quantity, criterion, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
     }
 }
@@ -342,7 +342,7 @@ pub(crate) mod tests {
     }
 
     pub fn failed(lanes: usize) -> Record {
-        let failure = Failure {
+        let failure = FailedAt {
             step: 7,
             body: 2,
             quantity: Quantity::Speed,
@@ -417,7 +417,7 @@ pub(crate) mod tests {
     #[test]
     fn a_failure_without_a_finite_speed_says_so() {
         let of = |quantity, speed, criterion| {
-            Failure::from(Divergence { step: 3, body: 1, quantity, speed, criterion }).to_string()
+            FailedAt::from(Divergence { step: 3, body: 1, quantity, speed, criterion }).to_string()
         };
         let bounds = |quantity, speed| of(quantity, speed, Criterion::Bounds);
         let cure = "; try more substeps, a shorter step or another solver";

@@ -17,9 +17,9 @@
 //! than three, the next ones that are plausible. Where none of the last is plausible, the dropped ones run whole as
 //! well, until one is: no solver fails on a scene by a candidate that only short runs have seen.
 
-use super::found::{Candidate, Entry, Found};
+use super::found::{Found, FoundBudgets, TunedBudget};
 use super::horizon::{in_parallel, later};
-use super::{Cell, Failure, Progress, Record, Row, StudyPlan};
+use super::{ErrorCell, FailedAt, Progress, Record, RecordRow, StudyPlan};
 use super::{leave_out_unseen, observe_until_broken, record_of, settings};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -75,7 +75,12 @@ pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<
     for name in &plan.scenes {
         let scene = plan.open(name)?.scene;
         for &solver in plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
-            jobs.extend(plan.impacts_on(&scene).iter().map(|&impacts| Job { plan, name, solver, impacts }));
+            jobs.extend(plan.impacts_on(&scene).iter().map(|&impacts| SearchJob {
+                plan,
+                name,
+                solver,
+                impacts,
+            }));
         }
     }
     let (done, total) = (AtomicUsize::new(0), jobs.len());
@@ -84,13 +89,13 @@ pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<
         progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
         let candidates = job.best()?;
         let scene = plan.open(job.name)?.scene.name;
-        Ok(Entry { scene, solver: job.solver.name, impacts: job.impacts, candidates })
+        Ok(FoundBudgets { scene, solver: job.solver.name, impacts: job.impacts, candidates })
     })?;
     Ok(Found { entries })
 }
 
 /// The candidates of a solver in steps of `dt` (s): the standard parameters first, then the others as they are drawn.
-pub fn candidates(solver: &Variant, dt: f64) -> Vec<Candidate> {
+pub fn candidates(solver: &Variant, dt: f64) -> Vec<TunedBudget> {
     let (mut standard, mut others) = (Vec::new(), Vec::new());
     for budget in budgets(solver) {
         let h = dt as f32 / budget.substeps as f32;
@@ -99,7 +104,7 @@ pub fn candidates(solver: &Variant, dt: f64) -> Vec<Candidate> {
             _ => p.trials,
         })
         .into_iter()
-        .map(|parameters| Candidate { budget, parameters });
+        .map(|parameters| TunedBudget { budget, parameters });
         standard.extend(list.next());
         others.extend(list);
     }
@@ -156,7 +161,7 @@ pub fn parameters<'a>(solver: &Variant, h: f32, trials: impl Fn(&Parameter) -> &
 }
 
 /// A solver on a scene.
-struct Job<'a> {
+struct SearchJob<'a> {
     plan: &'a StudyPlan,
     name: &'a str,
     solver: &'static Variant,
@@ -164,14 +169,14 @@ struct Job<'a> {
 }
 
 /// A candidate after a run.
-struct Trial {
-    candidate: Candidate,
+struct SearchTrial {
+    candidate: TunedBudget,
     record: Record,
     /// Sweeps and substeps of a mean step.
     work: f64,
 }
 
-impl Trial {
+impl SearchTrial {
     /// Excess over the strictest tolerances; what is within them is as good as anything.
     fn excess(&self) -> f64 {
         self.record.excess_at(Accuracy::Exact).max(1.0)
@@ -182,9 +187,9 @@ impl Trial {
     }
 }
 
-impl Job<'_> {
+impl SearchJob<'_> {
     /// The settings to time, the least work first.
-    fn best(&self) -> Result<Vec<Candidate>, Error> {
+    fn best(&self) -> Result<Vec<TunedBudget>, Error> {
         let scene = self.plan.open(self.name)?.scene;
         let mut left = candidates(self.solver, scene.dt);
         let mut dropped = Vec::new();
@@ -194,7 +199,7 @@ impl Job<'_> {
             let fronts = by_fronts(&points);
             let unbeaten = fronts.first().map_or(0, Vec::len);
             let kept = left.len().div_ceil(4).max(LAST).max(unbeaten).min(left.len());
-            let order: Vec<Candidate> = fronts.into_iter().flatten().map(|i| left[i]).collect();
+            let order: Vec<TunedBudget> = fronts.into_iter().flatten().map(|i| left[i]).collect();
             dropped.splice(0..0, order[kept..].iter().copied());
             left = order[..kept].to_vec();
         }
@@ -215,7 +220,7 @@ impl Job<'_> {
                 let nearest = trials.iter().min_by(|a, b| a.record.excess().total_cmp(&b.record.excess()));
                 let nearest = nearest.filter(|t| t.record.excess().is_finite()).map(|t| t.candidate);
                 let (budget, parameters) = (self.solver.budget, self.solver.defaults());
-                return Ok(vec![nearest.unwrap_or(Candidate { budget, parameters })]);
+                return Ok(vec![nearest.unwrap_or(TunedBudget { budget, parameters })]);
             } else {
                 return Ok(chosen.into_iter().map(|i| trials[i].candidate).collect());
             }
@@ -226,9 +231,18 @@ impl Job<'_> {
         self.plan.open(self.name).is_ok_and(|loaded| loaded.rests())
     }
 
-    fn cell(&self, &Candidate { budget, parameters }: &Candidate) -> Cell<'_> {
-        let Job { name, solver, impacts, .. } = *self;
-        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false }
+    fn cell(&self, &TunedBudget { budget, parameters }: &TunedBudget) -> ErrorCell<'_> {
+        let SearchJob { name, solver, impacts, .. } = *self;
+        ErrorCell {
+            scene: [0; 2],
+            swept: None,
+            name,
+            solver,
+            impacts,
+            budget,
+            parameters,
+            widest_alone: false,
+        }
     }
 
     /// Colored order at any width gives the same bits; the plan may have natural order alone.
@@ -239,13 +253,13 @@ impl Job<'_> {
         }
     }
 
-    fn later(&self, candidate: &Candidate) -> Result<super::record::Later, Error> {
+    fn later(&self, candidate: &TunedBudget) -> Result<super::record::Later, Error> {
         let (order, width) = self.order();
         later(&self.plan.open(self.name)?, settings(self.plan, &self.cell(candidate), order, width))
     }
 
     /// Runs candidates for so many steps, or for those of the scene.
-    fn judged(&self, list: &[Candidate], steps: Option<u32>) -> Result<Vec<Trial>, Error> {
+    fn judged(&self, list: &[TunedBudget], steps: Option<u32>) -> Result<Vec<SearchTrial>, Error> {
         let plan = StudyPlan { steps, ..self.plan.clone() };
         let (order, width) = self.order();
         let (mut records, mut works) = (Vec::new(), Vec::new());
@@ -255,8 +269,8 @@ impl Job<'_> {
             let cell = self.cell(candidate);
             let given = settings(&plan, &cell, order, width);
             let (outcome, work) = observe_until_broken(plan.open(self.name)?, given)?;
-            let row = Row { cell: &cell, order, width, outcome: &outcome };
-            let failure = outcome.errors.as_ref().err().map(|&d| Failure::from(d));
+            let row = RecordRow { cell: &cell, order, width, outcome: &outcome };
+            let failure = outcome.errors.as_ref().err().map(|&d| FailedAt::from(d));
             records.push(record_of(&plan, &loaded, &row, None, failure));
             works.push(work);
         }
@@ -264,12 +278,12 @@ impl Job<'_> {
             leave_out_unseen(&mut records, &loaded.scene);
         }
         let trials = list.iter().zip(records).zip(works);
-        Ok(trials.map(|((&candidate, record), work)| Trial { candidate, record, work }).collect())
+        Ok(trials.map(|((&candidate, record), work)| SearchTrial { candidate, record, work }).collect())
     }
 }
 
 /// The places of the settings to time: at each accuracy the least work, and then the next plausible ones; the least work first.
-fn choose(trials: &[Trial]) -> Vec<usize> {
+fn choose(trials: &[SearchTrial]) -> Vec<usize> {
     let mut sorted: Vec<usize> = (0..trials.len()).filter(|&i| trials[i].is_plausible()).collect();
     sorted.sort_by(|&a, &b| {
         let key = |i: usize| (trials[i].work, trials[i].excess());
@@ -374,7 +388,7 @@ mod tests {
         let found = search(&plan, &|_| ()).unwrap();
         let pgs = found.of("stack:2", plan.solvers[0], Impacts::Own).unwrap();
         assert_eq!(pgs.len(), 3);
-        let work = |c: &Candidate| c.budget.substeps * (1 + c.budget.velocity_iterations);
+        let work = |c: &TunedBudget| c.budget.substeps * (1 + c.budget.velocity_iterations);
         assert!(pgs.windows(2).all(|w| work(&w[0]) <= work(&w[1])), "{pgs:?}");
         // The same twice, and the same from a file.
         assert_eq!(search(&plan, &|_| ()).unwrap(), found);

@@ -3,7 +3,7 @@
 
 use super::Record;
 use super::compare::compare;
-use super::curve::{Curve, ErrorAxis, Sample, curves};
+use super::curve::{Curve, ErrorAxis, SettingSample, curves};
 
 /// Every solver of a scene at one time or at one error.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub struct Slice<'a> {
     /// Unit of the error.
     pub unit: &'static str,
     /// Solver, and its setting; none where all take longer, or have a larger error.
-    pub values: Vec<(&'static str, Option<Sample<'a>>)>,
+    pub values: Vec<(&'static str, Option<SettingSample<'a>>)>,
     /// The solvers that nobody beats: in equal time those of least error, to equal error the
     /// fastest and those that [tie](compare) with it.
     pub best: Vec<&'static str>,
@@ -23,13 +23,13 @@ pub struct Slice<'a> {
 
 /// The errors of the scene in equal time; none if no curve has an error of this kind.
 pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
-    let best = |least: &Sample, other: &Sample| other.error <= least.error;
+    let best = |least: &SettingSample, other: &SettingSample| other.error <= least.error;
     slice(records, axis, |s| s.time, Curve::best_within, |s| s.error, best)
 }
 
 /// The times to equal error.
 pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
-    let best = |least: &Sample, other: &Sample| {
+    let best = |least: &SettingSample, other: &SettingSample| {
         let samples = least.record.sample.as_ref().zip(other.record.sample.as_ref());
         samples.is_some_and(|(least, other)| compare(least, other).is_eq())
     };
@@ -39,10 +39,10 @@ pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
 fn slice<'a>(
     records: &'a [Record],
     axis: ErrorAxis,
-    given: fn(&Sample) -> f64,
-    of: fn(&Curve<'a>, f64) -> Option<Sample<'a>>,
-    sought: fn(&Sample) -> f64,
-    as_good: impl Fn(&Sample, &Sample) -> bool,
+    given: fn(&SettingSample) -> f64,
+    of: fn(&Curve<'a>, f64) -> Option<SettingSample<'a>>,
+    sought: fn(&SettingSample) -> f64,
+    as_good: impl Fn(&SettingSample, &SettingSample) -> bool,
 ) -> Option<Slice<'a>> {
     let curves = curves(records, axis);
     // What has no logarithm has no place between round numbers.
@@ -57,7 +57,7 @@ fn slice<'a>(
 }
 
 /// From the least to the largest time or error of a solver's settings.
-fn range(curve: &Curve, given: fn(&Sample) -> f64) -> Option<[f64; 2]> {
+fn range(curve: &Curve, given: fn(&SettingSample) -> f64) -> Option<[f64; 2]> {
     let all = || curve.samples.iter().map(given);
     let least = all().min_by(f64::total_cmp)?;
     Some([least, all().fold(least, f64::max)])
@@ -118,7 +118,7 @@ mod tests {
             other(12.0, 0.25),
             Record { solver: "projection", ..record(8, 1, 80.0, 3.0) },
         ];
-        let at = |s: &(&'static str, Option<Sample>)| s.1.map(|s| (s.time / 1e3, s.error));
+        let at = |s: &(&'static str, Option<SettingSample>)| s.1.map(|s| (s.time / 1e3, s.error));
         // 20 µs: the second setting of pgs is not done, and projection has none that is. That of
         // soft_step was done long ago.
         let time = equal_time(&records, ErrorAxis::Penetration).unwrap();

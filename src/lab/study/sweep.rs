@@ -20,20 +20,20 @@ use std::str::FromStr;
 const MOST: usize = 100;
 
 /// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
-const QUANTITIES: [(&str, &str, Kind); 8] = [
-    ("substeps", "", Kind::Substeps),
-    ("iterations", "", Kind::Iterations),
-    ("velocity_iterations", "", Kind::Velocity),
-    ("relax_iterations", "", Kind::Relax),
-    ("position_iterations", "", Kind::Position),
-    ("dt", "s", Kind::Dt),
-    ("friction", "", Kind::Friction),
-    ("mass_ratio", "", Kind::MassRatio),
+const QUANTITIES: [(&str, &str, QuantityKind); 8] = [
+    ("substeps", "", QuantityKind::Substeps),
+    ("iterations", "", QuantityKind::Iterations),
+    ("velocity_iterations", "", QuantityKind::Velocity),
+    ("relax_iterations", "", QuantityKind::Relax),
+    ("position_iterations", "", QuantityKind::Position),
+    ("dt", "s", QuantityKind::Dt),
+    ("friction", "", QuantityKind::Friction),
+    ("mass_ratio", "", QuantityKind::MassRatio),
 ];
 
 /// Whose quantity it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum QuantityKind {
     /// A parameter of solvers.
     Parameter,
     /// [`Budget::substeps`]
@@ -56,7 +56,7 @@ enum Kind {
 
 /// The quantity and its values, ascending.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Sweep {
+pub struct QuantitySweep {
     /// In `snake_case`.
     pub name: &'static str,
     /// Empty for a pure number.
@@ -64,7 +64,7 @@ pub struct Sweep {
     /// Each once.
     pub values: Vec<f64>,
     #[serde(skip)]
-    kind: Kind,
+    kind: QuantityKind,
 }
 
 /// The swept quantity of one record.
@@ -86,7 +86,7 @@ impl Display for Swept {
     }
 }
 
-impl FromStr for Sweep {
+impl FromStr for QuantitySweep {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
@@ -97,7 +97,8 @@ impl FromStr for Sweep {
         let parameters = || VARIANTS.iter().flat_map(|v| v.parameters);
         let snake = given.trim().replace('-', "_");
         let fixed = QUANTITIES.into_iter().find(|q| q.0 == snake);
-        let own = || parameters().find(|p| p.name == snake).map(|p| (p.name, p.unit, Kind::Parameter));
+        let own =
+            || parameters().find(|p| p.name == snake).map(|p| (p.name, p.unit, QuantityKind::Parameter));
         let Some((name, unit, kind)) = fixed.or_else(own) else {
             let mut known: Vec<&str> = QUANTITIES.iter().map(|q| q.0).collect();
             for parameter in parameters() {
@@ -116,7 +117,7 @@ impl FromStr for Sweep {
             quantity("sweep", value, if plain { "" } else { unit })
         };
         let mut values = values.split(',').map(read).collect::<Result<Vec<f64>, Error>>()?;
-        let is_count = !matches!(kind, Kind::Parameter | Kind::Dt | Kind::Friction);
+        let is_count = !matches!(kind, QuantityKind::Parameter | QuantityKind::Dt | QuantityKind::Friction);
         if let Some(broken) = values.iter().find(|v| is_count && (v.fract() != 0.0 || **v > 1e9)) {
             return Err(refuse(format!("{broken} is not a whole number, which {name} is")));
         }
@@ -125,11 +126,11 @@ impl FromStr for Sweep {
         if values.len() > MOST {
             return Err(refuse(format!("{} values, where at most {MOST} are possible", values.len())));
         }
-        Ok(Sweep { name, unit, values, kind })
+        Ok(QuantitySweep { name, unit, values, kind })
     }
 }
 
-impl Sweep {
+impl QuantitySweep {
     /// One after the other.
     pub fn points(&self) -> impl Iterator<Item = Swept> {
         self.values.iter().map(|&value| Swept { name: self.name, unit: self.unit, value })
@@ -138,12 +139,14 @@ impl Sweep {
     /// Whether the quantity is one that this solver has, or is the scene's.
     pub fn concerns(&self, variant: &Variant) -> bool {
         match self.kind {
-            Kind::Parameter => variant.parameter(self.name).is_ok(),
-            Kind::Velocity => variant.uses.velocity,
-            Kind::Relax => variant.uses.relax,
-            Kind::Position => variant.uses.position,
-            Kind::Iterations => variant.uses.velocity || variant.uses.position,
-            Kind::Substeps | Kind::Dt | Kind::Friction | Kind::MassRatio => true,
+            QuantityKind::Parameter => variant.parameter(self.name).is_ok(),
+            QuantityKind::Velocity => variant.uses.velocity,
+            QuantityKind::Relax => variant.uses.relax,
+            QuantityKind::Position => variant.uses.position,
+            QuantityKind::Iterations => variant.uses.velocity || variant.uses.position,
+            QuantityKind::Substeps | QuantityKind::Dt | QuantityKind::Friction | QuantityKind::MassRatio => {
+                true
+            }
         }
     }
 
@@ -152,10 +155,14 @@ impl Sweep {
     /// Errors: a list of several values, or of the swept quantity.
     pub fn check_grid(&self, grid: &BudgetGrid) -> Result<(), Error> {
         let lists = [
-            ("substeps", &grid.substeps, &[Kind::Substeps][..]),
-            ("velocity-iterations", &grid.velocity_iterations, &[Kind::Velocity, Kind::Iterations]),
-            ("relax-iterations", &grid.relax_iterations, &[Kind::Relax]),
-            ("position-iterations", &grid.position_iterations, &[Kind::Position]),
+            ("substeps", &grid.substeps, &[QuantityKind::Substeps][..]),
+            (
+                "velocity-iterations",
+                &grid.velocity_iterations,
+                &[QuantityKind::Velocity, QuantityKind::Iterations],
+            ),
+            ("relax-iterations", &grid.relax_iterations, &[QuantityKind::Relax]),
+            ("position-iterations", &grid.position_iterations, &[QuantityKind::Position]),
         ];
         for (option, list, kinds) in lists {
             if list.len() > 1 {
@@ -173,13 +180,17 @@ impl Sweep {
     pub fn budget(&self, value: f64, budget: Budget, variant: &Variant) -> Result<Budget, Error> {
         let count = value as u32;
         let changed = match self.kind {
-            Kind::Substeps => Budget { substeps: count, ..budget },
-            Kind::Velocity => Budget { velocity_iterations: count, ..budget },
-            Kind::Relax => Budget { relax_iterations: count, ..budget },
-            Kind::Position => Budget { position_iterations: count, ..budget },
-            Kind::Iterations if variant.uses.velocity => Budget { velocity_iterations: count, ..budget },
-            Kind::Iterations => Budget { position_iterations: count, ..budget },
-            Kind::Parameter | Kind::Dt | Kind::Friction | Kind::MassRatio => budget,
+            QuantityKind::Substeps => Budget { substeps: count, ..budget },
+            QuantityKind::Velocity => Budget { velocity_iterations: count, ..budget },
+            QuantityKind::Relax => Budget { relax_iterations: count, ..budget },
+            QuantityKind::Position => Budget { position_iterations: count, ..budget },
+            QuantityKind::Iterations if variant.uses.velocity => {
+                Budget { velocity_iterations: count, ..budget }
+            }
+            QuantityKind::Iterations => Budget { position_iterations: count, ..budget },
+            QuantityKind::Parameter | QuantityKind::Dt | QuantityKind::Friction | QuantityKind::MassRatio => {
+                budget
+            }
         };
         budget::check(&changed, variant)?;
         Ok(changed)
@@ -188,14 +199,14 @@ impl Sweep {
     /// `parameters` at this value. Errors: a value out of the parameter's range.
     pub fn set(&self, value: f64, parameters: &mut Parameters, variant: &Variant) -> Result<(), Error> {
         match self.kind {
-            Kind::Parameter => Ok(variant.set(parameters, self.name, value as f32)?),
+            QuantityKind::Parameter => Ok(variant.set(parameters, self.name, value as f32)?),
             _ => Ok(()),
         }
     }
 
     /// The name that opens the scene at this value. Errors: a scene that does not have the quantity.
     pub fn scene_name(&self, value: f64, name: &str) -> Result<String, Error> {
-        if self.kind != Kind::MassRatio {
+        if self.kind != QuantityKind::MassRatio {
             return Ok(name.to_string());
         }
         let (stem, _) = name.split_once(':').unwrap_or((name, ""));
@@ -211,20 +222,20 @@ impl Sweep {
 
     /// Length of a step (s) at this value, where it is what varies.
     pub fn dt(&self, value: f64) -> Option<f64> {
-        (self.kind == Kind::Dt).then_some(value)
+        (self.kind == QuantityKind::Dt).then_some(value)
     }
 
     /// The scene at this value, as it is compared with those at others: under one name, and with what is
     /// known about it where that still holds.
     pub fn adapt(&self, value: f64, mut loaded: Loaded) -> Loaded {
         match self.kind {
-            Kind::Friction => {
+            QuantityKind::Friction => {
                 let shapes = loaded.scene.bodies.iter_mut().flat_map(|b| &mut b.shapes);
                 shapes.for_each(|shape| shape.friction = value);
                 loaded.truth = None;
                 loaded.tolerances.truth = None;
             }
-            Kind::MassRatio => {
+            QuantityKind::MassRatio => {
                 let stem = loaded.scene.name.split(':').next().unwrap_or_default();
                 loaded.scene.name = stem.to_string();
             }
@@ -271,7 +282,7 @@ mod tests {
     use super::*;
     use crate::engine::solvers::find;
 
-    fn sweep(text: &str) -> Sweep {
+    fn sweep(text: &str) -> QuantitySweep {
         text.parse().unwrap()
     }
 
@@ -285,7 +296,7 @@ mod tests {
 
     #[test]
     fn what_is_no_sweep_is_refused_with_its_text() {
-        let message = |text: &str| text.parse::<Sweep>().unwrap_err().to_string();
+        let message = |text: &str| text.parse::<QuantitySweep>().unwrap_err().to_string();
         assert!(message("contact-hertz").contains("'contact-hertz' is not NAME=VALUE"));
         assert_eq!(message("dt="), "sweep: the list of values of dt is empty");
         let unknown = message("contact-herz=30");

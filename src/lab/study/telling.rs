@@ -2,14 +2,14 @@
 
 use super::answer::Answer;
 use super::curve::solvers_of;
-use super::{Cell, Record, StudyPlan, settings};
+use super::{ErrorCell, Record, StudyPlan, settings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::Watch;
+use crate::lab::scenes::holds::HoldWatch;
 use crate::lab::units::lanes;
 use std::cmp::Reverse;
 
@@ -84,15 +84,23 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     };
     let Record { impacts, budget, .. } = *record;
     let parameters = overrides::of_words(solver, &record.parameters)?;
-    let cell =
-        Cell { scene: [0; 2], swept: None, name, solver, impacts, budget, parameters, widest_alone: false };
+    let cell = ErrorCell {
+        scene: [0; 2],
+        swept: None,
+        name,
+        solver,
+        impacts,
+        budget,
+        parameters,
+        widest_alone: false,
+    };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
     let mut recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
-    let mut watch = Watch::new(&world, demands);
+    let mut watch = HoldWatch::new(&world, demands);
     for _ in 0..scene.steps {
         if let Err(divergence) = world.step() {
             return recorder.finish(&format!("blew up at step {}", divergence.step));

@@ -1,7 +1,7 @@
 //! Ten kinds of scenes that are hard in ten ways, each drawn from a seed.
 
 use super::shapes::{body, capsule, driven, log_range, of_density, of_surface, once_in};
-use super::{Case, Room};
+use super::{Room, TortureCase};
 use crate::lab::scenes::{Scene, SceneBody, SceneShape};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -54,7 +54,7 @@ pub const FAMILIES: &[Family] = &[
 
 impl Family {
     /// Scene `number` of a campaign with this seed. The same for ever: what was drawn before does not matter.
-    pub fn case(&self, seed: u64, number: u32) -> Case {
+    pub fn case(&self, seed: u64, number: u32) -> TortureCase {
         let place = FAMILIES.iter().position(|f| f.name == self.name).unwrap_or(0) as u64;
         // Neighbors in any of the three begin far apart: odd factors of a Weyl sequence.
         let mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -66,7 +66,7 @@ impl Family {
         all.extend(bodies);
         let steps = (seconds / dt).round().max(1.0) as u32;
         let scene = Scene { gravity: [0.0, -gravity], dt, steps, ..Scene::new(name, all) };
-        Case { family: self.name, number, scene, room, rests, substeps }
+        TortureCase { family: self.name, number, scene, room, rests, substeps }
     }
 }
 

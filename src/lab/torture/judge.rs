@@ -1,6 +1,6 @@
 //! Looks at a run from outside, at its poses alone.
 
-use super::{Case, Engine, Fault, Outcome, Room, Verdict};
+use super::{CaseOutcome, Engine, Fault, Room, TortureCase, TortureVerdict};
 use crate::engine::bodies::BodyKind;
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::{Settings, World};
@@ -49,7 +49,7 @@ pub struct Ledger {
 
 /// Watches one run.
 pub struct Judge<'c> {
-    case: &'c Case,
+    case: &'c TortureCase,
     /// Of the case's scene; never stepped, holds masses and shapes, and poses when overlaps are looked for.
     mirror: World,
     bodies: Vec<BodyState>,
@@ -59,12 +59,12 @@ pub struct Judge<'c> {
     /// Speeds (m/s) and energies of motion (J) over the step before.
     before: Vec<[f64; 2]>,
     paths: Vec<(DVec2, f64)>,
-    outcome: Outcome,
+    outcome: CaseOutcome,
 }
 
 impl<'c> Judge<'c> {
     /// Before the first step. Errors: a scene that is not valid.
-    pub fn new(case: &'c Case) -> Result<Self, Error> {
+    pub fn new(case: &'c TortureCase) -> Result<Self, Error> {
         let mirror = case.scene.build(Settings::new(find(DEFAULT)?))?;
         let gravity = DVec2::from(case.scene.gravity);
         let bodies: Vec<_> =
@@ -76,14 +76,24 @@ impl<'c> Judge<'c> {
         let ledger = ledger(case, &mirror, &bodies, &reaches);
         let paths = bodies.iter().map(|b| (b.position, 0.0)).collect();
         let before = vec![[0.0; 2]; bodies.len()];
-        Ok(Judge { case, mirror, bodies, ledger, reach, step: 0, before, paths, outcome: Outcome::default() })
+        Ok(Judge {
+            case,
+            mirror,
+            bodies,
+            ledger,
+            reach,
+            step: 0,
+            before,
+            paths,
+            outcome: CaseOutcome::default(),
+        })
     }
 
     /// Looks at one more step; whether the run is worth going on with.
     pub fn observe(&mut self, engine: &dyn Engine, is_well: bool) -> bool {
         self.step += 1;
         if !is_well {
-            self.fault(Verdict::Diverged, None);
+            self.fault(TortureVerdict::Diverged, None);
             return false;
         }
         let dt = self.case.scene.dt;
@@ -94,7 +104,7 @@ impl<'c> Judge<'c> {
             }
             let [position, rotation] = engine.pose(i).map(DVec2::from);
             if !position.is_finite() || !rotation.is_finite() {
-                self.fault(Verdict::Diverged, Some(i));
+                self.fault(TortureVerdict::Diverged, Some(i));
                 return false;
             }
             let body = &mut self.bodies[i];
@@ -108,13 +118,13 @@ impl<'c> Judge<'c> {
             self.before[i] = now;
             total += kinetic + height_energy(&self.case.room, body, 0.5 * (position + was.position));
             if speed > FLUNG * self.ledger.speed {
-                self.fault(Verdict::Flung, Some(i));
+                self.fault(TortureVerdict::Flung, Some(i));
             }
             let Room { low, high, wall } = self.case.room;
             let gone =
                 (0..2).any(|k| position[k] < low[k] - 0.5 * wall || position[k] > high[k] + 0.5 * wall);
             if gone {
-                self.fault(Verdict::Escaped, Some(i));
+                self.fault(TortureVerdict::Escaped, Some(i));
             }
             let last_second = f64::from(self.case.scene.steps - self.step) * dt < 1.0;
             if self.step.is_multiple_of(STRIDE) {
@@ -128,28 +138,28 @@ impl<'c> Judge<'c> {
             self.outcome.energy = self.outcome.energy.max(total / self.ledger.lent);
         }
         if self.outcome.energy > ENERGY {
-            self.fault(Verdict::Energy, None);
+            self.fault(TortureVerdict::Energy, None);
         }
         true
     }
 
     /// What was found.
-    pub fn finish(mut self) -> Outcome {
-        if self.outcome.has(Verdict::Diverged) {
+    pub fn finish(mut self) -> CaseOutcome {
+        if self.outcome.has(TortureVerdict::Diverged) {
             return self.outcome;
         }
         let seconds = f64::min(1.0, f64::from(self.step) * self.case.scene.dt);
         self.outcome.rest_speed = self.paths.iter().map(|p| p.1).fold(0.0, f64::max) / seconds;
         let gravity = DVec2::from(self.case.scene.gravity).length();
         if self.case.rests && self.outcome.rest_speed > RESTLESS * (gravity * self.reach).sqrt() {
-            self.fault(Verdict::Restless, None);
+            self.fault(TortureVerdict::Restless, None);
         }
         // What a piston presses has nowhere to go.
         let is_driven = self.bodies.iter().any(|b| b.kind == BodyKind::Kinematic);
         let (depth, body) = self.deepest();
         self.outcome.depth = depth;
         if depth > SUNK && !is_driven {
-            self.fault(Verdict::Sunk, Some(body));
+            self.fault(TortureVerdict::Sunk, Some(body));
         }
         self.outcome.faults.sort_by_key(|f| f.verdict);
         self.outcome
@@ -178,7 +188,7 @@ impl<'c> Judge<'c> {
         deepest
     }
 
-    fn fault(&mut self, verdict: Verdict, body: Option<usize>) {
+    fn fault(&mut self, verdict: TortureVerdict, body: Option<usize>) {
         if !self.outcome.has(verdict) {
             self.outcome.faults.push(Fault { verdict, step: self.step, body });
         }
@@ -205,7 +215,7 @@ fn reaches(world: &World) -> Vec<f64> {
 }
 
 /// See [`Ledger`].
-fn ledger(case: &Case, mirror: &World, bodies: &[BodyState], reaches: &[f64]) -> Ledger {
+fn ledger(case: &TortureCase, mirror: &World, bodies: &[BodyState], reaches: &[f64]) -> Ledger {
     let room = &case.room;
     let height = room.high[1] - room.low[1];
     let driven = |(b, reach): (&BodyState, &f64)| match b.kind {
@@ -250,16 +260,16 @@ mod tests {
     }
 
     /// A disc of 0.5 m that rests on the floor of a room of 8 × 4 m with walls of 1 m.
-    fn judged(way: impl Fn(u32) -> [f64; 2]) -> Outcome {
+    fn judged(way: impl Fn(u32) -> [f64; 2]) -> CaseOutcome {
         let room = Room::new(0.0, 4.0, 4.0, 1.0);
         let mut bodies = room.walls();
         bodies.push(SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5)));
         let scene = Scene::new("x", bodies).steps(120);
-        let case = Case { family: "drops", number: 0, scene, room, rests: true, substeps: None };
+        let case = TortureCase { family: "drops", number: 0, scene, room, rests: true, substeps: None };
         run(&case, &mut Led(0, way)).unwrap()
     }
 
-    fn verdicts(way: impl Fn(u32) -> [f64; 2]) -> Vec<Verdict> {
+    fn verdicts(way: impl Fn(u32) -> [f64; 2]) -> Vec<TortureVerdict> {
         judged(way).faults.iter().map(|f| f.verdict).collect()
     }
 
@@ -268,13 +278,13 @@ mod tests {
         assert_eq!(verdicts(|_| [0.0, 0.5]), []);
         // √(g ℓ) = 2.24 m/s, so 11 mm/s are allowed.
         assert_eq!(verdicts(|k| [0.010 / 60.0 * f64::from(k), 0.5]), []);
-        assert_eq!(verdicts(|k| [0.013 / 60.0 * f64::from(k), 0.5]), [Verdict::Restless]);
-        assert_eq!(verdicts(|_| [0.0, 0.24]), [Verdict::Sunk]);
+        assert_eq!(verdicts(|k| [0.013 / 60.0 * f64::from(k), 0.5]), [TortureVerdict::Restless]);
+        assert_eq!(verdicts(|_| [0.0, 0.24]), [TortureVerdict::Sunk]);
         assert_eq!(verdicts(|_| [0.0, 0.26]), []);
-        assert_eq!(verdicts(|_| [f64::NAN, 0.5]), [Verdict::Diverged]);
+        assert_eq!(verdicts(|_| [f64::NAN, 0.5]), [TortureVerdict::Diverged]);
         // In the middle of the wall and beyond.
-        assert!(!verdicts(|_| [4.49, 0.5]).contains(&Verdict::Escaped));
-        assert!(verdicts(|_| [4.51, 0.5]).contains(&Verdict::Escaped));
+        assert!(!verdicts(|_| [4.49, 0.5]).contains(&TortureVerdict::Escaped));
+        assert!(verdicts(|_| [4.51, 0.5]).contains(&TortureVerdict::Escaped));
     }
 
     #[test]
@@ -286,9 +296,9 @@ mod tests {
         let slide = |speed: f64| move |k: u32| [speed / 60.0 * f64::from(k.min(20)), 0.5];
         // ½ v² = 2.5 J/kg at 2.236 m/s.
         assert_eq!(verdicts(slide(2.2)), []);
-        assert_eq!(verdicts(slide(2.3)), [Verdict::Energy]);
+        assert_eq!(verdicts(slide(2.3)), [TortureVerdict::Energy]);
         // √(2 g 4 m) = 8.94 m/s; four times that is too fast for one step after another.
-        assert!(verdicts(|k| [40.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&Verdict::Flung));
-        assert!(!verdicts(|k| [35.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&Verdict::Flung));
+        assert!(verdicts(|k| [40.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&TortureVerdict::Flung));
+        assert!(!verdicts(|k| [35.0 / 60.0 * f64::from(k.min(5)), 0.5]).contains(&TortureVerdict::Flung));
     }
 }

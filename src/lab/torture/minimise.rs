@@ -1,6 +1,6 @@
 //! The smallest scene that still fails.
 
-use super::{Case, Outcome, Verdict};
+use super::{CaseOutcome, TortureCase, TortureVerdict};
 use crate::engine::bodies::BodyKind;
 use crate::lab::error::Error;
 
@@ -15,12 +15,12 @@ const AFTER: u32 = 10;
 ///
 /// Source: Zeller, Hildebrandt 2002 (delta debugging).
 pub fn minimise(
-    case: &Case,
-    verdict: Verdict,
-    mut run: impl FnMut(&Case) -> Result<Outcome, Error>,
-) -> Result<Case, Error> {
+    case: &TortureCase,
+    verdict: TortureVerdict,
+    mut run: impl FnMut(&TortureCase) -> Result<CaseOutcome, Error>,
+) -> Result<TortureCase, Error> {
     let mut runs = 0;
-    let mut fails = |case: &Case| -> Result<Option<u32>, Error> {
+    let mut fails = |case: &TortureCase| -> Result<Option<u32>, Error> {
         runs += 1;
         if runs > MOST_RUNS {
             return Ok(None);
@@ -30,7 +30,7 @@ pub fn minimise(
     };
     let mut best = case.clone();
     // What is judged at the end needs its time.
-    let shortens = !matches!(verdict, Verdict::Sunk | Verdict::Restless);
+    let shortens = !matches!(verdict, TortureVerdict::Sunk | TortureVerdict::Restless);
     if let Some(step) = fails(&best)?.filter(|_| shortens) {
         best.scene.steps = best.scene.steps.min(step + AFTER);
     }
@@ -59,7 +59,7 @@ pub fn minimise(
 }
 
 /// Bodies that may be left out: walls are the room.
-fn removable(case: &Case) -> Vec<usize> {
+fn removable(case: &TortureCase) -> Vec<usize> {
     let bodies = case.scene.bodies.iter().enumerate();
     bodies.filter(|(_, b)| b.kind != BodyKind::Static).map(|(i, _)| i).collect()
 }
@@ -75,14 +75,14 @@ mod tests {
         let bodies = &case.scene.bodies;
         assert!(bodies.len() > 12, "{}", bodies.len());
         let culprits = [bodies[5].clone(), bodies[bodies.len() - 1].clone()];
-        let run = |case: &Case| {
-            let mut outcome = Outcome::default();
+        let run = |case: &TortureCase| {
+            let mut outcome = CaseOutcome::default();
             if culprits.iter().all(|c| case.scene.bodies.contains(c)) {
-                outcome.faults.push(Fault { verdict: Verdict::Flung, step: 30, body: None });
+                outcome.faults.push(Fault { verdict: TortureVerdict::Flung, step: 30, body: None });
             }
             Ok(outcome)
         };
-        let least = minimise(&case, Verdict::Flung, run).unwrap();
+        let least = minimise(&case, TortureVerdict::Flung, run).unwrap();
         assert_eq!(least.scene.bodies[4..], culprits);
         assert_eq!(least.scene.steps, 40);
     }

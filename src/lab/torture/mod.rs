@@ -35,7 +35,7 @@ use std::time::Instant;
 
 /// A scene with its conditions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Case {
+pub struct TortureCase {
     /// [`Family::name`].
     pub family: &'static str,
     /// Number of the scene in its family, from 0.
@@ -72,7 +72,7 @@ pub trait Engine {
 /// Failures, in order of precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum TortureVerdict {
     /// A speed or a place out of all bounds.
     Diverged,
     /// More energy than was lent.
@@ -87,26 +87,26 @@ pub enum Verdict {
     Restless,
 }
 
-impl Verdict {
+impl TortureVerdict {
     /// Every verdict.
-    pub const ALL: [Verdict; 6] = [
-        Verdict::Diverged,
-        Verdict::Energy,
-        Verdict::Flung,
-        Verdict::Escaped,
-        Verdict::Sunk,
-        Verdict::Restless,
+    pub const ALL: [TortureVerdict; 6] = [
+        TortureVerdict::Diverged,
+        TortureVerdict::Energy,
+        TortureVerdict::Flung,
+        TortureVerdict::Escaped,
+        TortureVerdict::Sunk,
+        TortureVerdict::Restless,
     ];
 
     /// For tables.
     pub fn word(self) -> &'static str {
         match self {
-            Verdict::Diverged => "diverged",
-            Verdict::Energy => "energy",
-            Verdict::Flung => "flung",
-            Verdict::Escaped => "escaped",
-            Verdict::Sunk => "sunk",
-            Verdict::Restless => "restless",
+            TortureVerdict::Diverged => "diverged",
+            TortureVerdict::Energy => "energy",
+            TortureVerdict::Flung => "flung",
+            TortureVerdict::Escaped => "escaped",
+            TortureVerdict::Sunk => "sunk",
+            TortureVerdict::Restless => "restless",
         }
     }
 }
@@ -115,7 +115,7 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
     /// What happened.
-    pub verdict: Verdict,
+    pub verdict: TortureVerdict,
     /// First step at which it was seen, from 1.
     pub step: u32,
     /// The body, where it is about one.
@@ -124,7 +124,7 @@ pub struct Fault {
 
 /// Result of a scene under a solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Outcome {
+pub struct CaseOutcome {
     /// The first of each verdict, in their order.
     pub faults: Vec<Fault>,
     /// Most energy ever, in what was lent (1).
@@ -139,21 +139,21 @@ pub struct Outcome {
     pub late: u32,
 }
 
-impl Outcome {
+impl CaseOutcome {
     /// Whether anything forbidden happened.
     pub fn fails(&self) -> bool {
         !self.faults.is_empty()
     }
 
     /// Whether this did.
-    pub fn has(&self, verdict: Verdict) -> bool {
+    pub fn has(&self, verdict: TortureVerdict) -> bool {
         self.faults.iter().any(|f| f.verdict == verdict)
     }
 }
 
 /// One scene under one solver.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Row {
+pub struct TortureRow {
     /// Of the campaign.
     pub seed: u64,
     /// [`Family::name`].
@@ -163,7 +163,7 @@ pub struct Row {
     /// The solver, with options that differ from its defaults.
     pub solver: String,
     /// Its result.
-    pub outcome: Outcome,
+    pub outcome: CaseOutcome,
 }
 
 /// Which scenes of a campaign.
@@ -195,7 +195,7 @@ pub fn family(name: &str) -> Result<&'static Family, Error> {
 }
 
 /// Runs a case from start to end, or to where it diverges. Errors: a scene that is not valid.
-pub fn run(case: &Case, engine: &mut dyn Engine) -> Result<Outcome, Error> {
+pub fn run(case: &TortureCase, engine: &mut dyn Engine) -> Result<CaseOutcome, Error> {
     let mut judge = Judge::new(case)?;
     let (budget, mut slowest, mut late) = (1e3 * case.scene.dt, 0.0_f64, 0);
     for _ in 0..case.scene.steps {
@@ -208,18 +208,18 @@ pub fn run(case: &Case, engine: &mut dyn Engine) -> Result<Outcome, Error> {
             break;
         }
     }
-    Ok(Outcome { slowest_ms: slowest, late, ..judge.finish() })
+    Ok(CaseOutcome { slowest_ms: slowest, late, ..judge.finish() })
 }
 
 /// Runs a case under one of this crate's solvers. Errors: a scene that is not valid.
-pub fn run_solver(case: &Case, settings: &Settings) -> Result<Outcome, Error> {
+pub fn run_solver(case: &TortureCase, settings: &Settings) -> Result<CaseOutcome, Error> {
     let mut settings = settings.clone();
     settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
     run(case, &mut Own(case.scene.build(settings)?))
 }
 
 /// Substeps that a solver takes in a case; one that takes a single one by design keeps it.
-pub fn substeps(case: &Case, solver: &Variant, own: u32) -> u32 {
+pub fn substeps(case: &TortureCase, solver: &Variant, own: u32) -> u32 {
     case.substeps.filter(|_| solver.budget.substeps > 1).unwrap_or(own)
 }
 
@@ -256,11 +256,12 @@ mod tests {
     fn a_run_is_the_same_twice_and_its_rows_survive_a_file() {
         let case = FAMILIES[0].case(7, 3);
         let settings = Settings::new(find("soft_step").unwrap());
-        let still = |o: Outcome| Outcome { slowest_ms: 0.0, late: 0, ..o };
+        let still = |o: CaseOutcome| CaseOutcome { slowest_ms: 0.0, late: 0, ..o };
         let [a, b] = [0, 1].map(|_| still(run_solver(&case, &settings).unwrap()));
         assert_eq!(a, b);
-        let row = Row { seed: 7, family: "drops".into(), number: 3, solver: "soft_step".into(), outcome: a };
+        let row =
+            TortureRow { seed: 7, family: "drops".into(), number: 3, solver: "soft_step".into(), outcome: a };
         let text = serde_json::to_string(&row).unwrap();
-        assert_eq!(serde_json::from_str::<Row>(&text).unwrap(), row);
+        assert_eq!(serde_json::from_str::<TortureRow>(&text).unwrap(), row);
     }
 }

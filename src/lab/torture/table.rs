@@ -1,12 +1,12 @@
 //! Campaigns in numbers: a line per family and solver.
 
 use super::families::FAMILIES;
-use super::{Row, Verdict};
+use super::{TortureRow, TortureVerdict};
 use crate::lab::report::table::{finish, table};
 
 /// What a family's scenes were under one solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Line {
+pub struct FamilyLine {
     /// Name, or `all`.
     pub family: String,
     /// Who ran them.
@@ -15,8 +15,8 @@ pub struct Line {
     pub scenes: u32,
     /// Scenes with a fault.
     pub failed: u32,
-    /// Scenes with each fault, in the order of [`Verdict::ALL`].
-    pub faults: [u32; Verdict::ALL.len()],
+    /// Scenes with each fault, in the order of [`TortureVerdict::ALL`].
+    pub faults: [u32; TortureVerdict::ALL.len()],
     /// Most energy, in what was lent.
     pub energy: f64,
     /// Deepest overlap at an end, in half the width of the thinner shape.
@@ -28,16 +28,17 @@ pub struct Line {
 }
 
 /// Every family in order, each under every solver, and all families together.
-pub fn lines(rows: &[Row], solvers: &[String]) -> Vec<Line> {
+pub fn lines(rows: &[TortureRow], solvers: &[String]) -> Vec<FamilyLine> {
     let mut lines = Vec::new();
     for family in FAMILIES.iter().map(|f| f.name).chain(["all"]) {
         for solver in solvers {
-            let mut line = Line { family: family.into(), solver: solver.clone(), ..Line::default() };
-            let own = |row: &&Row| row.solver == *solver && (row.family == family || family == "all");
-            for Row { outcome, .. } in rows.iter().filter(own) {
+            let mut line =
+                FamilyLine { family: family.into(), solver: solver.clone(), ..FamilyLine::default() };
+            let own = |row: &&TortureRow| row.solver == *solver && (row.family == family || family == "all");
+            for TortureRow { outcome, .. } in rows.iter().filter(own) {
                 line.scenes += 1;
                 line.failed += u32::from(outcome.fails());
-                for (count, verdict) in line.faults.iter_mut().zip(Verdict::ALL) {
+                for (count, verdict) in line.faults.iter_mut().zip(TortureVerdict::ALL) {
                     *count += u32::from(outcome.has(verdict));
                 }
                 line.energy = line.energy.max(outcome.energy);
@@ -54,9 +55,9 @@ pub fn lines(rows: &[Row], solvers: &[String]) -> Vec<Line> {
 }
 
 /// The lines as a table.
-pub fn text(lines: &[Line]) -> String {
+pub fn text(lines: &[FamilyLine]) -> String {
     let mut head = vec!["family", "solver", "scenes", "failed"];
-    head.extend(Verdict::ALL.map(Verdict::word));
+    head.extend(TortureVerdict::ALL.map(TortureVerdict::word));
     head.extend(["energy/lent", "depth", "slowest ms", "late"]);
     let mut table = table(&head);
     let mut last = "";
@@ -81,23 +82,23 @@ pub fn text(lines: &[Line]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::torture::{Fault, Outcome};
+    use crate::lab::torture::{CaseOutcome, Fault};
 
     #[test]
     fn lines_count_scenes_once_and_faults_each() {
-        let row = |family: &str, verdicts: &[Verdict], energy: f64| Row {
+        let row = |family: &str, verdicts: &[TortureVerdict], energy: f64| TortureRow {
             seed: 1,
             family: family.into(),
             number: 0,
             solver: "a".into(),
-            outcome: Outcome {
+            outcome: CaseOutcome {
                 faults: verdicts.iter().map(|&verdict| Fault { verdict, step: 1, body: None }).collect(),
                 energy,
-                ..Outcome::default()
+                ..CaseOutcome::default()
             },
         };
         let rows = [
-            row("drops", &[Verdict::Energy, Verdict::Flung], 9.0),
+            row("drops", &[TortureVerdict::Energy, TortureVerdict::Flung], 9.0),
             row("drops", &[], 1.0),
             row("far", &[], 1.0),
         ];

@@ -1,6 +1,6 @@
 //! Tools of the cases: worlds of one solver, and measurements of their state in `f64`.
 
-use super::{Failure, Finding, Sweep, SweepRow};
+use super::{Failure, Finding, ParameterSweep, SweepRow};
 use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::Impacts;
 use crate::engine::contacts::Contact;
@@ -321,7 +321,7 @@ pub(super) fn sweep(
     }
     let held = rows.iter().take_while(|row| row.holds).last().map_or(0.0, |row| row.value);
     let all = values.last().copied().unwrap_or(0.0);
-    Ok(Finding { sweep: Some(Sweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
+    Ok(Finding { sweep: Some(ParameterSweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
 }
 
 /// Ground at height 0 of friction µ: a line of half length `half` (m).

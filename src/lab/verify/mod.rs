@@ -85,7 +85,7 @@ mod table;
 mod together;
 
 pub use lab::Lab;
-pub use runner::{Cell, Matrix, Progress, run, select};
+pub use runner::{CaseProgress, Cell, VerifyMatrix, run, select};
 pub use table::CASES;
 
 use crate::engine::solvers::Variant;
@@ -139,10 +139,10 @@ pub struct Case {
     /// The solvers whose own law the reference value follows.
     pub law_of: LawOf,
     /// Runs the case.
-    pub measure: Measure,
+    pub measure: MeasureFn,
 }
 
-type Measure = fn(&Lab) -> Result<Finding, Failure>;
+type MeasureFn = fn(&Lab) -> Result<Finding, Failure>;
 
 impl Case {
     const fn new(
@@ -150,7 +150,7 @@ impl Case {
         summary: &'static str,
         unit: &'static str,
         tolerance: &'static str,
-        measure: Measure,
+        measure: MeasureFn,
         required: Required,
     ) -> Self {
         Case { id, summary, unit, tolerance, required, law_of: LawOf::Everyone, measure }
@@ -193,19 +193,19 @@ pub struct Finding {
     /// Further remarks; often empty.
     pub note: String,
     /// If the reference value is a threshold, the sweep that found it.
-    pub sweep: Option<Sweep>,
+    pub sweep: Option<ParameterSweep>,
 }
 
 /// A parameter tried value by value.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Sweep {
+pub struct ParameterSweep {
     /// Its name, with its unit.
     pub parameter: &'static str,
     /// In the order tried.
     pub rows: Vec<SweepRow>,
 }
 
-/// A row of a [`Sweep`].
+/// A row of a [`ParameterSweep`].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SweepRow {
     /// Of the parameter.

@@ -30,7 +30,7 @@ impl Cell {
 }
 
 /// All results.
-pub struct Matrix {
+pub struct VerifyMatrix {
     /// Rows.
     pub cases: Vec<&'static Case>,
     /// Columns.
@@ -39,7 +39,7 @@ pub struct Matrix {
     pub cells: Vec<Vec<Cell>>,
 }
 
-impl Matrix {
+impl VerifyMatrix {
     /// Ids of the required cases that `solver` did not pass; none where it is not in the matrix.
     pub fn broken_promises(&self, solver: &str) -> Option<Vec<&'static str>> {
         let column = self.solvers.iter().position(|s| s.name == solver)?;
@@ -72,7 +72,7 @@ pub fn select(wanted: &[String]) -> Result<Vec<&'static Case>, Error> {
 
 /// What has just begun.
 #[derive(Clone, Debug)]
-pub struct Progress {
+pub struct CaseProgress {
     /// Runs that are finished.
     pub done: usize,
     /// Runs in all.
@@ -88,8 +88,8 @@ pub fn run(
     solvers: Vec<&'static Variant>,
     threads: usize,
     lab: impl Fn(&'static Variant) -> Lab + Sync,
-    tell: &(dyn Fn(Progress) + Sync),
-) -> Matrix {
+    tell: &(dyn Fn(CaseProgress) + Sync),
+) -> VerifyMatrix {
     let total = cases.len() * solvers.len();
     let slots: Vec<Mutex<Cell>> = (0..total).map(|_| Mutex::new(Cell::Foreign)).collect();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -101,7 +101,7 @@ pub fn run(
             }
             let (case, solver) = (cases[i / solvers.len()], solvers[i % solvers.len()]);
             let what = format!("{} with {}", case.id, solver.name);
-            tell(Progress { done: done.load(Ordering::Relaxed), total, what });
+            tell(CaseProgress { done: done.load(Ordering::Relaxed), total, what });
             let cell = judge(case, &lab(solver), solver);
             // A thread that panics takes the scope down with it: no slot is read poisoned.
             if let Ok(mut slot) = slots[i].lock() {
@@ -118,7 +118,7 @@ pub fn run(
     });
     let mut all = slots.into_iter().map(|slot| slot.into_inner().unwrap_or(Cell::Foreign));
     let cells = cases.iter().map(|_| all.by_ref().take(solvers.len()).collect()).collect();
-    Matrix { cases, solvers, cells }
+    VerifyMatrix { cases, solvers, cells }
 }
 
 fn judge(case: &Case, lab: &Lab, solver: &Variant) -> Cell {

@@ -28,7 +28,7 @@ pub(super) const fn stride(points: usize) -> usize {
 }
 
 /// Finds what bounces in the coming substep.
-pub struct Begin {
+pub struct FindBounces {
     /// Substep (s).
     pub h: f32,
     /// There are no masses to give back.
@@ -40,7 +40,7 @@ pub struct Begin {
 /// One sweep over what bounces.
 pub struct BiasSweep;
 
-impl Pass for Begin {
+impl Pass for FindBounces {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let read = 3 + layout.points * (layout.arms() + 4);
         PerLane { halves: 0, ..PerLane::of_bodies(read, 3 * layout.points, opposite) }
@@ -74,7 +74,7 @@ fn begin<L: Lanes>(
     layout: &Layout,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    to: &mut Begin,
+    to: &mut FindBounces,
 ) {
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));

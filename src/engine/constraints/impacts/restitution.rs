@@ -33,7 +33,7 @@ pub struct Rebound {
 }
 
 /// Reads the speeds of approach, before anything moves.
-pub struct Begin {
+pub struct ReadApproach {
     /// What bounces.
     pub rebound: Rebound,
     /// Lane vectors of a side record.
@@ -42,7 +42,7 @@ pub struct Begin {
     pub found: f32,
 }
 
-impl Pass for Begin {
+impl Pass for ReadApproach {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let bounce = 2 * layout.points;
         let read = 2 + layout.points * (layout.arms() + 1);
@@ -94,7 +94,7 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
     batches: &mut Batches,
     bounces: &mut Bounces,
     contacts: &[Contact],
-    begin: &Begin,
+    begin: &ReadApproach,
 ) -> f32 {
     bounces.reserve(batches.lanes(), begin.stride);
     let mut most = 0.0_f32;

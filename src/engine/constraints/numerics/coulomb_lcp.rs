@@ -22,11 +22,11 @@
 //! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn). q is divided by its largest
 //! entry, which gives tolerances a meaning: the problem is homogeneous in (z, q).
 
-use crate::engine::constraints::numerics::lemke::{Outcome, lemke};
+use crate::engine::constraints::numerics::lemke::{LemkeOutcome, lemke};
 use crate::engine::constraints::numerics::matrix::Matrix;
 
-/// `[normal, tangential]` of one contact point.
-pub type Pair = [f64; 2];
+/// `[normal, tangential]` of one contact point: impulses (N·s) or velocities (m/s).
+pub type DPair = [f64; 2];
 
 /// The law of all contact points; see the [module](self).
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct CoulombLcp {
     /// Scale of q.
     unit: f64,
     /// 1/√G_ii
-    scale: Vec<Pair>,
+    scale: Vec<DPair>,
     /// The points that have friction.
     frictional: Vec<usize>,
 }
@@ -44,11 +44,16 @@ pub struct CoulombLcp {
 impl CoulombLcp {
     /// The law of points with these Coulomb coefficients. `diagonal` and `free` are G_ii (1/kg) and b (m/s) of each;
     /// `g(row, column)` are the entries of G, whose rows and columns are (n₀, t₀, n₁, t₁, …).
-    pub fn new(friction: &[f64], diagonal: &[Pair], free: &[Pair], g: impl Fn(usize, usize) -> f64) -> Self {
+    pub fn new(
+        friction: &[f64],
+        diagonal: &[DPair],
+        free: &[DPair],
+        g: impl Fn(usize, usize) -> f64,
+    ) -> Self {
         let frictional: Vec<usize> = (0..friction.len()).filter(|&i| friction[i] > 0.0).collect();
         let (points, nf) = (friction.len(), frictional.len());
         let n = points + 3 * nf;
-        let scale: Vec<Pair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
+        let scale: Vec<DPair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
         // Normal rows of all points; then β⁺ and β⁻ of each that has friction; then σ.
         // An impulse row is a (point, direction, sign); a σ row has none.
         let impulse_row = |row: usize| {
@@ -98,13 +103,13 @@ impl CoulombLcp {
     ///
     /// # Panics
     /// If `covering` is not [`Self::rows`] long.
-    pub fn solve(&self, covering: &[f64], pivots: usize) -> Result<Vec<Pair>, Outcome> {
+    pub fn solve(&self, covering: &[f64], pivots: usize) -> Result<Vec<DPair>, LemkeOutcome> {
         let z = match lemke(&self.a, &self.q, covering, pivots).outcome {
-            Outcome::Solution(z) => z,
+            LemkeOutcome::Solution(z) => z,
             other => return Err(other),
         };
         let (scale, unit, points) = (&self.scale, self.unit, self.scale.len());
-        let mut impulses: Vec<Pair> = (0..points).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
+        let mut impulses: Vec<DPair> = (0..points).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
         for (k, &i) in self.frictional.iter().enumerate() {
             impulses[i][1] = unit * scale[i][1] * (z[points + 2 * k] - z[points + 2 * k + 1]);
         }
@@ -117,7 +122,7 @@ mod tests {
     use super::*;
 
     /// A mass point of 2 kg that is pushed onto a floor, and along it by `along` (m/s), at µ = 0.5.
-    fn pushed(along: f64) -> Pair {
+    fn pushed(along: f64) -> DPair {
         let g = |row, column| if row == column { 0.5 } else { 0.0 };
         let law = CoulombLcp::new(&[0.5], &[[0.5; 2]], &[[-3.0, along]], g);
         assert_eq!(law.rows(), 4);

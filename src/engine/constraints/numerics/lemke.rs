@@ -22,7 +22,7 @@ pub const REBUILD: usize = 50;
 
 /// Outcome of Lemke's method.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum LemkeOutcome {
     /// z, with w = A z + q and the complementarity pattern that LU refined.
     Solution(Vec<f64>),
     /// No row blocks the entering variable: the method has no answer (for the matrices of frictional
@@ -38,7 +38,7 @@ pub enum Outcome {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lemke {
     /// How it ended.
-    pub outcome: Outcome,
+    pub outcome: LemkeOutcome,
     /// Pivots taken.
     pub pivots: usize,
 }
@@ -60,7 +60,7 @@ pub fn lemke(a: &Matrix, q: &[f64], d: &[f64], limit: usize) -> Lemke {
     let n = q.len();
     let end = |outcome, pivots| Lemke { outcome, pivots };
     if q.iter().all(|&x| x >= 0.0) {
-        return end(Outcome::Solution(vec![0.0; n]), 0);
+        return end(LemkeOutcome::Solution(vec![0.0; n]), 0);
     }
     let mut t = Tableau::new(a, q, d);
     // z₀ enters at the row of the lexicographically smallest (q_i, e_i)/d_i: the last of equals.
@@ -70,20 +70,20 @@ pub fn lemke(a: &Matrix, q: &[f64], d: &[f64], limit: usize) -> Lemke {
     let mut entering = complement(t.pivot(first, n), n);
     for pivots in 1..=limit {
         if pivots % REBUILD == 0 && !t.rebuild(a, q, d) {
-            return end(Outcome::Singular, pivots);
+            return end(LemkeOutcome::Singular, pivots);
         }
         let column = t.nonbasic.iter().position(|&v| v == entering).expect("complements are nonbasic");
-        let Some(row) = t.blocking_row(column) else { return end(Outcome::Ray, pivots) };
+        let Some(row) = t.blocking_row(column) else { return end(LemkeOutcome::Ray, pivots) };
         let leaving = t.pivot(row, column);
         if leaving == artificial(n) || t.value(artificial(n)) <= ZERO {
             return match t.rebuild(a, q, d) {
-                true => end(Outcome::Solution(t.solution()), pivots + 1),
-                false => end(Outcome::Singular, pivots + 1),
+                true => end(LemkeOutcome::Solution(t.solution()), pivots + 1),
+                false => end(LemkeOutcome::Singular, pivots + 1),
             };
         }
         entering = complement(leaving, n);
     }
-    end(Outcome::IterationLimit, limit)
+    end(LemkeOutcome::IterationLimit, limit)
 }
 
 // Variables are numbered w: 0..n, z: n..2n, z₀: 2n.
@@ -231,14 +231,14 @@ impl Tableau {
 mod tests {
     use super::*;
 
-    fn solve(a: &[&[f64]], q: &[f64]) -> Outcome {
+    fn solve(a: &[&[f64]], q: &[f64]) -> LemkeOutcome {
         let a = Matrix::from_fn(q.len(), q.len(), |i, j| a[i][j]);
         lemke(&a, q, &vec![1.0; q.len()], 100).outcome
     }
 
     fn solution(a: &[&[f64]], q: &[f64]) -> Vec<f64> {
         match solve(a, q) {
-            Outcome::Solution(z) => z,
+            LemkeOutcome::Solution(z) => z,
             other => panic!("{other:?}"),
         }
     }
@@ -256,14 +256,14 @@ mod tests {
 
     #[test]
     fn infeasible_data_end_on_a_ray() {
-        assert_eq!(solve(&[&[0.0]], &[-1.0]), Outcome::Ray);
-        assert_eq!(solve(&[&[-1.0]], &[-1.0]), Outcome::Ray);
+        assert_eq!(solve(&[&[0.0]], &[-1.0]), LemkeOutcome::Ray);
+        assert_eq!(solve(&[&[-1.0]], &[-1.0]), LemkeOutcome::Ray);
     }
 
     #[test]
     fn the_limit_is_a_status() {
         let a = Matrix::from_fn(3, 3, |i, j| if i == j { 2.0 } else { 1.0 });
-        assert_eq!(lemke(&a, &[-1.0, -2.0, -3.0], &[1.0; 3], 0).outcome, Outcome::IterationLimit);
+        assert_eq!(lemke(&a, &[-1.0, -2.0, -3.0], &[1.0; 3], 0).outcome, LemkeOutcome::IterationLimit);
     }
 
     #[test]
@@ -271,7 +271,7 @@ mod tests {
         // All right-hand sides equal and A of rank one plus nothing: every ratio is a tie.
         let n = 30;
         let a = Matrix::from_fn(n, n, |_, _| 1.0);
-        let Outcome::Solution(z) = lemke(&a, &vec![-1.0; n], &vec![1.0; n], 1000).outcome else {
+        let LemkeOutcome::Solution(z) = lemke(&a, &vec![-1.0; n], &vec![1.0; n], 1000).outcome else {
             panic!("no solution")
         };
         assert!((z.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{z:?}");
@@ -294,7 +294,7 @@ mod tests {
             });
             let q: Vec<f64> = (0..n).map(|_| next()).collect();
             let run = lemke(&a, &q, &vec![1.0; n], 20 * n);
-            let Outcome::Solution(z) = run.outcome else { panic!("{n}: no solution") };
+            let LemkeOutcome::Solution(z) = run.outcome else { panic!("{n}: no solution") };
             if n == 260 {
                 assert!(run.pivots > REBUILD, "{}", run.pivots);
             }

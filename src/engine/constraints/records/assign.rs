@@ -12,7 +12,7 @@ use crate::engine::lanes::{LaneWidth, held};
 
 /// One constraint on its way into a lane.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct Assigned {
     /// Level of the contact graph; 0 unless they are grouped by it.
     level: u32,
     /// 0 for contacts, k for type k − 1 of [`Workspace::types`].
@@ -22,7 +22,7 @@ struct Entry {
     rows: [u32; 2],
 }
 
-impl Entry {
+impl Assigned {
     /// Entries of one segment have this in common.
     fn place(&self) -> (u32, u32) {
         (self.level, self.kind)
@@ -32,7 +32,7 @@ impl Entry {
 /// Constraints against one kind of body, and their colors.
 #[derive(Clone, Debug, Default)]
 struct Group {
-    entries: Vec<Entry>,
+    entries: Vec<Assigned>,
     /// Their rows, with a exempt unless it is dynamic.
     edges: Vec<[u32; 2]>,
     coloring: Coloring,
@@ -44,7 +44,7 @@ pub struct Assignment {
     /// By [`OppositeKind`].
     groups: [Group; 3],
     /// Entries of one color.
-    color: Vec<Entry>,
+    color: Vec<Assigned>,
     /// Contacts in a shuffled order.
     places: Vec<u32>,
     /// Colors in use.
@@ -113,7 +113,7 @@ impl Assignment {
         for (kind, index, rows) in all.chain(types) {
             let opposite = (sides.opposite)(rows[0]);
             let group = &mut self.groups[opposite as usize];
-            group.entries.push(Entry { level: sides.level(rows), kind, index: index as u32, rows });
+            group.entries.push(Assigned { level: sides.level(rows), kind, index: index as u32, rows });
             let a = if opposite == OppositeKind::Dynamic { rows[0] } else { EXEMPT };
             group.edges.push([a, rows[1]]);
         }
@@ -135,7 +135,7 @@ impl Assignment {
                     color.sort_unstable_by_key(|e| (e.place(), e.index));
                 }
                 for run in color.chunk_by(|a, b| a.place() == b.place()) {
-                    let Entry { level, kind, .. } = run[0];
+                    let Assigned { level, kind, .. } = run[0];
                     let place =
                         Place { opposite, stage: level * STAGES_PER_LEVEL + stage, level, disjoint: !serial };
                     work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), inert);
@@ -194,7 +194,7 @@ impl Assignment {
         let list = &mut self.color;
         list.clear();
         for (k, joined) in work.types.iter().enumerate() {
-            let entry = |(i, &rows): (usize, &[u32; 2])| Entry {
+            let entry = |(i, &rows): (usize, &[u32; 2])| Assigned {
                 level: sides.level(rows),
                 kind: k as u32 + 1,
                 index: i as u32,
@@ -203,11 +203,16 @@ impl Assignment {
             list.extend(joined.kind.ends().iter().enumerate().map(entry));
         }
         let rows = |i: u32| [contacts[i as usize].body_a, contacts[i as usize].body_b];
-        list.extend(order.map(|i| Entry { level: sides.level(rows(i)), kind: 0, index: i, rows: rows(i) }));
+        list.extend(order.map(|i| Assigned {
+            level: sides.level(rows(i)),
+            kind: 0,
+            index: i,
+            rows: rows(i),
+        }));
         if sides.levels.is_some() {
             list.sort_by_key(|e| e.level);
         }
-        let place = |e: &Entry| (e.place(), (sides.opposite)(e.rows[0]));
+        let place = |e: &Assigned| (e.place(), (sides.opposite)(e.rows[0]));
         for (stage, run) in list.chunk_by(|i, j| place(i) == place(j)).enumerate() {
             let ((level, kind), opposite) = place(&run[0]);
             let place = Place { opposite, stage: stage as u32, level, disjoint: false };

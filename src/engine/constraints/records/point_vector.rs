@@ -17,7 +17,7 @@ use wide::f32x16;
 pub type Wide = f32x16;
 
 /// Sixteen points: their normal and their tangential entries.
-pub type Entry = [Wide; 2];
+pub type PointEntry = [Wide; 2];
 
 /// Entries of all contact points; see the [module](self).
 #[derive(Debug, Default)]
@@ -70,11 +70,11 @@ impl PointVector {
     }
 
     /// All entries.
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[PointEntry] {
         bytemuck::cast_slice(&self.blocks)
     }
 
-    fn entries_mut(&mut self) -> &mut [Entry] {
+    fn entries_mut(&mut self) -> &mut [PointEntry] {
         bytemuck::cast_slice_mut(&mut self.blocks)
     }
 
@@ -101,7 +101,7 @@ pub(crate) fn places<L: Lanes>(slot: usize, point: usize) -> [usize; 2] {
 pub fn update<const M: usize, const N: usize>(
     to: [&mut PointVector; M],
     from: [&PointVector; N],
-    f: impl Fn([Entry; M], [Entry; N]) -> [Entry; M],
+    f: impl Fn([PointEntry; M], [PointEntry; N]) -> [PointEntry; M],
 ) {
     let count = to.first().map_or(0, |v| v.entries().len());
     let mut to = to.map(|v| &mut v.entries_mut()[..count]);
@@ -122,7 +122,10 @@ pub fn dot(x: &PointVector, y: &PointVector) -> f64 {
 /// # Panics
 /// If a vector is shorter than the first.
 #[inline(always)]
-pub fn sum_of_products<const N: usize>(from: [&PointVector; N], f: impl Fn([Entry; N]) -> [Entry; 2]) -> f64 {
+pub fn sum_of_products<const N: usize>(
+    from: [&PointVector; N],
+    f: impl Fn([PointEntry; N]) -> [PointEntry; 2],
+) -> f64 {
     let count = from.first().map_or(0, |v| v.entries().len());
     let from = from.map(|v| &v.entries()[..count]);
     let mut sums = [0.0_f64; 16];
@@ -139,31 +142,31 @@ pub fn sum_of_products<const N: usize>(from: [&PointVector; N], f: impl Fn([Entr
 
 /// x + y.
 #[inline(always)]
-pub fn sum(x: Entry, y: Entry) -> Entry {
+pub fn sum(x: PointEntry, y: PointEntry) -> PointEntry {
     [x[0] + y[0], x[1] + y[1]]
 }
 
 /// x − y.
 #[inline(always)]
-pub fn difference(x: Entry, y: Entry) -> Entry {
+pub fn difference(x: PointEntry, y: PointEntry) -> PointEntry {
     [x[0] - y[0], x[1] - y[1]]
 }
 
 /// factor x.
 #[inline(always)]
-pub fn scaled(factor: f32, x: Entry) -> Entry {
+pub fn scaled(factor: f32, x: PointEntry) -> PointEntry {
     let factor = Wide::splat(factor);
     [factor * x[0], factor * x[1]]
 }
 
 /// x + factor y.
 #[inline(always)]
-pub fn plus_scaled(x: Entry, factor: f32, y: Entry) -> Entry {
+pub fn plus_scaled(x: PointEntry, factor: f32, y: PointEntry) -> PointEntry {
     sum(x, scaled(factor, y))
 }
 
 /// The same, entry by entry, of `x / y` where y > 0, and 0 elsewhere.
 #[inline(always)]
-pub fn quotient(x: Entry, y: Entry) -> Entry {
+pub fn quotient(x: PointEntry, y: PointEntry) -> PointEntry {
     [0, 1].map(|axis| Lanes::select_positive(y[axis], x[axis] / y[axis], Wide::zero()))
 }

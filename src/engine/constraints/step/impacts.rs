@@ -4,7 +4,7 @@ use super::Passes;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Workspace;
 use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::spread::{self, Find, Leads, On};
+use crate::engine::constraints::impacts::spread::{self, Find, Leads, SpreadInput};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::records::batches::Part;
@@ -38,7 +38,7 @@ impl Passes<'_> {
         let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
         let size = kept.size().per_contact;
         let leads = lead.map_or(Leads::NONE, |place| Leads { kept: kept.contacts(), size, place });
-        let cut = spread.run(&mut On {
+        let cut = spread.run(&mut SpreadInput {
             rows,
             batches: [lanes, serial],
             contacts: self.contacts,
@@ -89,14 +89,14 @@ impl Passes<'_> {
     fn begin_bounces(&mut self, rebound: Rebound) {
         let points = if self.input.features.two_points { 2 } else { 1 };
         let stride = self.law().stride(points);
-        let mut begin = restitution::Begin { rebound, stride, found: 0.0 };
+        let mut begin = restitution::ReadApproach { rebound, stride, found: 0.0 };
         self.over_contacts(&mut begin);
         self.bounces = begin.found > 0.0;
     }
 
     /// Finds what bounces in the coming substep.
     fn begin_bias(&mut self, is_first: bool) {
-        let mut begin = bias::Begin { h: self.input.h, is_first, fastest: 0.0 };
+        let mut begin = bias::FindBounces { h: self.input.h, is_first, fastest: 0.0 };
         self.over_contacts(&mut begin);
         self.biased = begin.fastest > 0.0;
     }

@@ -11,8 +11,8 @@ mod vectors;
 mod workspace;
 
 pub(crate) use impacts::Spreading;
-pub use solver::{Collision, Scene, Schedule, Solver};
-pub use workspace::{Observer, StepInput, Watch, WorkCount, Workspace};
+pub use solver::{Collision, CollisionScene, Schedule, Solver};
+pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};
 
 use crate::engine::clock::{Clock, Phase};
 use crate::engine::constraints::impacts::ImpactLaw;

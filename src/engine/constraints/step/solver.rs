@@ -17,10 +17,10 @@ use std::fmt;
 /// [`Schedule`].
 pub trait Solver: fmt::Debug + Send {
     /// Before candidates are collided: the contacts are those of the last step.
-    fn before_collision(&mut self, _scene: &mut Scene<'_>, _collision: &mut Collision) {}
+    fn before_collision(&mut self, _scene: &mut CollisionScene<'_>, _collision: &mut Collision) {}
 
     /// After they were, and impulses were handed on: the contacts are those of the coming step.
-    fn after_collision(&mut self, _scene: &mut Scene<'_>) {}
+    fn after_collision(&mut self, _scene: &mut CollisionScene<'_>) {}
 
     /// The contact graph, where contacts are to be grouped by its levels; asked before they get their lanes.
     fn levels(&mut self, _bodies: &Bodies, _contacts: &[Contact]) -> Option<&Graph> {
@@ -46,7 +46,7 @@ impl Clone for Box<dyn Solver> {
 }
 
 /// What a solver sees of a world around a collision.
-pub struct Scene<'a> {
+pub struct CollisionScene<'a> {
     /// At the beginning of the step.
     pub bodies: &'a Bodies,
     /// Sorted by shape pair.
@@ -71,7 +71,7 @@ pub struct Scene<'a> {
     pub substeps: u32,
 }
 
-impl Scene<'_> {
+impl CollisionScene<'_> {
     /// Substep (s).
     pub fn h(&self) -> f32 {
         self.dt / self.substeps as f32

@@ -45,10 +45,10 @@ pub struct Workspace {
 }
 
 /// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
-pub struct Watch(pub Box<Observer>);
+pub struct Watch(pub Box<IterationObserver>);
 
 /// Is given the number of an iteration and the problem after it.
-pub type Observer = dyn FnMut(u32, &mut System<'_>) + Send;
+pub type IterationObserver = dyn FnMut(u32, &mut System<'_>) + Send;
 
 impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -11,7 +11,7 @@ use crate::engine::constraints::records::segment::Segment;
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
 
 /// Input of a pass: bodies, and one set of batches with its part of a vector.
-pub(crate) struct On<'a> {
+pub(crate) struct VectorInput<'a> {
     pub rows: &'a mut [BodyRow],
     pub batches: &'a mut Batches,
     pub features: &'a Features,
@@ -21,7 +21,7 @@ pub(crate) struct On<'a> {
 /// Two quantities of each point, by their places in a record, into the vector; of a scene without
 /// friction the second is zero.
 #[inline(never)]
-pub(crate) fn read<L: Lanes>(on: On<'_>, of: impl Fn(&Layout) -> [usize; 2]) {
+pub(crate) fn read<L: Lanes>(on: VectorInput<'_>, of: impl Fn(&Layout) -> [usize; 2]) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
         let [first, second] = of(layout);
         for p in 0..layout.points {
@@ -34,7 +34,7 @@ pub(crate) fn read<L: Lanes>(on: On<'_>, of: impl Fn(&Layout) -> [usize; 2]) {
 
 /// Coulomb coefficients of each point take the place of tangential entries, and separations that of normal ones.
 #[inline(never)]
-pub(crate) fn read_surfaces<L: Lanes>(on: On<'_>) {
+pub(crate) fn read_surfaces<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
         for p in 0..layout.points {
             let [n, t] = places::<L>(slot, p);
@@ -48,7 +48,7 @@ pub(crate) fn read_surfaces<L: Lanes>(on: On<'_>) {
 
 /// The vector becomes the accumulated impulses.
 #[inline(never)]
-pub(crate) fn write_impulses<L: Lanes>(on: On<'_>) {
+pub(crate) fn write_impulses<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
         for p in 0..layout.points {
             let [n, t] = places::<L>(slot, p);
@@ -62,7 +62,7 @@ pub(crate) fn write_impulses<L: Lanes>(on: On<'_>) {
 
 /// The vector becomes J v.
 #[inline(never)]
-pub(crate) fn read_velocities<L: Lanes>(on: On<'_>) {
+pub(crate) fn read_velocities<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |rows, layout, _, record, [row_a, row_b], vector, slot| {
         let b = L::gather(rows, row_b);
         let a = if layout.a_has_row { L::gather(rows, row_a) } else { [L::zero(); 8] };
@@ -83,7 +83,7 @@ pub(crate) fn read_velocities<L: Lanes>(on: On<'_>) {
 
 /// v ← v + M⁻¹ Jᵀ Δλ, the vector being Δλ.
 #[inline(never)]
-pub(crate) fn push<L: Lanes>(on: On<'_>) {
+pub(crate) fn push<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |rows, layout, segment, record, [row_a, row_b], vector, slot| {
         let b = L::gather(rows, row_b);
         let a = if layout.a_has_row { L::gather(rows, row_a) } else { [L::zero(); 8] };
@@ -132,7 +132,7 @@ const AHEAD: usize = 3;
 /// Calls `visit(rows, layout, segment, record, [row_a, row_b], vector, slot)` for every batch.
 #[inline(always)]
 fn each_batch<L: Lanes>(
-    On { rows, batches, features, vector }: On<'_>,
+    VectorInput { rows, batches, features, vector }: VectorInput<'_>,
     mut visit: impl FnMut(
         &mut [BodyRow],
         &Layout,

@@ -14,7 +14,7 @@ use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::{Features, Layout};
 use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::passes::{self, On};
+use crate::engine::constraints::vectors::passes::{self, VectorInput};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, LaneWidth};
 use crate::engine::narrowphase::lanes::PoseRow;
@@ -181,13 +181,13 @@ impl<'a> System<'a> {
     ///
     /// # Panics
     /// If the vector is of other contacts.
-    fn over_lanes(&mut self, vector: &mut PointVector, pass: impl Fn(LaneWidth, On<'_>)) {
+    fn over_lanes(&mut self, vector: &mut PointVector, pass: impl Fn(LaneWidth, VectorInput<'_>)) {
         let [lanes, serial] = &mut self.batches;
         let parts = vector.parts([lanes, serial]);
         for (batches, (width, vector)) in
             [lanes, serial].into_iter().zip([self.width, LaneWidth::W1].into_iter().zip(parts))
         {
-            pass(width, On { rows: self.rows, batches, features: self.features, vector });
+            pass(width, VectorInput { rows: self.rows, batches, features: self.features, vector });
         }
     }
 

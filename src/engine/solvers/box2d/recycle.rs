@@ -14,7 +14,7 @@
 
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::held;
-use crate::engine::narrowphase::batch::{Kind, NO_CONTACT};
+use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::engine::narrowphase::candidate::Candidates;
 use crate::engine::narrowphase::lanes::PoseRow;
 use glam::Vec2;
@@ -23,7 +23,7 @@ use glam::Vec2;
 const SAME_TURN: f32 = 0.98;
 
 /// Kinds of pairs whose manifolds are kept.
-const KINDS: [Kind; 2] = [Kind::Rectangles, Kind::Hulls];
+const KINDS: [PairKind; 2] = [PairKind::Rectangles, PairKind::Hulls];
 
 /// A manifold as it was found, on its bodies.
 #[derive(Clone, Copy, Debug)]

@@ -8,13 +8,13 @@ use serde_json::Value;
 
 /// `verify.json` as far as the page needs it.
 #[derive(Debug, Deserialize)]
-pub struct Matrix {
-    cases: Vec<Case>,
+pub struct VerifyFile {
+    cases: Vec<MatrixCase>,
     results: Vec<MatrixCell>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Case {
+struct MatrixCase {
     case: String,
     what: String,
     required: bool,
@@ -63,7 +63,7 @@ fn word(value: &Value) -> String {
 }
 
 /// The matrix as a table.
-pub fn matrix(matrix: &Matrix) -> String {
+pub fn matrix(matrix: &VerifyFile) -> String {
     let mut solvers: Vec<&str> = Vec::new();
     for outcome in &matrix.results {
         if !solvers.contains(&outcome.solver.as_str()) {

@@ -20,14 +20,14 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::picture::svg::escaped;
 use crate::lab::recording::Header;
-use crate::lab::recording::page::{MOST, Panel, SCRIPT, STYLE, fragment};
+use crate::lab::recording::page::{MOST, RecordingPanel, SCRIPT, STYLE, fragment};
 use crate::lab::recording::read::read_file;
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::style::Style;
 use crate::lab::report::sweep::is_sweep;
 use crate::lab::study::curve::solvers_of;
 use crate::lab::units::{bodies, count};
-use matrix::Matrix;
+use matrix::VerifyFile;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 pub use sweep::svg as sweep_svg;
@@ -63,7 +63,7 @@ pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<Pat
 /// Errors: files there that are not what their names say.
 pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
     let matrix_path = folder.join("verify.json");
-    let matrix: Option<Matrix> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
+    let matrix: Option<VerifyFile> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
     let mut recordings = Vec::new();
     for path in (0..MOST).map(|i| folder.join(recording_name(i))).filter(|p| p.exists()) {
         let (bytes, recording) = read_file(&path)?;
@@ -80,7 +80,7 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
 }
 
 /// The whole page.
-fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Header)]) -> String {
+fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, Header)]) -> String {
     let (records, solvers) = (&study.records[..], solvers_of(&study.records));
     let scenes = setting::scenes(records);
     let e = &study.environment;
@@ -138,10 +138,14 @@ fn page(study: &StudyFile, matrix: Option<&Matrix>, recordings: &[(Vec<u8>, Head
             "{scene} separates the solvers most, among scenes small enough to play. Bodies are \
              colored by their deepest overlap; arrows are impulses."
         );
-        let panels: Vec<Panel> = recordings
+        let panels: Vec<RecordingPanel> = recordings
             .iter()
             .cloned()
-            .map(|(bytes, header)| Panel { bytes, color: Style::of(&header.solver).color.into(), header })
+            .map(|(bytes, header)| RecordingPanel {
+                bytes,
+                color: Style::of(&header.solver).color.into(),
+                header,
+            })
             .collect();
         section("replay", "Replay of the most telling scene", &lead, fragment(&panels, 0.6));
     }

@@ -1,8 +1,8 @@
 //! A plot: a frame with a grid and ticks, and marks within it, as inline SVG.
 
 use super::scale::Scale;
+use crate::lab::picture::axes::wrapped;
 use crate::lab::picture::svg::{escaped, points, px};
-use crate::lab::report::axes::wrapped;
 use crate::lab::report::style::Style;
 
 /// Width of the band for what has no place on the axis (pixels).

@@ -46,7 +46,7 @@ use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 use point::{Body, HitPoint, Role, STILL};
-pub(crate) use point::{Leads, On};
+pub(crate) use point::{Leads, SpreadInput};
 use std::collections::VecDeque;
 
 /// No lane, no point.
@@ -127,7 +127,7 @@ impl Spread {
 
     /// Solves the impacts of the lanes that were found, island by island. Returns how many islands reached their bound; none
     /// without impacts.
-    pub(crate) fn run(&mut self, on: &mut On<'_>) -> Option<usize> {
+    pub(crate) fn run(&mut self, on: &mut SpreadInput<'_>) -> Option<usize> {
         if self.found.iter().all(Vec::is_empty) {
             return None;
         }
@@ -164,7 +164,7 @@ impl Spread {
     }
 
     /// Solves the impacts of an island; false if it reached its bound.
-    fn island(&mut self, on: &mut On<'_>, hit: std::ops::Range<usize>) -> bool {
+    fn island(&mut self, on: &mut SpreadInput<'_>, hit: std::ops::Range<usize>) -> bool {
         (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
         for i in hit {
@@ -205,7 +205,7 @@ impl Spread {
     }
 
     /// Finds the points that bounce in this wave; whether there are any.
-    fn begin_wave(&mut self, on: &mut On<'_>, is_first: bool, bounces: bool) -> bool {
+    fn begin_wave(&mut self, on: &mut SpreadInput<'_>, is_first: bool, bounces: bool) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = &mut self.points[place];
@@ -252,7 +252,7 @@ impl Spread {
     /// times the distance of both, which takes 3 % of the spin of a block 8 m high. So a point that an impact releases, which
     /// is one that leaves faster than its load can bring it back within the step, gives F t beside the impact (for t < 0 it has
     /// borne too long, and takes it back from what does not move). A force in [0, t] moves bodies by F t (dt − t/2)/m in the step.
-    fn release(&mut self, on: &mut On<'_>) -> bool {
+    fn release(&mut self, on: &mut SpreadInput<'_>) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = self.points[place];
@@ -290,7 +290,7 @@ impl Spread {
     }
 
     /// Visits the points of bodies that were pushed, until none is left or the bound is reached; whether none is left.
-    fn spread(&mut self, on: &mut On<'_>, bounces: bool) -> bool {
+    fn spread(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
         let mut is_done = true;
         while let Some(body) = self.queue.pop_front() {
             self.bodies[body as usize].is_queued = false;
@@ -313,7 +313,7 @@ impl Spread {
     }
 
     /// Solves a point, if it approaches fast enough or was hit before.
-    fn visit(&mut self, on: &mut On<'_>, place: usize, bounces: bool) {
+    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
         if point.mass <= 0.0 || point.role == Role::Left && bounces {
             return;
@@ -371,7 +371,7 @@ impl Spread {
 
     /// Pushes both bodies of a point with an impulse (N·s) up to `time` (s), in the mean at `at` (s), and has their points
     /// looked at.
-    fn push(&mut self, on: &mut On<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
+    fn push(&mut self, on: &mut SpreadInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
         let point = self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
@@ -390,7 +390,7 @@ impl Spread {
     }
 
     /// Links the ends of each body, and bodies that contacts connect.
-    fn link(&mut self, on: &On<'_>) {
+    fn link(&mut self, on: &SpreadInput<'_>) {
         let (count, lanes) = (on.rows.len(), on.batches[0].lanes() + on.batches[1].lanes());
         self.bodies.clear();
         self.bodies.extend(
@@ -423,7 +423,7 @@ impl Spread {
     }
 
     /// The body that stands for the island of a lane.
-    fn island_of(&mut self, on: &On<'_>, lane: u32) -> u32 {
+    fn island_of(&mut self, on: &SpreadInput<'_>, lane: u32) -> u32 {
         let (lane, lanes) = (lane as usize, on.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         // Body b is dynamic.
@@ -431,7 +431,7 @@ impl Spread {
     }
 
     /// The place of the first point of a lane.
-    fn list(&mut self, on: &On<'_>, lane: u32) -> usize {
+    fn list(&mut self, on: &SpreadInput<'_>, lane: u32) -> usize {
         let listed = &mut self.listed[lane as usize];
         if *listed == NONE {
             *listed = self.points.len() as u32;
@@ -460,19 +460,19 @@ fn root(parent: &mut [u32], mut body: u32) -> u32 {
 }
 
 /// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
-fn arrival(point: &HitPoint, on: &On<'_>, slowest: f32) -> Option<f32> {
+fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> {
     let ([vn, _], gap) = (point.velocity(on.rows), point.gap(on.rows));
     (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
 }
 
 /// Whether it approaches fast enough to bounce.
-fn will_bounce(point: &HitPoint, on: &On<'_>) -> bool {
+fn will_bounce(point: &HitPoint, on: &SpreadInput<'_>) -> bool {
     let speed = -point.velocity(on.rows)[0];
     point.restitution > 0.0 && speed > point.slow && point.restitution * speed > BOUNCES * point.slow
 }
 
 /// Velocity at which an approaching point has to leave (m/s), and the time of its impact (s); see the [module](self).
-fn rebounds(point: &HitPoint, on: &On<'_>, is_first: bool) -> Option<[f32; 2]> {
+fn rebounds(point: &HitPoint, on: &SpreadInput<'_>, is_first: bool) -> Option<[f32; 2]> {
     if !will_bounce(point, on) {
         return None;
     }

@@ -90,7 +90,7 @@ pub(super) struct HitPoint {
 }
 
 /// The data that [`super::Spread::run`] works on.
-pub(crate) struct On<'a> {
+pub(crate) struct SpreadInput<'a> {
     pub rows: &'a mut [BodyRow],
     /// Colored batches, serial ones.
     pub batches: [&'a mut Batches; 2],
@@ -147,7 +147,7 @@ pub(super) struct LanePlace {
     pub pushes_a: bool,
 }
 
-impl On<'_> {
+impl SpreadInput<'_> {
     pub(super) fn place(&self, lane: u32) -> LanePlace {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };

@@ -95,7 +95,7 @@ struct InBlocks<R, const NORMAL_FIRST: bool> {
 
 /// See [`Stages::Begun`].
 #[derive(Clone, Copy)]
-struct Begun<L> {
+struct BegunBlock<L> {
     /// c (N·s), s (kg) and v (m/s) of the normal rows.
     constant: [L; 2],
     slope: [L; 2],
@@ -147,12 +147,12 @@ where
     O: Opposite,
     R: NormalRule,
 {
-    type Begun = Begun<L>;
+    type Begun = BegunBlock<L>;
 
     #[inline(always)]
-    fn nothing() -> Begun<L> {
+    fn nothing() -> BegunBlock<L> {
         let pair = [L::zero(); 2];
-        Begun { constant: pair, slope: pair, velocity: pair, friction: pair }
+        BegunBlock { constant: pair, slope: pair, velocity: pair, friction: pair }
     }
 
     #[inline(always)]
@@ -162,7 +162,7 @@ where
         record: &mut [L],
         pushes_a: bool,
         state: &mut PairState<L>,
-        begun: &mut Begun<L>,
+        begun: &mut BegunBlock<L>,
     ) {
         let layout = const { Layout::of::<N, O>() };
         let has_friction = const { N::FRICTION && R::FRICTION };
@@ -188,7 +188,7 @@ where
     }
 
     #[inline(always)]
-    fn solve(self, begun: &Begun<L>, record: &mut [L], state: &mut PairState<L>) {
+    fn solve(self, begun: &BegunBlock<L>, record: &mut [L], state: &mut PairState<L>) {
         let layout = const { Layout::of::<N, O>() };
         let friction_last = const { N::FRICTION && R::FRICTION && NORMAL_FIRST };
         let inertia = state.inertia;

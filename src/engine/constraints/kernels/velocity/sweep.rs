@@ -254,7 +254,7 @@ struct RowByRow<R>(R);
 
 /// See [`Stages::Begun`].
 #[derive(Clone, Copy)]
-struct Begun<L> {
+struct BegunPoints<L> {
     /// sin Δθ, and 1 − cos Δθ, of a and b; only where arms turn.
     turn: [[L; 2]; 2],
     /// Of the normal rows: what a unit of velocity takes away (kg).
@@ -263,7 +263,7 @@ struct Begun<L> {
     impulse: [[L; 2]; 2],
 }
 
-impl<L: Lanes> Begun<L> {
+impl<L: Lanes> BegunPoints<L> {
     /// Arms of bodies a and b at point `p` along n, and along t, as the rule has them.
     #[inline(always)]
     fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
@@ -274,12 +274,12 @@ impl<L: Lanes> Begun<L> {
 }
 
 impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for RowByRow<R> {
-    type Begun = Begun<L>;
+    type Begun = BegunPoints<L>;
 
     #[inline(always)]
-    fn nothing() -> Begun<L> {
+    fn nothing() -> BegunPoints<L> {
         let pair = [L::zero(); 2];
-        Begun { turn: [pair; 2], slope: pair, impulse: [pair; 2] }
+        BegunPoints { turn: [pair; 2], slope: pair, impulse: [pair; 2] }
     }
 
     #[inline(always)]
@@ -289,7 +289,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
         record: &mut [L],
         pushes_a: bool,
         state: &mut PairState<L>,
-        begun: &mut Begun<L>,
+        begun: &mut BegunPoints<L>,
     ) {
         let (layout, rule) = (const { Layout::of::<N, O>() }, self.0);
         let [along_n, along_t] = state.along::<O>(record);
@@ -319,7 +319,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
     }
 
     #[inline(always)]
-    fn solve(self, begun: &Begun<L>, record: &mut [L], state: &mut PairState<L>) {
+    fn solve(self, begun: &BegunPoints<L>, record: &mut [L], state: &mut PairState<L>) {
         let layout = const { Layout::of::<N, O>() };
         let friction_rows = const { N::FRICTION && R::FRICTION };
         let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());

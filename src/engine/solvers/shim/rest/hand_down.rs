@@ -43,7 +43,7 @@ pub(in super::super) struct HandDown {
 }
 
 /// What loads are handed down on.
-pub(in super::super) struct On<'a> {
+pub(in super::super) struct HandDownInput<'a> {
     /// All contacts.
     pub contacts: &'a [Contact],
     /// N and T of both points of each contact (N), N negative where it is open. `[contacts × PER_CONTACT]`
@@ -88,7 +88,7 @@ impl HandDown {
     }
 
     /// Hands down what accelerates bodies.
-    pub fn run(&mut self, on: &mut On<'_>) {
+    pub fn run(&mut self, on: &mut HandDownInput<'_>) {
         for i in 0..self.downwards.len() {
             let (body, still) = self.downwards[i];
             let [x, y, turn, inv_mass] = on.fields[body as usize].velocity;
@@ -110,7 +110,7 @@ impl HandDown {
     }
 
     /// Lists the closed points of `body` with the bodies below it, and their loads.
-    fn find_supports(&mut self, on: &On<'_>, body: u32) {
+    fn find_supports(&mut self, on: &HandDownInput<'_>, body: u32) {
         self.supports.clear();
         let level = self.upright.levels()[body as usize];
         let hangs = level == UNSUPPORTED;
@@ -147,7 +147,7 @@ impl HandDown {
     }
 
     /// Finds the loads that support `body`.
-    fn stand(&mut self, on: &mut On<'_>, body: u32) {
+    fn stand(&mut self, on: &mut HandDownInput<'_>, body: u32) {
         let BodyRow { velocity: [x, y, turn, inv_mass], delta: [.., inv_inertia] } = on.fields[body as usize];
         let h = f64::from(on.h);
         let [inv_mass, inv_inertia] = [inv_mass, inv_inertia].map(f64::from);

@@ -76,7 +76,7 @@ impl Shim {
             let StepParts { work, contacts, .. } = passes.parts();
             let Workspace { kept, motion, .. } = work;
             let (kept, increments) = (kept.contacts(), motion.velocity_increments());
-            let mut on = hand_down::On { contacts, kept, fields, increments, h };
+            let mut on = hand_down::HandDownInput { contacts, kept, fields, increments, h };
             if hands_down {
                 self.hand_down.run(&mut on);
             }

@@ -3,15 +3,18 @@
 //! Axes are drawn here and not by the chart builder, so that a panel of any range has
 //! readable ticks within tight limits.
 
-use super::style::Style;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+/// Where is drawn.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// What the chart library returns.
 pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
+/// Of text and frames.
 pub const INK: RGBColor = RGBColor(40, 40, 40);
+/// Of lines at ticks.
 pub const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Distinct with any color vision (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
@@ -30,15 +33,9 @@ pub fn color(curve: usize) -> RGBColor {
     COLORS[curve % COLORS.len()]
 }
 
-/// The color of a solver, the same in every plot.
-pub fn solver_color(solver: &str) -> RGBColor {
-    let crate::lab::picture::Color(r, g, b, _) = Style::of(solver).rgb();
-    RGBColor(r, g, b)
-}
-
 /// A logarithmic axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scale {
+pub struct LogScale {
     /// Lower and upper limit.
     pub limits: [f64; 2],
     /// Where it has labels, within the limits.
@@ -48,12 +45,12 @@ pub struct Scale {
 /// Least range of an axis: limits this factor apart.
 const LEAST_RANGE: f64 = 1.3;
 
-impl Scale {
+impl LogScale {
     /// An axis that holds the values with a little room, at most `most` ticks on it.
     ///
     /// Ticks are the coarsest of decades, 1-2-5, single digits and so on that has at least two
     /// within the limits; if those are too many, every second or third.
-    pub fn of(values: impl Iterator<Item = f64> + Clone, most: usize) -> Scale {
+    pub fn of(values: impl Iterator<Item = f64> + Clone, most: usize) -> LogScale {
         let least = values.clone().fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
         let largest = values.fold(least, f64::max);
         let widen = (LEAST_RANGE * least / largest).max(1.0).sqrt();
@@ -75,7 +72,7 @@ impl Scale {
         let mut sets = digits.iter().map(within);
         let ticks = sets.clone().find(|t| t.len() >= 2).or_else(|| sets.next_back()).unwrap_or_default();
         let stride = ticks.len().div_ceil(most.max(1)).max(1);
-        Scale { limits, ticks: ticks.into_iter().step_by(stride).collect() }
+        LogScale { limits, ticks: ticks.into_iter().step_by(stride).collect() }
     }
 
     /// Where the value is between two pixels.
@@ -100,7 +97,7 @@ impl Edges {
     pub fn grid(
         &self,
         area: &Area,
-        [x, y]: [&Scale; 2],
+        [x, y]: [&LogScale; 2],
         gap: i32,
         labels: [&dyn Fn(f64) -> String; 2],
     ) -> Drawn {
@@ -144,21 +141,6 @@ pub fn with_dark(svg: &str) -> String {
     svg.find('\n').map_or(svg.to_string(), |end| format!("{}{STYLE}{}", &svg[..=end], &svg[end + 1..]))
 }
 
-/// A name and a stroke per solver, from `x` on; returns where the next thing may stand.
-pub fn solver_legend(
-    area: &Area,
-    solvers: &[&str],
-    mut x: i32,
-    y: i32,
-) -> Result<i32, Box<dyn std::error::Error>> {
-    for name in solvers {
-        area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], solver_color(name).stroke_width(3)))?;
-        write(area, name, (x + 32, y), 14, HPos::Left)?;
-        x += 56 + 7 * name.chars().count() as i32;
-    }
-    Ok(x)
-}
-
 /// Circle, triangle, square, then crosses.
 pub fn marker(area: &Area, (x, y): (i32, i32), budget: usize, color: &RGBColor) -> Drawn {
     let filled = color.filled();
@@ -192,12 +174,12 @@ mod tests {
 
     #[test]
     fn limits_are_tight_and_ticks_within() {
-        let scale = |values: [f64; 2]| Scale::of(values.into_iter(), 5);
+        let scale = |values: [f64; 2]| LogScale::of(values.into_iter(), 5);
         assert_eq!(scale([0.9, 1100.0]).ticks, [1.0, 10.0, 100.0, 1000.0]);
         assert_eq!(scale([3.0, 30.0]).ticks, [5.0, 10.0, 20.0]);
         assert_eq!(scale([16.0, 19.0]).ticks, [16.0, 17.0, 18.0, 19.0, 20.0]);
         for values in [[1e-12, 1e3], [9.99, 10.01], [5.0, 5.0], [2e-5, 3e-5], [150.0, 151.0]] {
-            let Scale { limits, ticks } = scale(values);
+            let LogScale { limits, ticks } = scale(values);
             assert!(limits[0] < values[0] && values[1] < limits[1], "{limits:?}");
             assert!((2..=5).contains(&ticks.len()), "{values:?} {ticks:?}");
             assert!(limits[1] / limits[0] <= 1.6 * (values[1] / values[0]).powf(1.13), "{limits:?}");
@@ -206,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_pixel_is_where_the_logarithm_is() {
-        let scale = Scale { limits: [1.0, 100.0], ticks: Vec::new() };
+        let scale = LogScale { limits: [1.0, 100.0], ticks: Vec::new() };
         assert_eq!([1.0, 10.0, 100.0].map(|v| scale.pixel(v, 300, 100)), [300, 200, 100]);
     }
 
