@@ -270,7 +270,7 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
     assert!(answer.lines().count() <= 60 && answer.contains("Ranking over all scenes"), "{answer}");
     assert!(tables.contains("Equal time") && tables.contains("Performance profiles"));
     let widest = answer.lines().map(|line| line.chars().count()).max();
-    assert!(widest <= Some(160), "{answer}");
+    assert!(widest <= Some(120), "{answer}");
 }
 
 #[test]

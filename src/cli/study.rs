@@ -300,11 +300,13 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
         true => sweep::text(&study.records, &study.environment),
         false => answer::text(&study.records, &study.environment, steps),
     };
-    let mut text =
-        study.caution() + &answer + &answer::wrapped(&study.budgets()) + &orders::text(&study.records);
+    let mut text = answer::wrapped(&study.caution())
+        + &answer
+        + &answer::wrapped(&study.budgets())
+        + &orders::text(&study.records);
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
-    text += &format!("\nwrote {} in {}\n", names.join(", "), out.display());
+    text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));
     if verbose {
         text += &format!("\n{}", report::tables(&study.records));
     }

@@ -107,10 +107,11 @@ fn rows(report: &Report) -> Vec<Row> {
     rows
 }
 
-/// The color of a curve: its solver's, whatever stage of it is drawn.
-fn color(solver: &str, colors: Colors) -> RGBColor {
-    let picture::Color(r, g, b, _) = colors(solver.split(' ').next().unwrap_or(solver));
-    RGBColor(r, g, b)
+/// The color of a curve: its solver's; paler for a part of the solver, such as `shim without relaxing`.
+fn color(solver: &str, colors: Colors) -> RGBAColor {
+    let (name, part) = solver.split_once(" without ").map_or((solver, false), |(name, _)| (name, true));
+    let picture::Color(r, g, b, _) = colors(name.split(' ').next().unwrap_or(name));
+    RGBColor(r, g, b).mix(if part { 0.4 } else { 1.0 })
 }
 
 fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -> Drawn {
@@ -156,7 +157,7 @@ fn legend(area: &Area, solvers: &[(&str, &str)], report: &Report, colors: Colors
     for (i, (order, name)) in orders.into_iter().enumerate() {
         let x = 12 + 275 * i as i32;
         line(area, vec![(x, y), (x + 52, y)], order, INK.stroke_width(2))?;
-        marker(area, (x + 26, y), order, &INK)?;
+        marker(area, (x + 26, y), order, &INK.mix(1.0))?;
         write(area, &name, (x + 60, y), 14, HPos::Left)?;
     }
     Ok(())
@@ -175,7 +176,7 @@ fn line(area: &Area, points: Vec<(i32, i32)>, order: Sequence, style: ShapeStyle
     Ok(())
 }
 
-fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBColor) -> Drawn {
+fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBAColor) -> Drawn {
     match order {
         Sequence::Natural => area.draw(&Circle::new(at, 4, color.filled()))?,
         Sequence::Colored => {

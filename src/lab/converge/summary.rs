@@ -23,9 +23,9 @@ pub fn text(report: &Report) -> String {
             text += &sentence(&own, at, start);
         }
     }
-    let changed: Vec<&Curve> = own.iter().copied().filter(|c| !c.own_is_rigid).collect();
-    if !changed.is_empty() {
-        let each = changed.iter().filter(|c| c.start == Start::Cold).map(|c| {
+    let changed = || own.iter().copied().filter(|c| !c.own_is_rigid && c.start == Start::Cold);
+    if changed().next().is_some() {
+        let each = changed().map(|c| {
             let sweeps = TOLD.map(|at| match to(c, &c.own, at) {
                 Some(n) => format!("{n} to {:.0e}", TOLERANCES[at]),
                 None => format!("none to {:.0e}", TOLERANCES[at]),
@@ -65,7 +65,7 @@ fn sentence(curves: &[&Curve], at: usize, start: Start) -> String {
                 1 => "in 1 sweep".to_string(),
                 n => format!("in {n} sweeps"),
             };
-            let mut text = format!("To {goal}: {} {when}", first.join(" and "));
+            let mut text = format!("To {goal}: {} {when}", first.join(", "));
             let others: Vec<String> =
                 reached.iter().filter(|r| r.0 > *least).map(|(n, name)| format!("{name} {n}")).collect();
             if !others.is_empty() {

@@ -30,6 +30,8 @@ pub const WIDTHS: [u32; 2] = [400, 8000];
 const MARGIN: f64 = 28.0;
 const HEADER: f64 = 66.0;
 const LEGEND: f64 = 84.0;
+/// What a row for the marks of joints adds to it.
+const JOINTS: f64 = 26.0;
 /// Height over width of the part with the scene, at least and at most.
 const ASPECT: [f64; 2] = [0.3, 0.95];
 
@@ -121,7 +123,8 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         bottom: HEADER + height - 0.5 * (height - scale * h),
         low,
     };
-    let size = [width, (HEADER + height + LEGEND).round() as u32];
+    let legend_height = if stage.joints.is_empty() { LEGEND } else { LEGEND + JOINTS };
+    let size = [width, (HEADER + height + legend_height).round() as u32];
     let mut picture = Picture::new(size, Color::rgb(0xffffff));
     let deepest = if frame.deepest() > 0.0 { darkest } else { 0.0 };
     let depth_of = depths(stage, frame);
@@ -153,10 +156,11 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     // Whatever of the ground reaches into them.
     let top = HEADER + height;
     picture.rectangle([0.0, 0.0], [f64::from(width), HEADER - 6.0], Color::rgb(0xffffff));
-    picture.rectangle([0.0, top], [f64::from(width), LEGEND], Color::rgb(0xffffff));
+    picture.rectangle([0.0, top], [f64::from(width), legend_height], Color::rgb(0xffffff));
     picture.text([MARGIN, 30.0], 21.0, Anchor::Start, INK, title);
     picture.text([MARGIN, 52.0], 14.0, Anchor::Start, FAINT, subtitle);
     legend(&mut picture, top, &view, [deepest, frame.deepest()], arrow, stage.dt);
+    super::joints::legend(&mut picture, stage, [MARGIN, top + LEGEND], INK);
     picture
 }
 

@@ -29,6 +29,17 @@ pub(crate) fn table(header: &[&str]) -> Table {
     table
 }
 
+/// Longest line of the page that a study prints (characters).
+pub const PAGE_WIDTH: usize = 120;
+
+/// The same table with at most `width` characters a line: cells that are too long go on below.
+pub(crate) fn narrow(mut table: Table, width: usize) -> Table {
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    // Two of them are the blanks behind the last column.
+    table.set_width(width as u16 + 2);
+    table
+}
+
 /// Every column but the first `left` to the right, and two blanks between columns.
 pub(crate) fn finish(mut table: Table, left: usize) -> String {
     for (i, column) in table.column_iter_mut().enumerate() {
