@@ -560,6 +560,10 @@ fn what_a_solver_ignores_is_refused_with_who_has_it() {
     refused(folder.path(), &relax, &["--relax-iterations", "pgs", "soft_step"]);
     let hertz = ["run", "stack:2", "--solver", "pgs", "--set", "contact_hertz=60"];
     refused(folder.path(), &hertz, &["contact_hertz", "pgs", "soft_step"]);
+    // Where others have it, a line says who does not.
+    let both = ["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs,soft_step", "--lanes", "1"];
+    let output = simpulse(folder.path(), &[&both[..], &["--set", "contact_hertz=60"]].concat());
+    assert_eq!(text(&output.stderr), "contact_hertz has no effect on pgs\n");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::replay::{Sequence, Start};
 use super::{Curve, Reached, Report, TOLERANCES};
 use crate::engine::lanes::native_width;
 
-/// Places in [`TOLERANCES`] of the two that are told.
+/// Places in [`TOLERANCES`] of the two that the summary names.
 const TOLD: [usize; 2] = [1, 3];
 
 /// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of

@@ -157,8 +157,10 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     let top = HEADER + height;
     picture.rectangle([0.0, 0.0], [f64::from(width), HEADER - 6.0], Color::rgb(0xffffff));
     picture.rectangle([0.0, top], [f64::from(width), legend_height], Color::rgb(0xffffff));
-    picture.text([MARGIN, 30.0], 21.0, Anchor::Start, INK, title);
-    picture.text([MARGIN, 52.0], 14.0, Anchor::Start, FAINT, subtitle);
+    // In a narrow picture letters are smaller, so that no line ends outside of it.
+    let fitted = |text: &str, size: f64| size.min(1.5 * inner / text.chars().count().max(1) as f64);
+    picture.text([MARGIN, 30.0], fitted(title, 21.0), Anchor::Start, INK, title);
+    picture.text([MARGIN, 52.0], fitted(subtitle, 14.0), Anchor::Start, FAINT, subtitle);
     legend(&mut picture, top, &view, [deepest, frame.deepest()], arrow, stage.dt);
     super::joints::legend(&mut picture, stage, [MARGIN, top + LEGEND], INK);
     picture
@@ -256,8 +258,9 @@ fn legend(
     let (bar_y, text_y, quarter) =
         (top + 34.0, top + 58.0, (f64::from(picture.size[0]) - 2.0 * MARGIN) / 4.0);
     let column = |k: usize| MARGIN + quarter * k as f64;
+    let size = (0.06 * quarter).min(13.0);
     let text = |picture: &mut Picture, x: f64, y: f64, anchor, text: String| {
-        picture.text([x, y], 13.0, anchor, INK, text);
+        picture.text([x, y], size, anchor, INK, text);
     };
     // A length.
     let meters = round_down(0.6 * quarter / view.scale);
@@ -304,7 +307,7 @@ fn legend(
         text(picture, x, bar_y + 4.0, Anchor::Start, "no impulses".into());
     }
     // Points and normals.
-    let x = column(3) + 0.25 * quarter;
+    let x = column(3) + (quarter - 200.0).clamp(6.0, 0.25 * quarter);
     picture.line([x, bar_y], [x, bar_y - 14.0], NORMAL, 1.6);
     picture.items.push(Item::Disc { at: [x, bar_y], radius: 4.0, color: INK, title: String::new() });
     picture.items.push(Item::Disc { at: [x, bar_y], radius: 3.0, color: RAMP[0], title: String::new() });

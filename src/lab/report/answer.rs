@@ -22,7 +22,7 @@ const MOST_NOTES: usize = 7;
 /// Waits beyond this share of the time are worth a warning (1).
 const BUSY: f64 = 0.02;
 
-/// What the columns of the answer are.
+/// The columns of the answer.
 const LEGEND: &str = "\
 Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the
 tolerances of the scene (`simpulse scene NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
@@ -49,7 +49,7 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
     text + &format!("\n{LEGEND}") + &left_out(records) + &differing(records)
 }
 
-/// What to use, in a sentence with its conditions; and where the default solver stands. Also for the page.
+/// The recommendation with its conditions, and the rank of the default solver. Also for the page.
 pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
     let standings = &ranking.standings;
     let mut text = String::new();
@@ -169,7 +169,7 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     text
 }
 
-/// What was tried, and where.
+/// The settings that ran, and the machine.
 fn head(records: &[Record], environment: &Environment, scenes: usize) -> String {
     let mut lanes: Vec<usize> =
         records.iter().filter(|r| r.order == Order::Colored).map(|r| r.lanes).collect();
@@ -271,7 +271,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// What keeps a setting from being good enough.
+/// The reason why a setting is not good enough.
 fn worst(record: &Record) -> String {
     if let Some(why) = record.fails_later() {
         return why;
@@ -390,7 +390,7 @@ fn standings(ranking: &Ranking, scenes: usize) -> String {
     )
 }
 
-/// What waves of impacts gain and cost, in a line; nothing where both were not run.
+/// Gain and cost of waves of impacts, in a line; empty unless both treatments ran.
 fn waves(records: &[Record]) -> String {
     let found = study::impacts::gains(records);
     if found.is_empty() {

@@ -15,7 +15,7 @@ use crate::lab::units::{bodies, si};
 /// Width and height of a plot (pixels).
 const SIZE: [f64; 2] = [330.0, 290.0];
 
-/// What a plot shows against the swept value.
+/// The quantity that a plot shows against the swept value.
 #[derive(Clone, Copy)]
 enum Shown {
     Time,
@@ -150,7 +150,7 @@ pub fn section(records: &[Record]) -> String {
     text + &format!("<pre class=\"sweep-table\">{}</pre>\n", lines.join("\n"))
 }
 
-/// What the reference value of a scene is of; nothing where none is known.
+/// The quantity of a scene's reference value; empty if none is known.
 fn reference(scene: &[Record]) -> String {
     scene.iter().find_map(|r| r.truth).map_or(String::new(), |t| format!("; reference value: {}", t.quantity))
 }
