@@ -49,7 +49,7 @@ use warm::{WarmStartSource, Warmed};
 /// Residuals whose first iteration is reported (1).
 pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
-/// What to run.
+/// Solvers and options of a run.
 #[derive(Clone, Debug)]
 pub struct ConvergeOptions {
     /// Solvers, in this order.

@@ -72,7 +72,7 @@ pub enum Demand {
     Contains(Outside),
     /// No dynamic body's center is outside of this box, given by its lowest and highest corner (m).
     Inside([[f64; 2]; 2]),
-    /// What moves comes to rest. How much may move in the end is a tolerance
+    /// Moving bodies come to rest. How much may move in the end is a tolerance
     /// ([`Tolerances::rest`](super::tolerance::Tolerances::rest)); here it says that the scene has to stand for a
     /// minute.
     Rests,
@@ -218,7 +218,7 @@ impl HoldWatch {
         self.previous = now;
     }
 
-    /// What is not a number meets nothing.
+    /// NaN meets no condition.
     fn is_met(&self, demand: &Demand, world: &World, now: &[DVec2]) -> bool {
         match demand {
             Demand::Stands => self.touching.iter().all(|&[a, b]| {
@@ -384,7 +384,7 @@ mod tests {
         scene.build(Settings::new(find(DEFAULT).unwrap())).unwrap()
     }
 
-    /// What is broken once body `i` is at `place`.
+    /// The condition that fails once body `i` is at `place`.
     fn moved(name: &str, demands: &[Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
         let mut world = build(&load(name).unwrap().scene);
         let mut watch = HoldWatch::new(&world, demands);
