@@ -1,9 +1,7 @@
 //! Joints as people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
 
-use super::frame::Stage;
 use super::outline::placed;
 use super::{Color, Item, Picture};
-use crate::engine::bodies::BodyKind;
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
 
@@ -81,20 +79,16 @@ pub fn records(world: &World) -> Vec<JointRecord> {
 }
 
 /// Draws joints of bodies at `poses`, `size` pixels wide, where `at` takes places of the stage (m) to pixels. A hinge
-/// outside of a body has a line to its middle.
+/// farther from the middle of a body than its `reach` (m) has a line to there.
 pub(super) fn draw(
     picture: &mut Picture,
-    stage: &Stage,
+    joints: &[JointRecord],
     poses: &[[f64; 3]],
+    reach: &[f64],
     size: f64,
     at: impl Fn([f64; 2]) -> [f64; 2],
 ) {
-    let mut reach = vec![0.0_f64; poses.len()];
-    for (body, shape) in &stage.shapes {
-        let own = &mut reach[*body as usize];
-        shape.for_each_vertex(|v| *own = own.max(f64::from(v.length() + shape.radius())));
-    }
-    for joint in &stage.joints {
+    for joint in joints {
         let a = poses[joint.bodies[0] as usize];
         let [p, q] = joint.ends(poses).map(&at);
         // Along the axis as far as b's anchor, and a bit on.
@@ -128,7 +122,7 @@ pub(super) fn draw(
                 line(picture, p, q);
                 for (k, end) in [p, q].into_iter().enumerate() {
                     let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
-                    if stage.kinds[i] == BodyKind::Dynamic && anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
+                    if anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
                         line(picture, at([poses[i][0], poses[i][1]]), end);
                     }
                 }

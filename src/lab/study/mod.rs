@@ -58,8 +58,8 @@ use interleave::Interleaved;
 pub use plan::{StudyPlan, is_path, open_scene};
 pub use record::{FailedAt, Fronts, Record, TruthError, mark_fronts};
 use sample::Sample;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
 
 /// Scenes of the default study: each shows something that the others do not.
