@@ -4,7 +4,8 @@ use crate::engine::clock::Phase;
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
-use crate::lab::study::interleave::{Sample, median, time_in_turns};
+use crate::lab::study::interleave::time_in_turns;
+use crate::lab::study::sample::{Sample, median};
 use crate::lab::units::{digits, si};
 use std::time::{Duration, Instant};
 

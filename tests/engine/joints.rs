@@ -245,6 +245,7 @@ fn joints_that_cannot_be_are_refused_in_one_line() {
 }
 
 #[test]
+#[cfg(feature = "lab")]
 fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     let (mut world, ground) = empty(find("shim").unwrap());
     let joints = chain(&mut world, ground, 5, 0.5);

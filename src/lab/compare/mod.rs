@@ -20,7 +20,7 @@ use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis;
-use crate::lab::study::interleave::{Sample, median};
+use crate::lab::study::sample::{Sample, median};
 use serde::Serialize;
 use solvers::SolverChange;
 

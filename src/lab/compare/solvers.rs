@@ -5,7 +5,7 @@
 //! slowdown that no single setting shows.
 
 use super::{FEWEST, SettingPair, Verdict, judged_within};
-use crate::lab::study::interleave::median;
+use crate::lab::study::sample::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;

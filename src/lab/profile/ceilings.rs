@@ -5,7 +5,7 @@
 //! widest lanes there are, since they ask what memory can do; the third the width of the run.
 
 use crate::engine::lanes::{Block, LaneWidth, Lanes};
-use crate::lab::study::interleave::median;
+use crate::lab::study::sample::median;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use wide::{f32x4, f32x8, f32x16};

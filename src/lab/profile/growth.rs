@@ -10,7 +10,7 @@ use super::waiting::{self, waited};
 use crate::engine::clock::{Phase, Timings};
 use crate::engine::world::{Memory, StepCounts, World};
 use crate::lab::metrics::Errors;
-use crate::lab::study::interleave::median;
+use crate::lab::study::sample::median;
 use std::time::{Duration, Instant};
 
 /// A world that takes part.

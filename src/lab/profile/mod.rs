@@ -26,7 +26,7 @@ pub mod waiting;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;
 use crate::engine::world::{HeldWorld, Probe, StepCounts};
-use crate::lab::study::interleave::median;
+use crate::lab::study::sample::median;
 use ceilings::{Buffer, MemoryLevel, levels, multiply_adds};
 use std::time::{Duration, Instant};
 use traffic::Traffic;

@@ -238,7 +238,7 @@ fn cheapest(scenes: &[Answer]) -> String {
 
 /// Solver, budget with lanes, mean, median and longest step.
 fn setting(record: &Record) -> [String; 5] {
-    let time = |ns: fn(&crate::lab::study::interleave::Sample) -> f64| {
+    let time = |ns: fn(&crate::lab::study::sample::Sample) -> f64| {
         record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
     };
     [

@@ -6,7 +6,7 @@
 //! interruption is one ratio among many, and a clock that drifts is in both halves of a pair. A ratio of 1 within the
 //! interval is a tie, and so is a negligible difference.
 
-use super::interleave::{Sample, median};
+use super::sample::{Sample, median};
 use std::cmp::Ordering;
 
 /// Times closer than this share are a tie (1): code that moved in memory changes them as much.

@@ -6,7 +6,7 @@
 //! have the smaller error.
 
 use super::compare::compare;
-use super::interleave::Sample;
+use super::sample::Sample;
 use std::cmp::Ordering;
 
 /// What a setting costs and how wrong it is.

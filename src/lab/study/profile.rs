@@ -15,7 +15,7 @@
 use super::Record;
 use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
-use super::interleave::Sample;
+use super::sample::Sample;
 
 /// For each solver the least time of its `allowed` records of one scene, relative to that of the fastest solver; a
 /// time that ties with the least is 1. None where no record is allowed.

@@ -1,8 +1,8 @@
 //! Results of a study: one record per setting, and which records are on a Pareto front.
 
 use super::curve::ErrorAxis;
-use super::interleave::Sample;
 use super::pareto::{self, TimeAndError};
+use super::sample::Sample;
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
@@ -285,7 +285,7 @@ fn is_fastest(group: &[Record], i: usize) -> bool {
 pub(crate) mod tests {
     use super::*;
     use crate::lab::scenes::{Scene, SceneBody, SceneShape};
-    use crate::lab::study::interleave::Load;
+    use crate::lab::study::sample::Load;
 
     /// A record of `stack:2` by `pgs` in colors, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {

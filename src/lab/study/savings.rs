@@ -7,7 +7,8 @@
 //!
 //! Scenes of few contacts are left out: what their sweeps cost is the cost of starting them.
 
-use super::interleave::{Sample, time_in_turns};
+use super::interleave::time_in_turns;
+use super::sample::Sample;
 use super::{Progress, StudyPlan, timing_steps};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Features;

@@ -27,7 +27,7 @@ use crate::engine::constraints::records::rows::ROWS;
 use crate::engine::lanes::held;
 
 /// Numbers per row of a block.
-type Rows = [f32; ROWS];
+type JointRows = [f32; ROWS];
 
 /// Joints of a world, and what is kept of their rows.
 #[derive(Clone, Debug, Default)]
@@ -38,29 +38,29 @@ pub(crate) struct JointDescent {
     starts: Vec<u32>,
     /// Their bodies. `[blocks]`
     bodies: Vec<[u32; 2]>,
-    blocks: Vec<Kept>,
+    blocks: Vec<KeptBlock>,
     found: Vec<RowBlock>,
 }
 
 /// What is kept of a block from iteration to iteration, and of its penalties from step to step.
 #[derive(Clone, Copy, Debug, Default)]
-struct Kept {
+struct KeptBlock {
     /// λ (N or N·m)
-    force: Rows,
+    force: JointRows,
     /// k (N/m or N·m)
-    penalty: Rows,
+    penalty: JointRows,
     /// C⁰ (m or rad)
-    first: Rows,
+    first: JointRows,
 }
 
 /// A block where bodies are now.
 struct Forces {
     /// f (N or N·m)
-    force: Rows,
+    force: JointRows,
     /// −∂f/∂C
-    stiffness: [Rows; ROWS],
+    stiffness: [JointRows; ROWS],
     /// What is to vanish (m or rad).
-    error: Rows,
+    error: JointRows,
     /// The rows' penalties may grow.
     grows: bool,
 }
@@ -92,7 +92,7 @@ impl JointDescent {
             self.bodies.clear();
             self.bodies.extend(bodies);
             self.blocks.clear();
-            self.blocks.resize(self.bodies.len(), Kept::default());
+            self.blocks.resize(self.bodies.len(), KeptBlock::default());
         }
     }
 
@@ -192,7 +192,7 @@ impl JointDescent {
 }
 
 /// See the [module](self).
-fn forces(block: &RowBlock, kept: &Kept, h: f32, alpha: f32) -> Forces {
+fn forces(block: &RowBlock, kept: &KeptBlock, h: f32, alpha: f32) -> Forces {
     let mut stiffness = [[0.0; ROWS]; ROWS];
     let mut error = [0.0; ROWS];
     let inv_square = 1.0 / (h * h);
@@ -242,7 +242,7 @@ fn forces(block: &RowBlock, kept: &Kept, h: f32, alpha: f32) -> Forces {
 }
 
 /// K⁻¹ times `scale`.
-fn inverse(block: &RowBlock, scale: f32) -> [Rows; ROWS] {
+fn inverse(block: &RowBlock, scale: f32) -> [JointRows; ROWS] {
     let mut columns = [[0.0; ROWS]; ROWS];
     for (c, column) in columns.iter_mut().enumerate().take(block.size) {
         let mut unit = [0.0; ROWS];

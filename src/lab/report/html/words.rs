@@ -11,8 +11,8 @@ use crate::lab::study::Record;
 use crate::lab::study::answer::Answer;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::ErrorAxis as Axis;
-use crate::lab::study::interleave::Sample;
 use crate::lab::study::ranking::{CLOSE, Ranking, ranking};
+use crate::lab::study::sample::Sample;
 use crate::lab::units::si;
 
 /// A solver's name with its marker.
