@@ -40,11 +40,8 @@ proptest! {
         let scene = pair(angles, offset, speed, spins, friction, density);
         let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
         let before = totals(&world);
-        let mut deepest = 0.0_f64;
         for _ in 0..60 {
             world.step().unwrap();
-            let points = world.contacts.iter().flat_map(|contact| contact.manifold.points());
-            deepest = points.map(|point| -f64::from(point.separation)).fold(deepest, f64::max);
         }
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
@@ -52,11 +49,12 @@ proptest! {
             // 60 · 14 substeps round each velocity four times, by 2⁻²⁴ of it: √3360 · 6e-8 = 3.5e-6, and six times that.
             prop_assert!((after[k] - before[k]).abs() < 2.1e-5 * scale, "{before:?} {after:?}");
         }
-        // A gap that closes within a step without having been foreseen leaves an overlap q. Springs that push it out have
-        // other arms when they give their impulse back: by then one body has slid past the other, and μ q v_t is gained.
+        // A gap that closes within a step without having been foreseen leaves an overlap. Springs that push it out in the next
+        // step, with an impulse of μ v_n at most, act on both bodies at points that were one when that step began, and are
+        // v_t h apart at its end: μ v_n v_t h is gained at most.
         let reduced = 1.6 * density / (1.6 + density);
         let passing = speed[0].hypot(speed[1]) + 0.95 * spins[0].abs() + 0.75 * spins[1].abs();
-        let gained = reduced * deepest * passing;
+        let gained = reduced * passing * passing / 60.0;
         prop_assert!((after[2] - before[2]).abs() < 0.01 * scale + gained, "{before:?} {after:?}");
         prop_assert!(after[3] < 1.0001 * before[3], "{before:?} {after:?}");
     }

@@ -4,7 +4,7 @@
 //! **Source.** `boyd2011`, section 3; `desaxce1998` (friction as one cone, of which µ |ut| is part of the
 //! normal velocity).
 //!
-//! **Departures.** The linear problem is solved by a few steps of conjugate gradients, from the last
+//! **Departures.** Rows of joints are in the same vectors, with their bounds in place of cones. The linear problem is solved by a few steps of conjugate gradients, preconditioned by D, from the last
 //! solution on. ρ is scaled by each point's effective mass, the same along n and t. The multiplier
 //! starts where the contact law puts it, at −u.
 //!
@@ -26,10 +26,10 @@
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::point_vector::{
-    Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, update,
+    Entry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, sum_of_products, update,
 };
 use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
 use crate::engine::lanes::Lanes;
@@ -60,7 +60,6 @@ pub static SOLVER: Variant = Variant {
             trials: &[3.0, 6.0],
         },
     ],
-    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
         (Law::Rest, "20 iterations are too few for tall stacks"),
@@ -74,30 +73,45 @@ fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let [fraction, penalty, linear] = [0, 1, 2].map(|i| passes.parameter(i));
     let rule = Baumgarte::new(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let law = rule.of_errors();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
-        let [mut bias, mut stiffness, mut lambda, mut z, mut w] = [(); 5].map(|_| passes.vector());
+        let [mut bias, mut stiffness, mut inverse, mut lambda, mut z, mut w] =
+            [(); 6].map(|_| passes.vector());
         let [mut u, mut right, mut direction, mut image, mut step] = [(); 5].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| {
             system.lane_surfaces(&mut bias);
             update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+            system.lane_bias(law, &mut bias);
             system.lane_masses(&mut stiffness);
-            // ρ D⁻¹, the same along n and t.
-            update([&mut stiffness], [], |[mass], []| [quotient([Wide::splat(penalty); 2], [mass[0]; 2])]);
+            // ρ D⁻¹ and D/(1 + ρ), the same along n and t.
+            update([&mut stiffness, &mut inverse], [], |[mass, _], []| {
+                let mass = [mass[0]; 2];
+                [quotient([Wide::splat(penalty); 2], mass), scaled(1.0 / (1.0 + penalty), mass)]
+            });
             system.lane_impulses(&mut lambda);
             z.clone_from(&lambda);
-            velocity(system, &bias, &mut u);
+            velocity(system, &bias, &mut lambda, &mut u);
             update([&mut w], [&u, &bias, &stiffness], |_, [u, bias, stiffness]| {
                 let w = quotient(scaled(-1.0, with_slide(u, bias)), stiffness);
                 // A multiplier is in the polar cone.
-                [difference(w, cone::project(w, bias[1]))]
+                [difference(w, cone::project_point(w, bias[1]))]
             });
+            if system.has_joints() {
+                // What is beyond the bounds of a joint of z − u/S.
+                update([&mut right], [&u, &stiffness, &z], |_, [u, stiffness, z]| {
+                    [difference(z, quotient(u, stiffness))]
+                });
+                step.clone_from(&right);
+                system.bound_lanes(&mut step);
+                update([&mut w], [&right, &step], |[w], [all, within]| [sum(w, difference(all, within))]);
+            }
         });
         for _ in 0..budget.velocity_iterations {
             passes.with_system(Phase::Solve, |system| {
                 // Residual of the linear problem at λ: velocities are those of λ.
-                velocity(system, &bias, &mut u);
+                velocity(system, &bias, &mut lambda, &mut u);
                 update(
                     [&mut right],
                     [&u, &bias, &stiffness, &z, &w, &lambda],
@@ -109,14 +123,20 @@ fn step(passes: &mut Passes<'_>) {
                 conjugate_gradients(
                     system,
                     linear as u32,
-                    &stiffness,
+                    [&stiffness, &inverse],
                     [&mut lambda, &mut right, &mut direction, &mut image, &mut step, &mut u],
                 );
                 update([&mut z, &mut w], [&lambda, &bias], |[_, w], [lambda, bias]| {
                     let both = sum(lambda, w);
-                    let z = cone::project(both, bias[1]);
+                    let z = cone::project_point(both, bias[1]);
                     [z, difference(both, z)]
                 });
+                if system.has_joints() {
+                    // Of joints z is λ + w by now, and w zero.
+                    right.clone_from(&z);
+                    system.bound_lanes(&mut z);
+                    update([&mut w], [&right, &z], |[w], [both, z]| [sum(w, difference(both, z))]);
+                }
                 system.set_lane_impulses(&mut z);
             });
             passes.count_sweep(2);
@@ -128,17 +148,18 @@ fn step(passes: &mut Passes<'_>) {
             system.push_lanes(&mut step);
         });
         passes.solves(&Sweep(rule));
-        passes.give_back([bias, stiffness, lambda, z, w]);
+        passes.give_back([bias, stiffness, inverse, lambda, z, w]);
         passes.give_back([u, right, direction, image, step]);
         passes.integrate_positions();
         passes.end_substep(substep);
     }
 }
 
-/// u = J v + b, b along n alone.
-fn velocity(system: &mut System<'_>, bias: &PointVector, to: &mut PointVector) {
+/// u = J v + b + R λ, b along n alone; R of joints with springs.
+fn velocity(system: &mut System<'_>, bias: &PointVector, lambda: &mut PointVector, to: &mut PointVector) {
     system.lane_velocities(to);
     update([to], [bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
+    system.soften_lanes(to, lambda);
 }
 
 /// u + (µ |ut|, 0), the second entry of `bias` being µ.
@@ -150,11 +171,13 @@ fn with_slide(u: Entry, bias: Entry) -> Entry {
 fn conjugate_gradients(
     system: &mut System<'_>,
     steps: u32,
-    stiffness: &PointVector,
+    [stiffness, inverse]: [&PointVector; 2],
     [lambda, residual, direction, image, step, before]: [&mut PointVector; 6],
 ) {
-    direction.clone_from(residual);
-    let mut square = dot(residual, residual);
+    // Preconditioned: rows of soft joints are stiffer than contacts by any factor.
+    let norm = |r: &PointVector| sum_of_products([r, inverse], |[r, m]| [r, [0, 1].map(|k| m[k] * r[k])]);
+    update([direction], [residual, inverse], |_, [r, m]| [[0, 1].map(|k| m[k] * r[k])]);
+    let mut square = norm(residual);
     for _ in 0..steps {
         if square <= 0.0 {
             break;
@@ -166,6 +189,7 @@ fn conjugate_gradients(
         update([image], [before, stiffness, direction], |[after], [before, stiffness, p]| {
             [[0, 1].map(|k| after[k] - before[k] + stiffness[k] * p[k])]
         });
+        system.soften_lanes(image, direction);
         let curve = dot(direction, image);
         if curve <= 0.0 {
             // Rounding: take the trial back and stop.
@@ -178,9 +202,11 @@ fn conjugate_gradients(
             [scaled(length - 1.0, p), plus_scaled(lambda, length, p), plus_scaled(residual, -length, image)]
         });
         system.push_lanes(step);
-        let next = dot(residual, residual);
+        let next = norm(residual);
         let beta = (next / square) as f32;
         square = next;
-        update([direction], [residual], |[p], [r]| [plus_scaled(r, beta, p)]);
+        update([direction], [residual, inverse], |[p], [r, m]| {
+            [plus_scaled([0, 1].map(|k| m[k] * r[k]), beta, p)]
+        });
     }
 }

@@ -10,14 +10,18 @@
 //! of a body is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has
 //! drifted, not its two anchors, so that along n it is where the manifold of the step has it. There is no geometric
 //! stiffness: rows are linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The
-//! cone is that of the normal force of the same iteration, not of the last one. Spins have no limit. There are rows
-//! of contacts alone: constraints of other types do nothing.
+//! cone is that of the normal force of the same iteration, not of the last one. Spins have no limit. Springs of joints
+//! follow the law of springs here, exact at rest and in their decay (`avbd/joints.rs`); motors and springs have stiffness of
+//! their own instead of a penalty that grows.
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
-//! a color (`avbd/descent.rs`). Sweeps of a step request 9477 B per contact.
+//! a color (`avbd/descent.rs`), and with their joints one by one. Sweeps of a step request 9477 B per contact.
 //!
-//! **Fails when** iterations are few for the height of a stack: a penalty needs them to grow, and
+//! **Fails when** a loop of joints spins: penalties that have grown beyond M/h² lock bodies to where their neighbors are, and
+//! the loop as a whole turns too little in an iteration. A triangle of rods goes from 3 to 16 rad/s with 10 iterations or 50
+//! (`simpulse verify --cases A29`); with 500, or without growth, it loses speed as one step of implicit Euler does. Also when
+//! iterations are few for the height of a stack: a penalty needs them to grow, and
 //! descent carries a change by one body per iteration. In `f32` a body is lost where penalties exceed
 //! its inertia M/h² by more than seven digits. From zero, orders hardly matter: penalties begin at 1 N/m, M/h² of a
 //! unit box is 3600 N/m at 60 Hz, and while they are that soft a body does not feel in one iteration what its
@@ -42,16 +46,20 @@
 //! the share α γ.
 
 mod descent;
+mod input;
+mod joints;
 mod lanes;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::types::{Joined, Placed};
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
 use crate::engine::params::{Budget, Parameter};
-use descent::{Descent, DescentInput, NORMAL, PER_BODY, PER_POINT, TANGENT};
+use descent::{Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
+use input::DescentInput;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -87,7 +95,6 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     kept: KeptSize { per_point: PER_POINT, per_body: PER_BODY, ..KeptSize::NONE },
-    holds_no_joints: Some("its bodies see rows of contacts alone"),
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),
@@ -128,6 +135,7 @@ impl Solver for Avbd {
             }
             self.run(passes, Phase::Solve, |descent, on| descent.hold(on));
             keep_impulses(passes, h);
+            passes.reload_types();
             passes.hide_turns();
             passes.end_substep(substep);
         }
@@ -148,9 +156,12 @@ impl Avbd {
         if !passes.runs(Phase::Solve) {
             return;
         }
-        passes.build_graph(&mut self.graph);
-        let StepParts { work: Workspace { rows, lanes, serial, .. }, contacts, width, .. } = passes.parts();
-        let sequence = lanes.segments().is_empty().then(|| serial.contact());
+        passes.build_whole_graph(&mut self.graph);
+        let StepParts { work: Workspace { rows, poses, types, lanes, serial, .. }, contacts, width, .. } =
+            passes.parts();
+        let colored = |types: &[Joined]| types.iter().any(|joined| joined.is_colored());
+        let sequence = (lanes.segments().is_empty() && !colored(types)).then(|| serial.contact());
+        self.descent.joints.assign(types, Placed { rows, poses });
         self.descent.assign(rows, contacts, &self.graph, width, sequence);
     }
 
@@ -169,13 +180,30 @@ impl Avbd {
         if !passes.runs(phase) {
             return;
         }
-        let StepParts { work: Workspace { rows, motion, kept, .. }, contacts, input, clock, .. } =
-            passes.parts();
+        let StepParts {
+            work: Workspace { rows, motion, kept, types, poses, .. },
+            contacts,
+            input,
+            clock,
+            ..
+        } = passes.parts();
         let Features { rotation, friction, .. } = input.features;
         let (increments, bodies) = (motion.velocity_increments(), rows.len() - 1);
         work(
             &mut self.descent,
-            &mut DescentInput { rows, kept, contacts, increments, bodies, rotation, friction },
+            &mut DescentInput {
+                rows,
+                kept,
+                contacts,
+                increments,
+                bodies,
+                rotation,
+                friction,
+                types,
+                poses,
+                graph: &self.graph,
+                h: input.h,
+            },
         );
         // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
         let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);

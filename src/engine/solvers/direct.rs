@@ -8,20 +8,19 @@
 //! **Departures.** Contacts with more supports than a body needs make the linear problem singular. So Newton solves
 //! a proximal problem: ε D (λ − λ₀) is added to the relative velocities, λ₀ being the impulses
 //! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
-//! Overlap is pushed apart as in [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
+//! Rows of joints are in the same system: a row holds, or has the impulse at its bound. Overlap is pushed apart as in
+//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
 //! finds nothing better, and in scenes with more than `largest` points, they are the answer.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then, for m points, a matrix of
-//! 4m² entries (32m² B) and up to `velocity_iterations` factorizations of 16m³/3 operations in `f64`, one lane.
-//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 27, 85, 250 and 890 µs where
-//! eight sweeps take 4 to 9 µs. Sweeps of moderate accuracy are always cheaper; sweeps of
-//! [`super::anderson`] from a cold start to a residual of 10⁻⁴ take 60, 96 and 319 µs for 10, 20 and 40
-//! boxes, so that it loses to those, too, from some 40 points on. Lemke's method takes 79 and 520 µs for
-//! stacks of 5 and 10 boxes where Newton's takes 11 and 28: a pivot goes through a tableau of 16m² entries, and there
-//! are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
+//! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
+//! within the envelope of the matrix (`numerics/envelope.rs`), n b² operations in `f64` for n rows in a band of b, one lane.
+//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 31, 48, 72 and 121 µs where eight sweeps take 4
+//! to 13 µs and fall from 20 boxes on (AMD EPYC, AVX2, 2026-11-23). Bands of pyramids are wide: with `largest` at 2000,
+//! `pyramid:10` takes 5.6 ms and `pyramid:20` 72 ms. Lemke's method takes 79 and 520 µs for stacks of 5 and 10 boxes: a
+//! pivot goes through a tableau of 16m² entries for m points, and there are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
 //! loses from the first point on. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** there are many points (a factorization grows by m³), and where friction lets a point
+//! **Fails when** there are many points in wide bands, and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
 //!
 //! # The method
@@ -40,8 +39,11 @@
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::rules::NormalRule;
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::numerics::envelope::Envelope;
+use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
+use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::system::{Pair, PointRows};
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule, System};
 use crate::engine::lanes::BodyRow;
@@ -68,7 +70,7 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 100.0,
             range: [0.0, 2000.0],
-            meaning: "contact points up to which Newton's method, or Lemke's, is tried",
+            meaning: "contact points, and pairs of rows of joints, up to which Newton's method, or Lemke's, is tried",
             trials: &[],
         },
         Parameter {
@@ -80,7 +82,6 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    holds_no_joints: Some("its system has rows of contacts alone"),
     breaks: &[
         (Law::NoAllocation, "matrices are as large as the scene"),
         (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
@@ -111,8 +112,14 @@ fn step(passes: &mut Passes<'_>) {
         for _ in 0..sweeps {
             passes.sweep(Phase::Solve, &sweep);
         }
-        let is_small = passes.points() <= largest;
-        let begin = |system: &mut System<'_>| is_small.then(|| Newton::new(system, &rule));
+        let points = passes.points();
+        let is_small = points <= largest;
+        let begin = |system: &mut System<'_>| {
+            let joints =
+                if is_small && system.has_joints() { system.joint_blocks() } else { JointBlocks::default() };
+            let rows = joints.blocks.iter().map(|block| block.size).sum::<usize>();
+            (is_small && points + rows / 2 <= largest).then(|| Newton::new(system, &rule, joints, h))
+        };
         let mut newton = passes.with_system(Phase::Solve, begin);
         for _ in 0..budget.velocity_iterations {
             if let Some(newton) = &mut newton {
@@ -138,22 +145,27 @@ struct Newton {
     written: Vec<Pair>,
     surfaces: Vec<Pair>,
     delta: Vec<Pair>,
+    joints: JointBlocks,
 }
 
 impl Newton {
-    fn new(system: &mut System<'_>, rule: &Baumgarte) -> Self {
+    fn new(system: &mut System<'_>, rule: &Baumgarte, joints: JointBlocks, h: f32) -> Self {
         let [mut written, mut velocities, mut surfaces] = [(); 3].map(|_| Vec::new());
         system.impulses(&mut written);
         system.relative_velocities(&mut velocities);
         system.gaps_and_friction(&mut surfaces);
         velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
         let points: Vec<PointRows> = system.point_rows().collect();
-        let problem = Problem::new(system.rows(), points, &written, &velocities, &surfaces);
+        let mut problem = Problem::new(points, &written, &velocities, &surfaces);
+        for block in &joints.blocks {
+            problem.join(system.rows(), block, rule.of_errors().bias_rate, h);
+        }
+        problem.couple(system.rows(), &joints.blocks);
         let impulses = problem.start.clone();
         let arguments = problem.arguments(&impulses);
         let merit = problem.merit(&impulses, &arguments);
         let delta = vec![[0.0; 2]; written.len()];
-        Newton { problem, impulses, arguments, merit, done: false, written, surfaces, delta }
+        Newton { problem, impulses, arguments, merit, done: false, written, surfaces, delta, joints }
     }
 
     /// One step as far as the residual falls; impulses and velocities follow.
@@ -207,69 +219,206 @@ impl Newton {
         }
         system.set_impulses(&self.written);
         system.apply(&self.delta);
+        if self.joints.blocks.is_empty() {
+            return;
+        }
+        let new = &self.impulses[2 * self.problem.points.len()..];
+        let mut new = new.iter().zip(&self.problem.rows[2 * self.problem.points.len()..]);
+        for block in &mut self.joints.blocks {
+            for (r, (&impulse, row)) in (0..block.size).zip(&mut new) {
+                let change = impulse as f32 - std::mem::replace(&mut block.impulses[r], impulse as f32);
+                for (body, j) in row.bodies.into_iter().zip(row.jacobian) {
+                    let Some(on) = system.rows().get_mut(body as usize) else { continue };
+                    let inverse = [on.velocity[3], on.velocity[3], on.delta[3]];
+                    (0..3).for_each(|c| on.velocity[c] += inverse[c] * j[c] as f32 * change);
+                }
+            }
+        }
+        system.set_joint_impulses(&self.joints);
     }
 }
 
+/// What a row does in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
-    Open,
-    Stick,
-    /// λt = this times λn.
-    Slip(f64),
+    /// u = 0.
+    Holds,
+    /// λ is this.
+    Fixed(f64),
+    /// λ is this times that of the row before it.
+    Slips(f64),
 }
 
-/// The law of a step around the impulses that the sweeps left. Entry 2i of a vector is the normal one
-/// of point i, 2i + 1 the tangential one.
+/// One row of the Jacobian.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    bodies: [u32; 2],
+    /// Of a and b.
+    jacobian: [[f64; 3]; 2],
+}
+
+/// Bounds of the rows of a joint.
+#[derive(Clone, Copy, Debug)]
+enum Bound {
+    Free,
+    NotNegative,
+    /// The norm of this row and of those that follow, so many in all.
+    Norm {
+        cap: f64,
+        size: usize,
+    },
+    /// One that follows.
+    Same,
+}
+
+/// The law of a step around the impulses that the sweeps left. Rows 2i and 2i + 1 are the normal and the tangential one of
+/// point i; behind the points come rows of joints.
 struct Problem {
     points: Vec<PointRows>,
     friction: Vec<f64>,
+    rows: Vec<Row>,
+    /// Of the rows of joints.
+    bounds: Vec<Bound>,
     /// λ₀ (N·s)
     start: Vec<f64>,
     /// u there, the bias included (m/s).
     velocity: Vec<f64>,
-    /// K, by rows (1/kg).
-    matrix: Vec<f64>,
+    /// K + R: its entries (1/kg) by rows, columns ascending, and where each row begins. `[rows + 1]`
+    entries: Vec<(usize, f64)>,
+    begins: Vec<usize>,
+    /// Its diagonal (1/kg).
+    diagonal: Vec<f64>,
 }
 
 impl Problem {
-    fn new(
-        rows: &[BodyRow],
-        points: Vec<PointRows>,
-        impulses: &[Pair],
-        velocities: &[Pair],
-        surfaces: &[Pair],
-    ) -> Self {
+    /// Of contact points alone, without the matrix.
+    fn new(points: Vec<PointRows>, impulses: &[Pair], velocities: &[Pair], surfaces: &[Pair]) -> Self {
         let flat = |v: &[Pair]| points.iter().flat_map(|p| v[p.at].map(f64::from)).collect::<Vec<_>>();
-        let n = 2 * points.len();
-        let mut matrix = vec![0.0; n * n];
         // J of a point on one of its bodies, along u: ±u and ± r × u.
-        let row = |p: &PointRows, side: usize, axis: usize| {
+        let of = |p: &PointRows, side: usize, axis: usize| {
             let sign = if side == 0 { -1.0 } else { 1.0 };
             let [x, y] = p.axes[axis];
             [x, y, p.arms[axis][side]].map(|j| sign * f64::from(j))
         };
-        for (i, p) in points.iter().enumerate() {
-            for (j, q) in points.iter().enumerate() {
-                for (side, body) in p.bodies.into_iter().enumerate() {
-                    let Some(other) = q.bodies.into_iter().position(|b| b == body) else { continue };
-                    let Some(mass) = rows.get(body as usize) else { continue };
-                    let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
-                    for axis in 0..2 {
-                        for along in 0..2 {
-                            let (a, b) = (row(p, side, axis), row(q, other, along));
-                            let k: f64 = (0..3).map(|c| a[c] * inverse[c] * b[c]).sum();
-                            matrix[(2 * i + axis) * n + 2 * j + along] += k;
-                        }
-                    }
-                }
+        let row =
+            |p: &PointRows, axis: usize| Row { bodies: p.bodies, jacobian: [of(p, 0, axis), of(p, 1, axis)] };
+        let rows = points.iter().flat_map(|p| [row(p, 0), row(p, 1)]).collect();
+        let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
+        let (start, velocity) = (flat(impulses), flat(velocities));
+        Problem {
+            friction,
+            start,
+            velocity,
+            rows,
+            bounds: vec![],
+            entries: vec![],
+            begins: vec![],
+            diagonal: vec![],
+            points,
+        }
+    }
+
+    /// Adds the rows of a block of a joint.
+    fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rate: f32, h: f32) {
+        let (bias, softness) = (block.bias(rate, h), f64::from(block.softness()));
+        for r in 0..block.size {
+            let row = Row { bodies: block.bodies, jacobian: [block.on(0, r), block.on(1, r)] };
+            let speed = |side: usize| {
+                let body = bodies.get(row.bodies[side] as usize).copied().unwrap_or_default();
+                (0..3).map(|c| row.jacobian[side][c] * f64::from(body.velocity[c])).sum::<f64>()
+            };
+            let soft = (0..block.size)
+                .map(|c| softness * f64::from(block.response[r][c]) * f64::from(block.impulses[c]))
+                .sum::<f64>();
+            self.velocity.push(speed(0) + speed(1) + f64::from(bias[r]) + soft);
+            self.start.push(f64::from(block.impulses[r]));
+            self.rows.push(row);
+            self.bounds.push(match (block.law, block.cap()) {
+                (RowLaw::Limit, _) => Bound::NotNegative,
+                (_, Some(_)) if r > 0 => Bound::Same,
+                (_, Some(cap)) => Bound::Norm { cap: f64::from(cap), size: block.size },
+                _ => Bound::Free,
+            });
+        }
+    }
+
+    /// The matrix K + R of all rows, R of `joints`.
+    fn couple(&mut self, bodies: &[BodyRow], joints: &[RowBlock]) {
+        let n = self.rows.len();
+        // Rows of each body, ascending: those that a row couples with are in the lists of its two bodies.
+        let mut sides: Vec<(u32, usize, usize)> = vec![];
+        for (i, row) in self.rows.iter().enumerate() {
+            sides.extend(row.bodies.into_iter().enumerate().map(|(side, body)| (body, i, side)));
+        }
+        sides.sort_unstable();
+        let mut lists: Vec<[(&[(u32, usize, usize)], [f64; 3]); 2]> = vec![[(&[], [0.0; 3]); 2]; n];
+        for of_body in sides.chunk_by(|one, other| one.0 == other.0) {
+            let Some(mass) = bodies.get(of_body[0].0 as usize) else { continue };
+            let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
+            if inverse != [0.0; 3] {
+                of_body.iter().for_each(|&(_, i, side)| lists[i][side] = (of_body, inverse));
             }
         }
-        let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
-        Problem { friction, start: flat(impulses), velocity: flat(velocities), matrix, points }
+        for (i, [(mut of_a, mass_a), (mut of_b, mass_b)]) in lists.into_iter().enumerate() {
+            self.begins.push(self.entries.len());
+            let product = |side: usize, inverse: [f64; 3], j: usize, other: usize| {
+                let (a, b) = (self.rows[i].jacobian[side], self.rows[j].jacobian[other]);
+                (0..3).map(|c| a[c] * inverse[c] * b[c]).sum::<f64>()
+            };
+            let mut diagonal = 0.0;
+            while let Some(j) = of_a.first().into_iter().chain(of_b.first()).map(|entry| entry.1).min() {
+                let mut sum = 0.0;
+                for (side, list, mass) in [(0, &mut of_a, mass_a), (1, &mut of_b, mass_b)] {
+                    if let Some((&(_, at, other), rest)) = list.split_first()
+                        && at == j
+                    {
+                        sum += product(side, mass, j, other);
+                        *list = rest;
+                    }
+                }
+                self.entries.push((j, sum));
+                diagonal = if i == j { sum } else { diagonal };
+            }
+            if self.begins[i] == self.entries.len() {
+                self.entries.push((i, 0.0));
+            }
+            self.diagonal.push(diagonal);
+        }
+        self.begins.push(self.entries.len());
+        let mut first = 2 * self.points.len();
+        for block in joints.iter() {
+            let softness = f64::from(block.softness());
+            for r in (0..block.size).filter(|_| softness > 0.0).map(|r| first + r) {
+                let row = self.begins[r]..self.begins[r + 1];
+                for (j, value) in &mut self.entries[row] {
+                    if (first..first + block.size).contains(j) {
+                        *value += softness * f64::from(block.response[r - first][*j - first]);
+                    }
+                    self.diagonal[r] = if *j == r { *value } else { self.diagonal[r] };
+                }
+            }
+            first += block.size;
+        }
+        // What nothing can move keeps its impulse.
+        for i in (2 * self.points.len()..n).filter(|&i| self.diagonal[i] <= 0.0).collect::<Vec<_>>() {
+            (self.diagonal[i], self.velocity[i]) = (1.0, 0.0);
+            let row = self.begins[i]..self.begins[i + 1];
+            self.entries[row].iter_mut().for_each(|(j, value)| *value = f64::from(*j == i));
+        }
+    }
+
+    /// Entries of a row, columns ascending.
+    fn row(&self, i: usize) -> &[(usize, f64)] {
+        &self.entries[self.begins[i]..self.begins[i + 1]]
+    }
+
+    /// Product of a row and a vector.
+    fn times(&self, i: usize, x: &[f64]) -> f64 {
+        self.row(i).iter().map(|&(j, k)| k * x[j]).sum()
     }
 
     fn diagonal(&self, i: usize) -> f64 {
-        self.matrix[i * (self.start.len() + 1)]
+        self.diagonal[i]
     }
 
     /// λ − (u + ε D (λ − λ₀))/D, row by row.
@@ -277,8 +426,7 @@ impl Problem {
         let n = impulses.len();
         let change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
         let argument = |i: usize| {
-            let row = &self.matrix[i * n..(i + 1) * n];
-            let u = self.velocity[i] + row.iter().zip(&change).map(|(k, c)| k * c).sum::<f64>();
+            let u = self.velocity[i] + self.times(i, &change);
             impulses[i] - u / self.diagonal(i) - SHIFT * change[i]
         };
         (0..n).map(argument).collect()
@@ -292,7 +440,12 @@ impl Problem {
             let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent.max(-bound).min(bound)];
             self.diagonal(2 * i) * r[0] * r[0] + self.diagonal(2 * i + 1) * r[1] * r[1]
         };
-        (0..self.points.len()).map(one).sum()
+        let contacts = (0..self.points.len()).map(one).sum::<f64>();
+        let joint = |(i, state): (usize, State)| {
+            let within = if let State::Fixed(value) = state { value } else { arguments[i] };
+            self.diagonal(i) * (impulses[i] - within).powi(2)
+        };
+        contacts + self.joint_states(arguments).map(joint).sum::<f64>()
     }
 
     /// The merit of residuals that are rounding beside these impulses.
@@ -301,74 +454,105 @@ impl Problem {
         TOLERANCE * TOLERANCE * impulses.iter().enumerate().map(one).sum::<f64>()
     }
 
+    /// States of all rows.
     fn states(&self, arguments: &[f64]) -> Vec<State> {
         let one = |i: usize| {
             let (normal, tangent, friction) = (arguments[2 * i], arguments[2 * i + 1], self.friction[i]);
             if normal <= 0.0 {
-                State::Open
+                [State::Fixed(0.0); 2]
             } else if tangent.abs() < friction * normal {
-                State::Stick
+                [State::Holds; 2]
             } else {
-                State::Slip(friction.copysign(tangent))
+                [State::Holds, State::Slips(friction.copysign(tangent))]
             }
         };
-        (0..self.points.len()).map(one).collect()
+        let joints = self.joint_states(arguments).map(|(_, state)| state);
+        (0..self.points.len()).flat_map(one).chain(joints).collect()
     }
 
-    /// The impulses at which the rows that the states name are at rest; none if that is singular.
+    /// Rows of joints and what they do: they hold, or their impulse is the nearest one within its bounds.
+    fn joint_states(&self, arguments: &[f64]) -> impl Iterator<Item = (usize, State)> {
+        let first = 2 * self.points.len();
+        let mut scale = 1.0;
+        self.bounds.iter().enumerate().map(move |(k, bound)| {
+            let i = first + k;
+            if let Bound::Norm { cap, size } = *bound {
+                let norm = arguments[i..i + size].iter().map(|x| x * x).sum::<f64>().sqrt();
+                scale = if norm > cap { cap / norm } else { 1.0 };
+            }
+            let state = match bound {
+                Bound::NotNegative if arguments[i] <= 0.0 => State::Fixed(0.0),
+                Bound::Norm { .. } | Bound::Same if scale < 1.0 => State::Fixed(scale * arguments[i]),
+                _ => State::Holds,
+            };
+            (i, state)
+        })
+    }
+
+    /// The impulses at which the rows that hold are at rest; none if that is singular.
     fn solve_states(&self, states: &[State]) -> Option<Vec<f64>> {
         let n = self.start.len();
-        let is_unknown = |i: usize| match states[i / 2] {
-            State::Open => false,
-            State::Slip(_) => i.is_multiple_of(2),
-            State::Stick => true,
+        let unknowns: Vec<usize> = (0..n).filter(|&i| states[i] == State::Holds).collect();
+        let slope = |i: usize| match states.get(i + 1) {
+            Some(State::Slips(slope)) => Some(*slope),
+            _ => None,
         };
-        let unknowns: Vec<usize> = (0..n).filter(|&i| is_unknown(i)).collect();
-        let slope = |i: usize| match states[i / 2] {
-            State::Slip(slope) => slope,
-            _ => 0.0,
-        };
+        let mut impulses: Vec<f64> =
+            states.iter().map(|state| if let State::Fixed(value) = state { *value } else { 0.0 }).collect();
         let scale = |i: usize| 1.0 / self.diagonal(i).sqrt();
-        let m = unknowns.len();
-        let (mut a, mut b) = (vec![0.0; m * m], vec![0.0; m]);
+        const KNOWN: usize = usize::MAX;
+        let mut number = vec![KNOWN; n];
+        unknowns.iter().enumerate().for_each(|(r, &i)| number[i] = r);
+        // A slipping point acts along n + s µ t: its tangential column belongs to the normal one.
+        let column = |j: usize| match states[j] {
+            State::Slips(slope) => (number[j - 1], j - 1, slope),
+            _ => (number[j], j, 1.0),
+        };
+        let coupled = |r: usize| {
+            self.row(unknowns[r]).iter().map(|&(j, _)| column(j).0).filter(|&number| number != KNOWN)
+        };
+        let mut system = Envelope::default();
+        system.begin(unknowns.len(), coupled);
+        let mut b = vec![0.0; unknowns.len()];
+        let change: Vec<f64> = self.start.iter().zip(&impulses).map(|(l, fixed)| l - fixed).collect();
         for (r, &i) in unknowns.iter().enumerate() {
-            let row = &self.matrix[i * n..(i + 1) * n];
-            for (c, &j) in unknowns.iter().enumerate() {
-                // A slipping point acts along n + s µ t.
-                let along = row[j] + if j % 2 == 0 { slope(j) * row[j + 1] } else { 0.0 };
-                a[r * m + c] = scale(i) * along * scale(j);
+            for &(j, k) in self.row(i) {
+                let (number, j, factor) = column(j);
+                if number != KNOWN {
+                    system.add(r, number, scale(i) * k * factor * scale(j));
+                }
             }
-            a[r * m + r] += SHIFT;
-            let from_start: f64 = row.iter().zip(&self.start).map(|(k, l)| k * l).sum();
-            b[r] = scale(i) * (from_start - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
+            system.add(r, r, SHIFT);
+            b[r] = scale(i) * (self.times(i, &change) - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
         }
-        if !solve_in_place(&mut a, &mut b, 1e-14) {
+        if !system.solve(&mut b, 1e-14) {
             return None;
         }
-        let mut impulses = vec![0.0; n];
         for (&i, y) in unknowns.iter().zip(&b) {
             impulses[i] = y * scale(i);
-        }
-        for i in (0..n).step_by(2) {
-            if let State::Slip(slope) = states[i / 2] {
+            if let Some(slope) = slope(i) {
                 impulses[i + 1] = slope * impulses[i];
             }
         }
         Some(impulses)
     }
 
-    /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::numerics::coulomb_lcp`].
+    /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::numerics::coulomb_lcp`]; of scenes
+    /// without joints.
     fn by_lemke(&self) -> Option<Vec<f64>> {
+        if !self.bounds.is_empty() {
+            return None;
+        }
         let n = self.start.len();
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();
         // u without impulses, pulled toward λ₀ as in Newton's problem.
         let free = |i: usize| {
-            let held: f64 = self.matrix[i * n..(i + 1) * n].iter().zip(&self.start).map(|(k, l)| k * l).sum();
-            self.velocity[i] - held - SHIFT * self.diagonal(i) * self.start[i]
+            self.velocity[i] - self.times(i, &self.start) - SHIFT * self.diagonal(i) * self.start[i]
         };
         let entry = |i: usize, j: usize| {
             let shift = if i == j { 1.0 + SHIFT } else { 1.0 };
-            shift * self.matrix[i * n + j]
+            let row = self.row(i);
+            row.binary_search_by_key(&j, |entry| entry.0).map_or(0.0, |at| shift * row[at].1)
         };
         let lcp = CoulombLcp::new(&self.friction, &pair(&|i| self.diagonal(i)), &pair(&free), entry);
         let found = lcp.solve(&vec![1.0; lcp.rows()], PIVOTS * lcp.rows()).ok()?;

@@ -119,7 +119,7 @@ impl TgsSticky {
             self.drifts.clear();
             if passes.rows_per_point() == 2 {
                 let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
-                self.drifts.reset([lanes, serial]);
+                self.drifts.reset([lanes, serial], 0);
                 let drifts = passes.parts_of(&mut self.drifts);
                 passes.run(Phase::Prepare, &mut LoadDrift { drifts });
             }

@@ -72,7 +72,7 @@ impl Solver for Xpbd {
         rebounds.clear();
         if passes.law() == SOLVER.impacts {
             let Workspace { lanes, serial, .. } = passes.parts().work;
-            rebounds.reset([lanes, serial]);
+            rebounds.reset([lanes, serial], 0);
         }
         for substep in 0..budget.substeps {
             passes.integrate_velocities();

@@ -374,7 +374,9 @@ impl World {
         ];
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         for value in arrays.into_iter().flat_map(|array| array.iter()) {
-            hash = (hash ^ value.to_bits() as u64).wrapping_mul(0x0000_0100_0000_01b3);
+            // What is no number has any sign, as a build has it.
+            let bits = if value.is_nan() { f32::NAN } else { *value }.to_bits();
+            hash = (hash ^ u64::from(bits)).wrapping_mul(0x0000_0100_0000_01b3);
         }
         hash
     }

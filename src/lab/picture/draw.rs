@@ -77,6 +77,18 @@ impl View {
     }
 }
 
+/// How far each body reaches from its middle (m); without end, if it does not move by impulses.
+fn reaches(stage: &Stage) -> Vec<f64> {
+    let is_dynamic = |kind: &BodyKind| *kind == BodyKind::Dynamic;
+    let mut all: Vec<f64> =
+        stage.kinds.iter().map(|kind| if is_dynamic(kind) { 0.0 } else { f64::INFINITY }).collect();
+    for (body, shape) in &stage.shapes {
+        let own = &mut all[*body as usize];
+        shape.for_each_vertex(|v| *own = own.max(f64::from(v.length() + shape.radius())));
+    }
+    all
+}
+
 /// Lower and upper corner of what moves and of what it hangs on; of everything, where nothing moves.
 fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>], poses: &[[f64; 3]]) -> [[f64; 2]; 2] {
     let moves = |i: usize| stage.kinds[stage.shapes[i].0 as usize] != BodyKind::Static;
@@ -151,7 +163,9 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         }
     }
     let mark = (0.3 * typical(stage, scale)).clamp(3.0, 12.0);
-    super::joints::draw(&mut picture, stage, &frame.poses, mark, |place| view.at(place));
+    super::joints::draw(&mut picture, &stage.joints, &frame.poses, &reaches(stage), mark, |place| {
+        view.at(place)
+    });
     let arrow = points(&mut picture, stage, frame, &view, deepest);
     // Whatever of the ground reaches into them.
     let top = HEADER + height;
@@ -162,7 +176,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     picture.text([MARGIN, 30.0], fitted(title, 21.0), Anchor::Start, INK, title);
     picture.text([MARGIN, 52.0], fitted(subtitle, 14.0), Anchor::Start, FAINT, subtitle);
     legend(&mut picture, top, &view, [deepest, frame.deepest()], arrow, stage.dt);
-    super::joints::legend(&mut picture, stage, [MARGIN, top + LEGEND], INK);
+    super::joints::legend(&mut picture, &stage.joints, [MARGIN, top + LEGEND], INK);
     picture
 }
 

@@ -1,9 +1,7 @@
 //! Joints as people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
 
-use super::frame::Stage;
 use super::outline::placed;
 use super::{Anchor, Color, Item, Picture};
-use crate::engine::bodies::BodyKind;
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
 
@@ -81,20 +79,16 @@ pub fn records(world: &World) -> Vec<JointRecord> {
 }
 
 /// Draws joints of bodies at `poses`, `size` pixels wide, where `at` takes places of the stage (m) to pixels. A hinge
-/// outside of a body has a line to its middle.
+/// farther from the middle of a body than its `reach` (m) has a line to there.
 pub(super) fn draw(
     picture: &mut Picture,
-    stage: &Stage,
+    joints: &[JointRecord],
     poses: &[[f64; 3]],
+    reach: &[f64],
     size: f64,
     at: impl Fn([f64; 2]) -> [f64; 2],
 ) {
-    let mut reach = vec![0.0_f64; poses.len()];
-    for (body, shape) in &stage.shapes {
-        let own = &mut reach[*body as usize];
-        shape.for_each_vertex(|v| *own = own.max(f64::from(v.length() + shape.radius())));
-    }
-    for joint in &stage.joints {
+    for joint in joints {
         let a = poses[joint.bodies[0] as usize];
         let [p, q] = joint.ends(poses).map(&at);
         // Along the axis as far as b's anchor, and a bit on.
@@ -110,7 +104,7 @@ pub(super) fn draw(
         if joint.mark == Mark::Revolute {
             for (k, end) in [p, q].into_iter().enumerate() {
                 let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
-                if stage.kinds[i] == BodyKind::Dynamic && anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
+                if anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
                     picture.line(at([poses[i][0], poses[i][1]]), end, COLOR, width(size));
                 }
             }
@@ -177,8 +171,8 @@ fn one(
     }
 }
 
-/// The marks that a stage has with their names, in a row at this height (pixels).
-pub(super) fn legend(picture: &mut Picture, stage: &Stage, [mut x, y]: [f64; 2], ink: Color) {
+/// The marks of these joints with their names, in a row at this height (pixels).
+pub(super) fn legend(picture: &mut Picture, joints: &[JointRecord], [mut x, y]: [f64; 2], ink: Color) {
     const NAMES: [(Mark, &str); 8] = [
         (Mark::Revolute, "hinge"),
         (Mark::Prismatic, "slider"),
@@ -189,7 +183,7 @@ pub(super) fn legend(picture: &mut Picture, stage: &Stage, [mut x, y]: [f64; 2],
         (Mark::Motor, "motor"),
         (Mark::Mouse, "mouse joint"),
     ];
-    for (mark, name) in NAMES.into_iter().filter(|(mark, _)| stage.joints.iter().any(|j| j.mark == *mark)) {
+    for (mark, name) in NAMES.into_iter().filter(|(mark, _)| joints.iter().any(|j| j.mark == *mark)) {
         let hinged = matches!(mark, Mark::Revolute | Mark::Weld);
         let places = if hinged { [[x + 12.0, y]; 2] } else { [[x, y], [x + 24.0, y]] };
         one(picture, mark, places, [[x, y], [x + 24.0, y]], 0.0, 9.0, String::new());

@@ -9,11 +9,11 @@ pub mod rows;
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
-use crate::engine::constraints::kernels::pass::{PassMode, at_width};
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, TypeInput};
-use crate::engine::lanes::{LaneWidth, Lanes, Quad, RowStore, held};
+use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
+use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
-use rows::{JointPass, Task};
+use rows::{JointPass, Places, RowBlock, Task};
 use std::f32::consts::TAU;
 use std::fmt;
 
@@ -235,6 +235,43 @@ impl<T: JointType> Joints<T> {
         }
     }
 
+    /// A pass between impulses and vectors.
+    fn vector_pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
+        let (first_kept, stride, kept) = (self.first_kept(), self.stride(), T::kept(self.form));
+        let pushes = matches!(task, Task::Vector { of: VectorTask::Push, .. });
+        let [mut x, mut y] = on.vectors.map(|blocks| bytemuck::cast_slice_mut::<Block, L>(blocks));
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let pushed = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let [rows_a, rows_b] =
+                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
+            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
+            let mut slot = segment.first_slot;
+            for (record, (row_a, row_b)) in parts.records.chunks_exact_mut(stride).zip(indices) {
+                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
+                let (numbers, impulses) = record.split_at_mut(first_kept);
+                let (anchors, numbers) = numbers.split_at(ANCHORS);
+                // Blocks of a row are two, the second of which is zero.
+                let per_block = 16 / L::WIDTH;
+                let first = 2 * kept * (slot / 16) * per_block + slot % 16 / L::WIDTH;
+                let places = Places { first, stride: 2 * per_block, next: 0 };
+                let mut pass = JointPass::new(bodies, anchors, task);
+                pass.vectors = Some(([x, y], places));
+                rows_once::<T, L>(self.form, numbers, impulses, &mut pass);
+                slot += L::WIDTH;
+                let ([a, b], vectors) = (pass.bodies, pass.vectors);
+                ([x, y], _) = vectors.expect("vectors of this pass");
+                if pushes && pushed[1] {
+                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+                }
+                if pushes && pushed[0] {
+                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+                }
+            }
+        }
+    }
+
     #[inline(never)]
     fn pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
@@ -272,6 +309,35 @@ impl<T: JointType> Joints<T> {
     }
 }
 
+impl<T: JointType> Joints<T> {
+    /// The pass over one joint, in one lane.
+    fn alone(&self, i: usize, Placed { rows, poses }: Placed<'_>, task: Task) -> JointPass<'static, f32> {
+        let [a, b] = self.ends[i];
+        let names = if self.swapped { [b, a] } else { [a, b] };
+        let [a, b] = names.map(|body| body as usize);
+        let Quad([ax, ay, bx, by]) = self.anchors[i];
+        let turned = |body: usize, [x, y]: [f32; 2]| {
+            let [cos, sin, ..] = poses[body].rotation;
+            [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
+        };
+        let (ra, rb, from, to) =
+            (turned(a, [ax, ay]), turned(b, [bx, by]), poses[a].position, poses[b].position);
+        let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
+        let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
+        let mut pass = JointPass::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]], task);
+        pass.names = names;
+        pass
+    }
+
+    /// States the rows of a joint to `pass`.
+    fn state(&mut self, joint: usize, pass: &mut JointPass<f32>) {
+        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
+        let (numbers, kept) =
+            (&self.numbers[joint * numbers..][..numbers], &mut self.kept[joint * kept..][..kept]);
+        rows_once::<T, f32>(self.form, numbers, kept, pass);
+    }
+}
+
 /// [`JointType::rows`] where speed does not matter: compiled once.
 #[inline(never)]
 fn rows_once<T: JointType, L: Lanes>(form: T::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
@@ -285,6 +351,10 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn stride(&self) -> usize {
         self.first_kept() + T::kept(self.form)
+    }
+
+    fn rows(&self) -> usize {
+        T::kept(self.form)
     }
 
     fn begin(&mut self, bodies: &Bodies, h: f32) {
@@ -312,6 +382,12 @@ impl<T: JointType> ConstraintType for Joints<T> {
         let inv_h = 1.0 / on.h;
         let task = match (on.phase, on.mode) {
             (_, PassMode::Masses) => return,
+            (_, PassMode::Vector(of)) => {
+                return at_width!(
+                    width,
+                    Self::vector_pass(self, Task::Vector { of, law: on.law, inv_h }, on)
+                );
+            }
             (_, PassMode::Forget) => return at_width!(width, Self::forget(self, on)),
             (_, PassMode::Book) => {
                 self.booked.resize(self.joints.len(), Booked::default());
@@ -337,6 +413,19 @@ impl<T: JointType> ConstraintType for Joints<T> {
             _ => return,
         };
         at_width!(width, Self::pass(self, task, on))
+    }
+
+    fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
+        let mut pass = self.alone(constraint, on, Task::Collect);
+        pass.blocks = std::mem::take(to);
+        self.state(constraint, &mut pass);
+        *to = pass.blocks;
+    }
+
+    fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
+        let mut pass = self.alone(constraint, on, Task::Replace);
+        pass.blocks.extend(blocks.iter().rev());
+        self.state(constraint, &mut pass);
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {

@@ -44,73 +44,13 @@
 
 use crate::engine::constraints::joints::ANCHORS;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
+use crate::engine::constraints::kernels::pass::VectorTask;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
+use crate::engine::constraints::numerics::small::solve;
+use crate::engine::constraints::records::rows::ROWS;
+pub use crate::engine::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
 use crate::engine::lanes::Lanes;
 use std::f32::consts::TAU;
-
-/// How the error of a row changes with velocities; see the [module](self).
-#[derive(Clone, Copy, Debug)]
-pub struct Jacobian<L> {
-    /// d (1)
-    pub axis: [L; 2],
-    /// s_a and s_b: r × d (m), or 1 for an angle.
-    pub arms: [L; 2],
-}
-
-impl<L: Lanes> Jacobian<L> {
-    /// The row of ω_b − ω_a.
-    #[inline(always)]
-    pub fn angle() -> Self {
-        Jacobian { axis: [L::zero(); 2], arms: [L::splat(1.0); 2] }
-    }
-
-    /// The row of the velocity of anchors along `axis`; `arms` are from the centers of mass of a and b (m).
-    #[inline(always)]
-    pub fn along(axis: [L; 2], arms: [[L; 2]; 2]) -> Self {
-        Jacobian { axis, arms: [cross(arms[0], axis), cross(arms[1], axis)] }
-    }
-
-    /// The rows of the velocity of anchors along x and y.
-    #[inline(always)]
-    pub fn point(arms: [[L; 2]; 2]) -> [Self; 2] {
-        let (zero, one) = (L::zero(), L::splat(1.0));
-        [
-            Jacobian { axis: [one, zero], arms: [-arms[0][1], -arms[1][1]] },
-            Jacobian { axis: [zero, one], arms: [arms[0][0], arms[1][0]] },
-        ]
-    }
-
-    /// The same row, the other way round: −C.
-    #[inline(always)]
-    pub fn reversed(self) -> Self {
-        Jacobian { axis: self.axis.map(|x| -x), arms: self.arms.map(|x| -x) }
-    }
-}
-
-/// The law of a block; see the [module](self).
-#[derive(Clone, Copy, Debug)]
-pub enum RowLaw<L> {
-    /// C = 0.
-    Rigid,
-    /// C ≥ 0.
-    Limit,
-    /// J v = `speed` (m/s or rad/s), at `cap` (N·s or N·m·s) per substep at most.
-    Motor {
-        /// u
-        speed: L,
-        /// F h
-        cap: L,
-    },
-    /// A spring; behind the impulses of its rows stand as many errors.
-    Spring {
-        /// S (1/s)
-        stiffness: L,
-        /// D (1)
-        damping: L,
-        /// F h, if bounded.
-        cap: Option<L>,
-    },
-}
 
 /// S and D of a spring of `hertz` and `damping_ratio` in substeps of `h` (s).
 pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
@@ -159,6 +99,19 @@ pub(crate) enum Task {
         /// Of rigid rows.
         law: Softness,
     },
+    /// Reads or writes vectors.
+    Vector {
+        /// What it does.
+        of: VectorTask,
+        /// Of rigid rows.
+        law: Softness,
+        /// 1/h (1/s)
+        inv_h: f32,
+    },
+    /// Appends the blocks of the first lane to [`JointPass::blocks`].
+    Collect,
+    /// Takes the impulses of the first lane from [`JointPass::blocks`], the last one first.
+    Replace,
     /// Moves bodies until errors are gone.
     Position {
         /// Largest correction (m or rad).
@@ -168,9 +121,20 @@ pub(crate) enum Task {
     },
 }
 
+/// Where the rows of a batch are in vectors, in lane vectors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    /// Of its first row.
+    pub first: usize,
+    /// From row to row.
+    pub stride: usize,
+    /// Rows that have been visited.
+    pub next: usize,
+}
+
 /// The two bodies of a batch of joints, and what the pass does with their rows.
 #[derive(Debug)]
-pub struct JointPass<L> {
+pub struct JointPass<'v, L> {
     /// Rows of a and b.
     pub(crate) bodies: [[L; 8]; 2],
     /// sin Δθ and 1 − cos Δθ of a and b.
@@ -178,12 +142,12 @@ pub struct JointPass<L> {
     /// See [`ANCHORS`].
     anchors: [L; ANCHORS],
     task: Task,
-}
-
-/// r × d
-#[inline(always)]
-pub fn cross<L: Lanes>(r: [L; 2], d: [L; 2]) -> L {
-    r[0].mul_add(d[1], -(r[1] * d[0]))
+    /// See [`Task::Collect`].
+    pub(super) blocks: Vec<RowBlock>,
+    /// x and y of [`Task::Vector`].
+    pub(super) vectors: Option<([&'v mut [L]; 2], Places)>,
+    /// Of the bodies of a joint alone.
+    pub(super) names: [u32; 2],
 }
 
 /// u·v
@@ -198,44 +162,12 @@ pub fn add<L: Lanes>(u: [L; 2], v: [L; 2]) -> [L; 2] {
     [u[0] + v[0], u[1] + v[1]]
 }
 
-/// The solution of K x = r; by LDLᵀ but for two rows, where one division does. What has no pivot is zero.
-#[inline(always)]
-fn solve<L: Lanes, const N: usize>(mut k: [[L; N]; N], mut x: [L; N]) -> [L; N] {
-    if N == 2 {
-        let determinant = k[0][0].mul_add(k[1][1], -(k[1][0] * k[1][0]));
-        let scale = determinant.select_positive(L::splat(1.0) / determinant, L::zero());
-        let y = k[1][1].mul_add(x[0], -(k[1][0] * x[1]));
-        x[1] = k[0][0].mul_add(x[1], -(k[1][0] * x[0])) * scale;
-        x[0] = y * scale;
-        return x;
-    }
-    let mut inverse = [L::zero(); N];
-    for j in 0..N {
-        inverse[j] = k[j][j].select_positive(L::splat(1.0) / k[j][j], L::zero());
-        for i in j + 1..N {
-            let factor = k[i][j] * inverse[j];
-            let column = k.map(|row| row[j]);
-            for (entry, &above) in k[i][..=i].iter_mut().zip(&column).skip(j + 1) {
-                *entry = factor.neg_mul_add(above, *entry);
-            }
-            x[i] = factor.neg_mul_add(x[j], x[i]);
-        }
-    }
-    for j in (0..N).rev() {
-        x[j] = x[j] * inverse[j];
-        for i in j + 1..N {
-            x[j] = (k[i][j] * inverse[j]).neg_mul_add(x[i], x[j]);
-        }
-    }
-    x
-}
-
-impl<L: Lanes> JointPass<L> {
+impl<'v, L: Lanes> JointPass<'v, L> {
     #[inline(always)]
     pub(crate) fn new(bodies: [[L; 8]; 2], anchors: &[L], task: Task) -> Self {
         let anchors = [anchors[0], anchors[1], anchors[2], anchors[3], anchors[4], anchors[5]];
         let turns = [turn(bodies[0][TURN]), turn(bodies[1][TURN])];
-        JointPass { bodies, turns, anchors, task }
+        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), vectors: None, names: [u32::MAX; 2] }
     }
 
     /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
@@ -255,6 +187,13 @@ impl<L: Lanes> JointPass<L> {
     #[inline(always)]
     pub fn turn(&self) -> L {
         self.bodies[1][TURN] - self.bodies[0][TURN]
+    }
+
+    /// J times the displacements since the start of the step (m or rad): the error of a row that holds a speed alone, and
+    /// knows of no error before.
+    #[inline(always)]
+    pub fn travel(&self, j: &Jacobian<L>) -> L {
+        self.rate(j, [DX, DY, TURN])
     }
 
     /// Arms of a and b to their anchors (m), and the way from a's anchor to b's (m), as they are now.
@@ -291,9 +230,9 @@ impl<L: Lanes> JointPass<L> {
         b[w] = (b[INV_INERTIA] * j.arms[1]).mul_add(impulse, b[w]);
     }
 
-    /// K⁻¹ x
+    /// The lower half of K.
     #[inline(always)]
-    fn solved<const N: usize>(&self, j: &[Jacobian<L>; N], x: [L; N]) -> [L; N] {
+    fn response<const N: usize>(&self, j: &[Jacobian<L>; N]) -> [[L; N]; N] {
         let [a, b] = &self.bodies;
         let (mass, ia, ib) = (a[INV_MASS] + b[INV_MASS], a[INV_INERTIA], b[INV_INERTIA]);
         let mut k = [[L::zero(); N]; N];
@@ -304,7 +243,131 @@ impl<L: Lanes> JointPass<L> {
                 k[r][c] = mass.mul_add(dot(j[r].axis, j[c].axis), by_turning);
             }
         }
-        solve(k, x)
+        k
+    }
+
+    /// K⁻¹ x
+    #[inline(always)]
+    fn solved<const N: usize>(&self, j: &[Jacobian<L>; N], x: [L; N]) -> [L; N] {
+        solve(self.response(j), x)
+    }
+
+    /// What a block has in vectors.
+    ///
+    /// A row asks for J v + b + R λ = 0 within its bounds: b = β C where it is rigid, C/h where a limit is open, −u of a
+    /// motor, and b = (S/D) C, R = K/D of a spring, which is the line of the [module](self) at rest.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn vector_block<const N: usize>(
+        &mut self,
+        j: &[Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        impulse: &mut [L],
+        of: VectorTask,
+        solver: Softness,
+        inv_h: f32,
+    ) {
+        const VELOCITY: [usize; 3] = [VX, VY, W];
+        let Some(([x, y], mut places)) = self.vectors.take() else { return };
+        let at = |i: usize| places.first + (places.next + i) * places.stride;
+        let one = L::splat(1.0);
+        let least = L::splat(1e-9);
+        match of {
+            VectorTask::Impulses => (0..N).for_each(|i| x[at(i)] = impulse[i]),
+            VectorTask::SetImpulses => (0..N).for_each(|i| impulse[i] = x[at(i)]),
+            VectorTask::Velocities => (0..N).for_each(|i| x[at(i)] = self.rate(&j[i], VELOCITY)),
+            VectorTask::Push => (0..N).for_each(|i| self.apply(&j[i], x[at(i)], VELOCITY)),
+            VectorTask::Masses => {
+                let k = self.response(j);
+                let more = match law {
+                    RowLaw::Spring { damping, .. } => one + one / damping.max(least),
+                    _ => one,
+                };
+                for i in 0..N {
+                    let k = k[i][i] * more;
+                    x[at(i)] = k.select_positive(one / k, L::zero());
+                }
+            }
+            VectorTask::Bias => {
+                let rigid = L::splat(solver.bias_rate);
+                for i in 0..N {
+                    x[at(i)] = match law {
+                        RowLaw::Rigid => rigid * error[i],
+                        RowLaw::Limit => error[i].select_positive(L::splat(inv_h), rigid) * error[i],
+                        RowLaw::Motor { speed, .. } => -speed,
+                        RowLaw::Spring { stiffness, damping, .. } => {
+                            stiffness / damping.max(least) * error[i]
+                        }
+                    };
+                }
+            }
+            VectorTask::Soften => {
+                if let RowLaw::Spring { damping, .. } = law {
+                    let (k, scale) = (self.response(j), one / damping.max(least));
+                    for r in 0..N {
+                        for c in 0..N {
+                            let k = k[r.max(c)][r.min(c)];
+                            x[at(r)] = (scale * k).mul_add(y[at(c)], x[at(r)]);
+                        }
+                    }
+                }
+            }
+            VectorTask::Bound => {
+                let cap = match law {
+                    RowLaw::Motor { cap, .. } => Some(cap),
+                    RowLaw::Spring { cap, .. } => cap,
+                    RowLaw::Limit => {
+                        x[at(0)] = x[at(0)].max(L::zero());
+                        None
+                    }
+                    RowLaw::Rigid => None,
+                };
+                if let Some(cap) = cap {
+                    let norm = (0..N).fold(L::zero(), |sum, i| x[at(i)].mul_add(x[at(i)], sum)).sqrt();
+                    let scale = (norm - cap).select_positive(cap / norm, one);
+                    (0..N).for_each(|i| x[at(i)] = x[at(i)] * scale);
+                }
+            }
+        }
+        places.next += N;
+        self.vectors = Some(([x, y], places));
+    }
+
+    /// A block of the first lane.
+    #[inline(never)]
+    fn collected<const N: usize>(
+        &self,
+        j: &[Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        impulse: &[L],
+    ) -> RowBlock {
+        let first = |x: L| bytemuck::cast_slice::<L, f32>(&[x])[0];
+        let none = Jacobian { axis: [0.0; 2], arms: [0.0; 2] };
+        let (arms, _) = self.anchors();
+        let mut block = RowBlock {
+            bodies: self.names,
+            size: N,
+            jacobians: [none; ROWS],
+            response: [[0.0; ROWS]; ROWS],
+            errors: [0.0; ROWS],
+            travel: [0.0; ROWS],
+            law: law.map(first),
+            impulses: [0.0; ROWS],
+            reach: arms.map(|arm| first(dot(arm, arm)).sqrt()),
+        };
+        let k = self.response(j);
+        for r in 0..N {
+            block.jacobians[r] = Jacobian { axis: j[r].axis.map(first), arms: j[r].arms.map(first) };
+            block.errors[r] = first(error[r]);
+            block.travel[r] = first(self.travel(&j[r]));
+            block.impulses[r] = first(impulse[r]);
+            for c in 0..=r {
+                (block.response[r][c], block.response[c][r]) = (first(k[r][c]), first(k[r][c]));
+            }
+        }
+        block
     }
 
     /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s).
@@ -407,6 +470,18 @@ impl<L: Lanes> JointPass<L> {
                     self.apply(&j[i], x[i], VELOCITY);
                 }
             }
+            Task::Vector { of, law: solver, inv_h } => {
+                self.vector_block(&j, error, law, impulse, of, solver, inv_h)
+            }
+            Task::Collect => {
+                let block = self.collected(&j, error, law, impulse);
+                self.blocks.push(block);
+            }
+            Task::Replace => {
+                if let Some(block) = self.blocks.pop() {
+                    impulse.iter_mut().zip(block.impulses).for_each(|(to, from)| *to = L::splat(from));
+                }
+            }
             Task::Position { max_correction, inv_h } => {
                 let mut x = error;
                 match law {
@@ -434,18 +509,6 @@ impl<L: Lanes> JointPass<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn symmetric_systems_are_solved_and_what_cannot_move_stays() {
-        let k = [[4.0f32, 0.0, 0.0], [1.0, 3.0, 0.0], [0.5, -1.0, 2.0]];
-        let x = solve(k, [1.0, 2.0, 3.0]);
-        let full = [[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 2.0]];
-        for (row, expected) in full.iter().zip([1.0, 2.0, 3.0]) {
-            let sum: f32 = row.iter().zip(x).map(|(k, x)| k * x).sum();
-            assert!((sum - expected).abs() < 1e-5, "{x:?}");
-        }
-        assert_eq!(solve([[0.0f32; 2]; 2], [1.0, 1.0]), [0.0, 0.0]);
-    }
 
     /// A mass on a spring, alone, over 20 periods or time constants.
     #[test]

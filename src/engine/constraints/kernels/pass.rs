@@ -80,12 +80,36 @@ pub enum PassMode {
         /// Whether displacements count as impulses of h.
         impulses: bool,
     },
+    /// Between impulses and vectors, [`TypeInput::vectors`](super::types::TypeInput::vectors); no row is solved.
+    Vector(VectorTask),
     /// Only springs and motors act.
     Drive,
     /// Accumulated impulses are added to those of the step, for metrics.
     Book,
     /// The solver does not start warm: only accumulated impulses are set to zero.
     Forget,
+}
+
+/// What a pass between impulses λ and a vector x does, and where it needs one, a second vector y. See
+/// [`rows`](crate::engine::constraints::joints::rows) for b and R.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VectorTask {
+    /// x = λ
+    Impulses,
+    /// λ = x
+    SetImpulses,
+    /// x = 1/(J M⁻¹ Jᵀ + R), row by row.
+    Masses,
+    /// x = J v
+    Velocities,
+    /// v ← v + M⁻¹ Jᵀ x
+    Push,
+    /// x = b
+    Bias,
+    /// x ← x + R y
+    Soften,
+    /// x becomes the nearest impulses within their bounds.
+    Bound,
 }
 
 /// Calls a function that is compiled per width alone, at the lanes of `$width`.

@@ -7,9 +7,8 @@
 //! [`TypeRows`] reads and writes bodies as the pass requires, so that one kernel serves Gauss–Seidel and
 //! Jacobi sweeps.
 //!
-//! What is no pass knows contacts alone: vectors over contact points ([`crate::engine::constraints::records::point_vector`]) and block descent
-//! (`solvers/avbd/descent.rs`), which would need positions, forces and penalties of a row. Under solvers that use vectors other
-//! types are as their sweeps leave them; under `avbd`, which has no sweeps, they do nothing.
+//! A solver that has no passes takes constraints one by one as [`RowBlock`]s ([`ConstraintType::collect`]); what has none
+//! does nothing under such a solver. Its impulses join the vectors of solvers that use them, if it says how many it has.
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
@@ -18,7 +17,8 @@ use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use crate::engine::constraints::records::rows::RowBlock;
+use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::fmt;
@@ -44,6 +44,8 @@ pub struct TypeInput<'a> {
     pub poses: &'a [PoseRow],
     /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
     pub batches: &'a mut Batches,
+    /// Parts of vectors, x and y of [`PassMode::Vector`]; else empty. `[groups × rows × 2]`, see [`ConstraintType::rows`].
+    pub vectors: [&'a mut [Block]; 2],
 }
 
 /// One row per body, and an inert one at the end: gathered and written in place or, in a Jacobi sweep,
@@ -144,6 +146,12 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Lane vectors of a record.
     fn stride(&self) -> usize;
 
+    /// Impulses of a constraint in vectors; those of 16 constraints that follow each other in a segment share as many pairs
+    /// of blocks, of which the second ones are zero. None: vectors know nothing of the type.
+    fn rows(&self) -> usize {
+        0
+    }
+
     /// Called before the passes of a step, of substeps of `h` (s).
     fn begin(&mut self, _bodies: &Bodies, _h: f32) {}
 
@@ -153,6 +161,13 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// phase; in [`PassMode::Jacobi`] it multiplies its increments by `relaxation`; in [`PassMode::Forget`] it
     /// sets its accumulated impulses to zero and does nothing else.
     fn run(&mut self, on: TypeInput<'_>);
+
+    /// Appends the blocks of a constraint as bodies are now, with the impulses that [`Self::impulses`] has: for solvers
+    /// that are no sweeps. A constraint that has none does nothing under those.
+    fn collect(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
+
+    /// Takes over the impulses of its `blocks`, which are those of [`Self::collect`].
+    fn replace(&mut self, _constraint: usize, _on: Placed<'_>, _blocks: &[RowBlock]) {}
 
     /// Accumulated impulses of a constraint (N·s or N·m·s), for those who ask.
     fn impulses(&self, _constraint: usize) -> &[f32] {
@@ -193,6 +208,15 @@ pub struct Booked {
     pub driving: [[f32; 3]; 2],
 }
 
+/// Where bodies are: one row and one pose at the start of the step for each, and an inert one at the end.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    /// Velocities, and displacements since the start of the step.
+    pub rows: &'a [BodyRow],
+    /// At the start of the step.
+    pub poses: &'a [PoseRow],
+}
+
 /// A type and the lanes of its constraints.
 #[derive(Clone, Debug)]
 pub struct Joined {
@@ -213,6 +237,16 @@ impl Joined {
     /// Its batches, colored and serial.
     pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
         [&mut self.lanes, &mut self.serial]
+    }
+
+    /// Rows of sixteen constraints in vectors.
+    pub(crate) fn vector_rows(&self) -> usize {
+        self.kind.rows() * (self.lanes.groups() + self.serial.groups())
+    }
+
+    /// Whether any of its constraints is colored.
+    pub(crate) fn is_colored(&self) -> bool {
+        !self.lanes.segments().is_empty()
     }
 
     pub(crate) fn arrange(&mut self, order: SweepOrder) {

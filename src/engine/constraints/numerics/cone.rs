@@ -17,6 +17,13 @@ pub fn project<L: Lanes>([normal, tangent]: [L; 2], friction: L) -> [L; 2] {
     [outside.select_positive(along, normal), outside.select_positive(side, tangent)]
 }
 
+/// As [`project`]; a negative `friction` marks what is no contact point, and stays as it is.
+#[inline(always)]
+pub fn project_point<L: Lanes>(point: [L; 2], friction: L) -> [L; 2] {
+    let nearest = project(point, friction);
+    [0, 1].map(|k| (-friction).select_positive(point[k], nearest[k]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -108,6 +108,16 @@ impl Graph {
         &self.edges[self.starts[body] as usize..self.starts[body + 1] as usize]
     }
 
+    /// Number of edges.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are no edges.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
     /// The two bodies of an edge.
     pub fn ends(&self, edge: usize) -> [u32; 2] {
         self.ends[edge]

@@ -1,8 +1,8 @@
 //! Records: where each number of each constraint is stored.
 //!
 //! [`features`] says which numbers a scene needs and where a record keeps them, [`batches`] and [`segment`] how records
-//! follow each other, [`assign`] which contact is in which lane, and [`order`] in which order a sweep visits them. [`graph`],
-//! [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
+//! follow each other, [`assign`] which contact is in which lane, and [`order`] in which order a sweep visits them. [`rows`] are
+//! those of joints, one by one. [`graph`], [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
 
 #[doc(hidden)]
 pub mod assign;
@@ -15,4 +15,5 @@ pub mod graph;
 pub mod kept;
 pub mod order;
 pub mod point_vector;
+pub mod rows;
 pub mod segment;

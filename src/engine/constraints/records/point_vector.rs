@@ -5,7 +5,8 @@
 //! whatever the width, and so a contact has one place at every width; contacts in natural order follow each
 //! other without gaps. Places without a point are zero. Sums are kept in sixteen parts, one for each place
 //! within a block, in `f64` and in the order of the blocks, and the parts are added in order: the
-//! result has the same bits at every width. For arithmetic entry by entry the width does not
+//! result has the same bits at every width. Behind the contacts come constraints of other types, if the scene has any: a
+//! row of sixteen of them has two blocks, the second of which is zero. For arithmetic entry by entry the width does not
 //! matter, so it is always [`Wide`], which a build lowers to what it has.
 
 use crate::engine::constraints::records::batches::Batches;
@@ -39,17 +40,23 @@ impl Clone for PointVector {
 const SHARED: usize = 4;
 
 impl PointVector {
-    /// Zeros for the contacts of both sets of batches.
-    pub(crate) fn reset(&mut self, batches: [&Batches; 2]) {
+    /// Zeros for the contacts of both sets of batches and for `rows` of sixteen other constraints.
+    pub(crate) fn reset(&mut self, batches: [&Batches; 2], rows: usize) {
         self.blocks.clear();
-        self.blocks.resize(SHARED * batches.map(Batches::groups).iter().sum::<usize>(), Block::default());
+        let contacts = SHARED * batches.map(Batches::groups).iter().sum::<usize>();
+        self.blocks.resize(contacts + 2 * rows, Block::default());
+    }
+
+    /// What is behind the contacts of both sets of batches.
+    pub(crate) fn others(&mut self, batches: [&Batches; 2]) -> &mut [Block] {
+        &mut self.blocks[SHARED * batches.map(Batches::groups).iter().sum::<usize>()..]
     }
 
     /// The parts that belong to the contacts of either set of batches.
     pub(crate) fn parts(&mut self, batches: [&Batches; 2]) -> [&mut [Block]; 2] {
         let [lanes, serial] = batches.map(Batches::groups);
-        assert!(self.blocks.len() == SHARED * (lanes + serial), "a vector of other contacts");
-        self.blocks.split_at_mut(SHARED * lanes).into()
+        assert!(self.blocks.len() >= SHARED * (lanes + serial), "a vector of other contacts");
+        self.blocks[..SHARED * (lanes + serial)].split_at_mut(SHARED * lanes).into()
     }
 
     /// Removes all entries.

@@ -58,6 +58,18 @@ impl Passes<'_> {
         graph.count_others(self.work.types.iter().flat_map(|t| t.kind.ends()).copied());
     }
 
+    /// As [`Self::build_graph`]; constraints of other types are edges as well, behind the contacts.
+    pub fn build_whole_graph(&mut self, graph: &mut Graph) {
+        let bodies = self.work.rows.len() - 1;
+        let dynamic = |body: u32| self.work.rows[body as usize].velocity[3] > 0.0;
+        let contacts = self.contacts.iter().map(|c| [c.body_a, c.body_b]);
+        graph.build(
+            bodies,
+            contacts.chain(self.work.types.iter().flat_map(|t| t.kind.ends()).copied()),
+            dynamic,
+        );
+    }
+
     /// Multiplies inverse masses and inertias by `factor(body)`, from what they are without
     /// any, and lets the effective masses of the constraints follow that the order has. Until
     /// [`Self::restore_masses`] a Jacobi sweep takes a factor n for n copies of a body.

@@ -24,6 +24,7 @@ use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::Layout;
 use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::order::SweepOrder;
+use crate::engine::constraints::vectors::system::Others;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
 use crate::engine::params::Budget;
@@ -271,6 +272,7 @@ impl<'a> Passes<'a> {
                     rows,
                     poses,
                     batches,
+                    vectors: [&mut [], &mut []],
                 });
             }
         }
@@ -278,24 +280,10 @@ impl<'a> Passes<'a> {
 
     /// Constraints of other types, without the contacts.
     pub(super) fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
-        for part in [Part::Lanes, Part::Serial] {
-            let width = self.width_of(part);
-            let Workspace { rows, types, poses, .. } = &mut *self.work;
-            for Joined { kind, lanes, serial } in types {
-                let (rows, batches) = (TypeRows::new(rows, &mut [], mode), part.of(lanes, serial));
-                kind.run(TypeInput {
-                    phase,
-                    mode,
-                    law: Softness::RIGID,
-                    driven: self.driven,
-                    h: self.input.h,
-                    width,
-                    rows,
-                    poses,
-                    batches,
-                });
-            }
-        }
+        let Workspace { rows, types, poses, .. } = &mut *self.work;
+        let (h, counted, driven) = (self.input.h, self.input.phases.counted, self.driven);
+        let mut others = Others { types, poses, h, counted, driven };
+        others.run(rows, self.width, (phase, mode), Softness::RIGID, [&mut [], &mut []]);
     }
 
     pub(crate) fn over_part(&mut self, part: Part, pass: &mut dyn AnyPass) {

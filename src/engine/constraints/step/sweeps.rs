@@ -49,6 +49,16 @@ impl Passes<'_> {
         }
     }
 
+    /// Pass over joints alone: their records take up what [`ConstraintType::replace`] has changed.
+    ///
+    /// [`ConstraintType::replace`]: crate::engine::constraints::kernels::types::ConstraintType::replace
+    pub fn reload_types(&mut self) {
+        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            self.over_types_alone(Phase::Prepare, PassMode::InTurn);
+            self.clock.lap(Phase::Solve);
+        }
+    }
+
     /// Constraint pass: applies the accumulated impulses.
     pub fn warm_start(&mut self) {
         self.run(Phase::WarmStart, &mut WarmStart { turned: false });

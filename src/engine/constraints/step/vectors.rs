@@ -2,15 +2,26 @@
 
 use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::system::System;
+use crate::engine::constraints::vectors::system::{Others, System};
 use crate::engine::lanes::Block;
 
 impl Passes<'_> {
     /// All impulses and velocities as vectors, in an order that no width changes.
     pub fn system(&mut self) -> System<'_> {
-        let Workspace { rows, lanes, serial, .. } = &mut *self.work;
-        System::new(rows, [lanes, serial], self.contacts, &self.input.features, self.clock, self.width)
+        let Workspace { rows, lanes, serial, types, poses, .. } = &mut *self.work;
+        let (h, counted) = (self.input.h, self.input.phases.counted);
+        let joints = Others { types, poses, h, counted, driven: self.driven };
+        System::new(
+            rows,
+            [lanes, serial],
+            self.contacts,
+            joints,
+            &self.input.features,
+            self.clock,
+            self.width,
+        )
     }
 
     /// The greatest violation of the rigid contact law now (N·s), see [`System::residual`].
@@ -23,7 +34,8 @@ impl Passes<'_> {
     /// again in the next step.
     pub fn vector(&mut self) -> PointVector {
         let mut vector = self.work.vectors.pop().unwrap_or_default();
-        vector.reset([&self.work.lanes, &self.work.serial]);
+        let rows = self.work.types.iter().map(Joined::vector_rows).sum();
+        vector.reset([&self.work.lanes, &self.work.serial], rows);
         vector
     }
 

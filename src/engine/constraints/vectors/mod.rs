@@ -1,4 +1,5 @@
 //! A step's problem as vectors: impulses λ, velocities v and the Jacobian J.
 
+pub mod blocks;
 pub(crate) mod passes;
 pub mod system;

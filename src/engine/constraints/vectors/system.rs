@@ -7,26 +7,71 @@
 //! the same bits at every width. One entry of a λ or of a relative velocity is `[normal, tangential]`,
 //! along n and t = (n_y, −n_x) on body b.
 
-use crate::engine::clock::Clock;
-use crate::engine::constraints::kernels::pass::at_width;
-use crate::engine::constraints::records::batches::Batches;
+use crate::engine::clock::{Clock, Phase};
+use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_width};
+use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::engine::constraints::kernels::velocity::rules::Softness;
+use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::{Features, Layout};
 use crate::engine::constraints::records::point_vector::PointVector;
 use crate::engine::constraints::vectors::passes::{self, On};
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth};
+use crate::engine::lanes::{Block, BodyRow, LaneWidth};
+use crate::engine::narrowphase::lanes::PoseRow;
 
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];
 
 /// A view of the step's problem; see the [module](self).
 pub struct System<'a> {
-    rows: &'a mut [BodyRow],
+    pub(super) rows: &'a mut [BodyRow],
     batches: [&'a mut Batches; 2],
     contacts: &'a [Contact],
+    pub(super) others: Others<'a>,
     features: &'a Features,
     clock: &'a mut Clock,
     width: LaneWidth,
+}
+
+/// Constraints of other types than contacts.
+pub(crate) struct Others<'a> {
+    pub types: &'a mut [Joined],
+    pub poses: &'a [PoseRow],
+    /// Substep (s).
+    pub h: f32,
+    pub counted: bool,
+    /// Springs and motors have acted in this substep.
+    pub driven: bool,
+}
+
+impl Others<'_> {
+    /// A pass over all of them; each takes its part of the vectors.
+    pub fn run(
+        &mut self,
+        rows: &mut [BodyRow],
+        width: LaneWidth,
+        (phase, mode): (Phase, PassMode),
+        law: Softness,
+        [mut x, mut y]: [&mut [Block]; 2],
+    ) {
+        let &mut Others { ref mut types, poses, h, counted, driven } = self;
+        for Joined { kind, lanes, serial } in types.iter_mut() {
+            for part in [Part::Lanes, Part::Serial] {
+                let width = match part {
+                    Part::Lanes => PassWidth { width, counted },
+                    Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+                };
+                let batches = part.of(lanes, serial);
+                let count = 2 * kind.rows() * batches.groups();
+                let vectors = [&mut x, &mut y].map(|all| all.split_off_mut(..count).unwrap_or_default());
+                if matches!(mode, PassMode::Vector(_)) && count == 0 {
+                    continue;
+                }
+                let rows = TypeRows::new(rows, &mut [], mode);
+                kind.run(TypeInput { phase, mode, law, driven, h, width, rows, poses, batches, vectors });
+            }
+        }
+    }
 }
 
 impl<'a> System<'a> {
@@ -34,11 +79,12 @@ impl<'a> System<'a> {
         rows: &'a mut [BodyRow],
         batches: [&'a mut Batches; 2],
         contacts: &'a [Contact],
+        others: Others<'a>,
         features: &'a Features,
         clock: &'a mut Clock,
         width: LaneWidth,
     ) -> Self {
-        System { rows, batches, contacts, features, clock, width }
+        System { rows, batches, contacts, others, features, clock, width }
     }
 
     /// Reads all accumulated impulses (N·s), in lanes.
@@ -46,38 +92,89 @@ impl<'a> System<'a> {
         let of = |layout: &Layout| [layout.normal_impulse, layout.tangent_impulse];
         self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
+        self.over_others(VectorTask::Impulses, Softness::RIGID, to, None);
     }
 
     /// Replaces all accumulated impulses (N·s), in lanes; velocities stay as they are.
     pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
         self.book_points([8.0, 8.0]);
         self.over_lanes(from, |width, on| at_width!(width, passes::write_impulses(on)));
+        self.over_others(VectorTask::SetImpulses, Softness::RIGID, from, None);
     }
 
     /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes; of the
-    /// normal row alone in a scene without friction.
+    /// normal row alone in a scene without friction. Of rows of joints 1/(J M⁻¹ Jᵀ + R).
     pub fn lane_masses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
         self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
+        self.over_others(VectorTask::Masses, Softness::RIGID, to, None);
     }
 
-    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes.
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes; −1 marks what is no contact.
     pub fn lane_surfaces(&mut self, to: &mut PointVector) {
         self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_surfaces(on)));
+        let [lanes, serial] = &self.batches;
+        for pair in to.others([lanes, serial]).chunks_exact_mut(2) {
+            (pair[0], pair[1]) = (Block::default(), Block([-1.0; 16]));
+        }
     }
 
     /// J v: how fast the surfaces part and slide at each point (m/s), in lanes.
     pub fn lane_velocities(&mut self, to: &mut PointVector) {
         self.book_points([GEOMETRY, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_velocities(on)));
+        self.over_others(VectorTask::Velocities, Softness::RIGID, to, None);
     }
 
     /// v ← v + M⁻¹ Jᵀ Δλ, in lanes, in the order of the lanes. Accumulated impulses stay as they are.
     pub fn push_lanes(&mut self, delta: &mut PointVector) {
         self.book_points([8.0 + GEOMETRY, 32.0]);
         self.over_lanes(delta, |width, on| at_width!(width, passes::push(on)));
+        self.over_others(VectorTask::Push, Softness::RIGID, delta, None);
+    }
+
+    /// Whether there are rows of joints.
+    pub fn has_joints(&self) -> bool {
+        self.others.types.iter().any(|joined| joined.kind.rows() > 0)
+    }
+
+    /// b of rows of joints under `law` (m/s or rad/s), in lanes; contacts stay as they are.
+    pub fn lane_bias(&mut self, law: Softness, to: &mut PointVector) {
+        self.over_others(VectorTask::Bias, law, to, None);
+    }
+
+    /// x ← x + R y of rows of joints, in lanes; contacts stay as they are.
+    pub fn soften_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
+        self.over_others(VectorTask::Soften, Softness::RIGID, x, Some(y));
+    }
+
+    /// Impulses of joints become the nearest ones within their bounds, in lanes; contacts stay as they are.
+    pub fn bound_lanes(&mut self, x: &mut PointVector) {
+        self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
+    }
+
+    /// A pass between impulses of joints and vectors.
+    fn over_others(
+        &mut self,
+        task: VectorTask,
+        law: Softness,
+        x: &mut PointVector,
+        y: Option<&mut PointVector>,
+    ) {
+        let (mut none, [lanes, serial]) = (PointVector::default(), &self.batches);
+        let x = x.others([lanes, serial]);
+        let y = match y {
+            Some(y) => y.others([lanes, serial]),
+            None => none.others([&Batches::default(), &Batches::default()]),
+        };
+        self.others.run(self.rows, self.width, (Phase::Solve, PassMode::Vector(task)), law, [x, y]);
+    }
+
+    /// A pass over constraints of other types than contacts.
+    pub(super) fn over_types(&mut self, phase: Phase, mode: PassMode) {
+        self.others.run(self.rows, self.width, (phase, mode), Softness::RIGID, [&mut [], &mut []]);
     }
 
     /// Colored batches at their width, then serial ones at one lane.

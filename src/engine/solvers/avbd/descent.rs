@@ -26,15 +26,13 @@
 //! square k JᵀJ for each row. It is solved as L D Lᵀ in the order x, y, θ, in lanes and in `f32`: what
 //! rounding does to the step of a body, its next step sees and mends, as forces are recomputed from positions.
 
+use super::input::{DescentInput, PENALTY};
+use super::joints::JointDescent;
 use super::lanes::{BodyLanes, Ends};
 use crate::engine::constraints::kernels::pass::at_width;
 use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::Kept;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
-
-/// Least and greatest penalty (N/m).
-const PENALTY: [f32; 2] = [1.0, 1e9];
 
 /// Overlap that is no error (m): `COLLISION_MARGIN` of the source.
 const MARGIN: f32 = 5e-4;
@@ -69,26 +67,14 @@ pub struct Descent {
     ends: Vec<Block>,
     /// Records of contacts, seen from body b.
     contacts: Vec<Block>,
-}
-
-/// Further inputs of a pass of block descent.
-pub(crate) struct DescentInput<'a> {
-    pub rows: &'a mut [BodyRow],
-    pub kept: &'a mut Kept,
-    pub contacts: &'a [Contact],
-    /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
-    pub increments: &'a [[f32; 4]],
-    /// The last row is none.
-    pub bodies: usize,
-    pub rotation: bool,
-    pub friction: bool,
+    pub(super) joints: JointDescent,
 }
 
 impl Descent {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         let records = [&self.bodies, &self.ends, &self.contacts];
-        self.lanes.held_bytes() + records.into_iter().map(held).sum::<usize>()
+        self.lanes.held_bytes() + self.joints.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
     /// Gives bodies their lanes, by colors or one by one in the `sequence` of contacts.
@@ -118,7 +104,8 @@ impl Descent {
     /// Begins a substep of `h` (s): records of all contacts, then bodies go to where they begin, moving for
     /// `motion` (s); of multipliers and penalties remain the shares `keep`.
     pub(crate) fn begin(&mut self, on: &mut DescentInput<'_>, h: f32, motion: f32, keep: [f32; 2]) {
-        let Descent { lanes, bodies, ends, contacts } = self;
+        let Descent { lanes, bodies, ends, contacts, joints } = self;
+        joints.begin(on, h, keep);
         at_width!(lanes.width, fill(&lanes.ends, ends, on));
         at_width!(lanes.width, fill(&lanes.contacts, contacts, on));
         for row in on.rows.iter_mut() {
@@ -149,17 +136,22 @@ impl Descent {
 
     /// Every body takes one step, of errors at the start of the substep the share `alpha` left alone.
     pub(crate) fn descend(&mut self, on: &mut DescentInput<'_>, alpha: f32) {
-        at_width!(self.lanes.width, descend(&self.lanes, [&self.bodies, &self.ends], on, alpha));
+        at_width!(
+            self.lanes.width,
+            descend(&self.lanes, [&self.bodies, &self.ends], &mut self.joints, on, alpha)
+        );
     }
 
     /// Multipliers take the forces over; penalties of rows within their bounds grow by `beta` (N/m²).
     pub(crate) fn raise(&mut self, on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
         at_width!(self.lanes.width, raise(&self.lanes.contacts, &self.contacts, on, alpha, beta));
+        self.joints.raise(on, alpha, beta);
     }
 
-    /// Points that stick take up how far they have drifted; the others forget it.
+    /// Points that stick take up how far they have drifted; the others forget it. Joints get their impulses.
     pub(crate) fn hold(&mut self, on: &mut DescentInput<'_>) {
         at_width!(self.lanes.width, hold(&self.lanes.contacts, &self.contacts, on));
+        self.joints.store(on);
     }
 
     /// v ← v + (x − y)/h, which is (x − x_begin)/h.
@@ -291,11 +283,12 @@ fn kept_of<L: Lanes>([first, second]: [&[Quad]; 2], contact: LaneIndex<L::Index>
 fn descend<L: Lanes>(
     lanes: &BodyLanes,
     [bodies, ends]: [&[Block]; 2],
+    joints: &mut JointDescent,
     on: &mut DescentInput<'_>,
     alpha: f32,
 ) {
     let (bodies, ends): (&[L], &[L]) = (bytemuck::cast_slice(bodies), bytemuck::cast_slice(ends));
-    let kept = on.kept.by_point().map(|points| bytemuck::cast_slice(points));
+    let share = alpha;
     let (contact, other) = (lanes.ends.contact.list(), lanes.ends.other.list());
     let (alpha, zero) = (L::splat(alpha), L::zero());
     let each = lanes.batches.iter().zip(bodies.chunks_exact(BODY)).zip(lanes.bodies.list().batches());
@@ -305,6 +298,12 @@ fn descend<L: Lanes>(
         // The upper half of the matrix, row by row, and the right-hand side.
         let mut k = [mass, zero, zero, mass, zero, inertia];
         let mut f = [0, 1, 2].map(|i| (if i == 2 { inertia } else { mass }) * (body[i] - x[i]));
+        if !joints.is_empty() {
+            let added = joint_systems::<L>(joints, index, on, share);
+            k = [0, 1, 2, 3, 4, 5].map(|i| k[i] + added[i]);
+            f = [0, 1, 2].map(|i| f[i] + added[6 + i]);
+        }
+        let kept = on.kept.by_point().map(|points| bytemuck::cast_slice::<f32, Quad>(points));
         let range = batch.first * L::WIDTH..(batch.first + batch.ranks) * L::WIDTH;
         let ranks = contact.part(range.clone()).batches().zip(other.part(range).batches());
         let records = ends[batch.first * RECORD..].chunks_exact(RECORD);
@@ -336,6 +335,26 @@ fn descend<L: Lanes>(
         let delta = [x[0] + change[0], x[1] + change[1], x[2] + change[2], x[3]];
         L::scatter_delta(on.rows, index, delta);
     }
+}
+
+/// What joints add to the systems of a batch of bodies.
+#[inline(never)]
+fn joint_systems<L: Lanes>(
+    joints: &mut JointDescent,
+    bodies: LaneIndex<L::Index>,
+    on: &mut DescentInput<'_>,
+    alpha: f32,
+) -> [L; 9] {
+    let (graph, first, count) = (on.graph, on.contacts.len(), on.bodies);
+    let mut sums = [L::zero(); 9];
+    for (lane, &body) in bodies.entries().iter().enumerate().filter(|&(_, &body)| (body as usize) < count) {
+        let edges = graph.edges_of(body as usize).iter().map(|&edge| edge as usize);
+        let own = joints.system(body, edges.filter_map(|edge| edge.checked_sub(first)), on, alpha);
+        for (sum, value) in sums.iter_mut().zip(own) {
+            bytemuck::cast_slice_mut::<L, f32>(std::slice::from_mut(sum))[lane] = value;
+        }
+    }
+    sums
 }
 
 /// K x = f for a symmetric positive definite K, given by its upper half, as L D Lᵀ.

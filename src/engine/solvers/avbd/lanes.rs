@@ -1,6 +1,6 @@
 //! Bodies in lanes: which of them are solved together, and with which contacts.
 //!
-//! Bodies of one color share no contact, so that each of them can be solved as if alone. Colors are given
+//! Bodies of one color share no contact and no joint, so that each of them can be solved as if alone. Colors are given
 //! greedily in the order of the bodies; within a color bodies with as many contacts stand together. A batch of
 //! bodies goes through their contacts by rank: first the first contact of each, then the second, and
 //! a body that has no more gets an empty one. What becomes of a body does not depend on the batch in
@@ -87,8 +87,8 @@ impl BodyLanes {
         self.order.iter().map(|&body| body as usize)
     }
 
-    /// Gives lanes to the bodies that have contacts and are dynamic, by colors, or one by one in the `sequence` of
-    /// contacts; `inert` is the number of bodies.
+    /// Gives lanes to the bodies that have contacts or joints and are dynamic, by colors, or one by one in the `sequence`
+    /// of contacts and then of joints; `inert` is the number of bodies. Edges of `graph` beyond the contacts are joints.
     pub fn assign(
         &mut self,
         width: LaneWidth,
@@ -98,13 +98,21 @@ impl BodyLanes {
         is_dynamic: impl Fn(u32) -> bool,
         sequence: Option<&[u32]>,
     ) {
+        let joints = contacts.len() as u32..graph.len() as u32;
+        // Edges ascend, contacts before joints.
+        let touching = |body: u32| {
+            let edges = graph.edges_of(body as usize);
+            &edges[..edges.partition_point(|&edge| edge < joints.start)]
+        };
         self.width = width;
         let width = width.lanes();
         self.order.clear();
         self.colors.clear();
         self.colors.resize(inert as usize, NONE);
         if let Some(sequence) = sequence {
-            for body in sequence.iter().flat_map(|&contact| graph.ends(contact as usize)) {
+            for body in
+                sequence.iter().copied().chain(joints.clone()).flat_map(|edge| graph.ends(edge as usize))
+            {
                 if let Some(color @ &mut NONE) = self.colors.get_mut(body as usize)
                     && is_dynamic(body)
                 {
@@ -116,7 +124,7 @@ impl BodyLanes {
             self.order
                 .extend((0..inert).filter(|&b| is_dynamic(b) && !graph.edges_of(b as usize).is_empty()));
             self.color(graph);
-            let (colors, degree) = (&self.colors, |b: u32| graph.edges_of(b as usize).len());
+            let (colors, degree) = (&self.colors, |b: u32| touching(b).len());
             self.order.sort_unstable_by_key(|&b| (colors[b as usize], std::cmp::Reverse(degree(b)), b));
         }
         self.batches.clear();
@@ -126,14 +134,14 @@ impl BodyLanes {
         let is_together =
             |a: &u32, b: &u32| sequence.is_none() && self.colors[*a as usize] == self.colors[*b as usize];
         for batch in self.order.chunk_by(is_together).flat_map(|color| color.chunks(width)) {
-            let ranks = batch.iter().map(|&b| graph.edges_of(b as usize).len()).max().unwrap_or(0);
+            let ranks = batch.iter().map(|&b| touching(b).len()).max().unwrap_or(0);
             self.batches.push(BodyBatch { ranks, first: self.ends.contact.len() / width });
             self.bodies.extend(batch);
             self.bodies.fill_to(self.bodies.len().next_multiple_of(width), inert);
             for rank in 0..ranks {
                 for lane in 0..width {
                     let body = batch.get(lane).copied();
-                    let edge = body.and_then(|b| graph.edges_of(b as usize).get(rank).map(|&edge| (b, edge)));
+                    let edge = body.and_then(|b| touching(b).get(rank).map(|&edge| (b, edge)));
                     let Some((body, edge)) = edge else {
                         // Some contact, which is not looked at.
                         self.ends.push(0, inert, inert, 0.0);

@@ -1,0 +1,77 @@
+//! Rows of joints one by one, for methods that build a system of all rows of a scene.
+
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::pass::PassMode;
+use crate::engine::constraints::kernels::types::Placed;
+use crate::engine::constraints::records::rows::{ROWS, RowBlock, RowLaw};
+use crate::engine::constraints::vectors::system::System;
+
+/// The blocks of all joints, in the order of their types.
+#[derive(Clone, Debug, Default)]
+pub struct JointBlocks {
+    /// All of them, with the impulses of the records.
+    pub blocks: Vec<RowBlock>,
+    /// Type of each joint, its number in it, and where its blocks begin. `[joints]`
+    joints: Vec<[usize; 3]>,
+}
+
+impl System<'_> {
+    /// Reads the blocks of all joints.
+    pub fn joint_blocks(&mut self) -> JointBlocks {
+        self.over_types(Phase::Store, PassMode::InTurn);
+        let mut all = JointBlocks::default();
+        let placed = Placed { rows: self.rows, poses: self.others.poses };
+        for (t, joined) in self.others.types.iter_mut().enumerate() {
+            for i in 0..joined.kind.ends().len() {
+                all.joints.push([t, i, all.blocks.len()]);
+                joined.kind.collect(i, placed, &mut all.blocks);
+            }
+        }
+        all
+    }
+
+    /// The impulses of the blocks become those of the joints; velocities stay as they are.
+    pub fn set_joint_impulses(&mut self, from: &JointBlocks) {
+        let ends = from.joints.iter().skip(1).map(|joint| joint[2]).chain([from.blocks.len()]);
+        let placed = Placed { rows: self.rows, poses: self.others.poses };
+        for (&[t, i, first], end) in from.joints.iter().zip(ends) {
+            self.others.types[t].kind.replace(i, placed, &from.blocks[first..end]);
+        }
+        self.over_types(Phase::Prepare, PassMode::InTurn);
+    }
+}
+
+impl RowBlock {
+    /// Row `r` on body a or b: `[d, d, s]` with the sign of its side.
+    pub fn on(&self, side: usize, r: usize) -> [f64; 3] {
+        let (sign, j) = (if side == 0 { -1.0 } else { 1.0 }, &self.jacobians[r]);
+        [j.axis[0], j.axis[1], j.arms[side]].map(|x| sign * f64::from(x))
+    }
+
+    /// b of J v + b + R λ = 0, see `constraints/joints/rows.rs`: `rate` is β of rigid rows (1/s).
+    pub fn bias(&self, rate: f32, h: f32) -> [f32; ROWS] {
+        self.errors.map(|error| match self.law {
+            RowLaw::Rigid => rate * error,
+            RowLaw::Limit => error * if error > 0.0 { 1.0 / h } else { rate },
+            RowLaw::Motor { speed, .. } => -speed,
+            RowLaw::Spring { stiffness, damping, .. } => stiffness / damping.max(1e-9) * error,
+        })
+    }
+
+    /// R = `softness` K (1).
+    pub fn softness(&self) -> f32 {
+        match self.law {
+            RowLaw::Spring { damping, .. } => 1.0 / damping.max(1e-9),
+            _ => 0.0,
+        }
+    }
+
+    /// Greatest norm of its impulses, where there is one.
+    pub fn cap(&self) -> Option<f32> {
+        match self.law {
+            RowLaw::Motor { cap, .. } => Some(cap),
+            RowLaw::Spring { cap, .. } => cap,
+            RowLaw::Rigid | RowLaw::Limit => None,
+        }
+    }
+}

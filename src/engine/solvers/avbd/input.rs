@@ -1,0 +1,30 @@
+//! What passes of block descent work on.
+
+use crate::engine::constraints::kernels::types::Joined;
+use crate::engine::constraints::records::graph::Graph;
+use crate::engine::constraints::records::kept::Kept;
+use crate::engine::contacts::Contact;
+use crate::engine::lanes::BodyRow;
+use crate::engine::narrowphase::lanes::PoseRow;
+
+/// Least and greatest penalty (N/m).
+pub(crate) const PENALTY: [f32; 2] = [1.0, 1e9];
+
+/// Inputs of a pass of block descent.
+pub(crate) struct DescentInput<'a> {
+    pub rows: &'a mut [BodyRow],
+    pub kept: &'a mut Kept,
+    pub contacts: &'a [Contact],
+    /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
+    pub increments: &'a [[f32; 4]],
+    /// The last row is none.
+    pub bodies: usize,
+    pub rotation: bool,
+    pub friction: bool,
+    pub types: &'a mut [Joined],
+    pub poses: &'a [PoseRow],
+    /// Of contacts and, behind them, joints.
+    pub graph: &'a Graph,
+    /// Substep (s).
+    pub h: f32,
+}

@@ -1,0 +1,254 @@
+//! Joints in block descent, one by one: what a joint states as rows becomes forces and stiffness of its bodies.
+//!
+//! # Forces
+//!
+//! A row has its error C where bodies are now, C⁰ at the start of the substep, a multiplier λ and a penalty k:
+//!
+//! ```text
+//! rigid    f = λ − k (C − α C⁰)
+//! limit    the same, f ≥ 0; C⁰ is 0 where it is open, which may close
+//! motor    f = λ − K⁻¹ (C − C⁰ − u h)/h², |f| ≤ F;   C is the way that it has gone in the step
+//! spring   f = −K⁻¹ (S C⁰ + D (C − C⁰)/h)/h, |f| ≤ F
+//! ```
+//!
+//! The last is the spring of all solvers, λ = −K⁻¹ (S x + D v⁺) (see `constraints/joints/rows.rs`), with f = λ/h and the
+//! velocity v⁺ = (C − C⁰)/h that the substep ends with. Springs and motors have stiffness of their own, K⁻¹ D/h² and K⁻¹/h²,
+//! and no penalty that grows.
+//!
+//! # Stiffness
+//!
+//! C is taken where bodies are, not along its tangent. What a turning arm adds to the stiffness is f ∂²C/∂θ² = f d·r of a
+//! row along d; its size is |f| √(|r|² − s²) with s = r × d, and is added to the diagonal as the source does.
+
+use super::input::{DescentInput, PENALTY};
+use crate::engine::constraints::joints::rows::{RowBlock, RowLaw};
+use crate::engine::constraints::kernels::types::{Joined, Placed};
+use crate::engine::constraints::records::rows::ROWS;
+use crate::engine::lanes::held;
+
+/// Numbers per row of a block.
+type Rows = [f32; ROWS];
+
+/// Joints of a world, and what is kept of their rows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct JointDescent {
+    /// Type of each joint and its number in it. `[joints]`
+    places: Vec<[u32; 2]>,
+    /// Where its blocks begin, and where the last ones end. `[joints + 1]`
+    starts: Vec<u32>,
+    /// Their bodies. `[blocks]`
+    bodies: Vec<[u32; 2]>,
+    blocks: Vec<Kept>,
+    found: Vec<RowBlock>,
+}
+
+/// What is kept of a block from iteration to iteration, and of its penalties from step to step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Kept {
+    /// λ (N or N·m)
+    force: Rows,
+    /// k (N/m or N·m)
+    penalty: Rows,
+    /// C⁰ (m or rad)
+    first: Rows,
+}
+
+/// A block where bodies are now.
+struct Forces {
+    /// f (N or N·m)
+    force: Rows,
+    /// −∂f/∂C
+    stiffness: [Rows; ROWS],
+    /// What is to vanish (m or rad).
+    error: Rows,
+    /// The rows' penalties may grow.
+    grows: bool,
+}
+
+impl JointDescent {
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    pub fn held_bytes(&self) -> usize {
+        held(&self.places) + held(&self.starts) + held(&self.bodies) + held(&self.blocks) + held(&self.found)
+    }
+
+    /// Lists the joints. Penalties are kept while the joints stay the same ones.
+    pub fn assign(&mut self, types: &mut [Joined], on: Placed<'_>) {
+        self.places.clear();
+        self.starts.clear();
+        self.found.clear();
+        for (t, joined) in types.iter_mut().enumerate() {
+            for i in 0..joined.kind.ends().len() {
+                self.places.push([t as u32, i as u32]);
+                self.starts.push(self.found.len() as u32);
+                joined.kind.collect(i, on, &mut self.found);
+            }
+        }
+        self.starts.push(self.found.len() as u32);
+        let bodies = self.found.iter().map(|block| block.bodies);
+        if !self.bodies.iter().copied().eq(bodies.clone()) {
+            self.bodies.clear();
+            self.bodies.extend(bodies);
+            self.blocks.clear();
+            self.blocks.resize(self.bodies.len(), Kept::default());
+        }
+    }
+
+    /// The blocks of joint `joint`, where bodies are now.
+    fn collect(&mut self, joint: usize, on: &mut DescentInput<'_>) -> std::ops::Range<usize> {
+        let [t, i] = self.places[joint];
+        self.found.clear();
+        let placed = Placed { rows: on.rows, poses: on.poses };
+        on.types[t as usize].kind.collect(i as usize, placed, &mut self.found);
+        self.starts[joint] as usize..self.starts[joint + 1] as usize
+    }
+
+    /// Begins a substep of `h` (s), before bodies move; of multipliers and penalties remain the shares `keep`.
+    pub fn begin(&mut self, on: &mut DescentInput<'_>, h: f32, keep: [f32; 2]) {
+        for joint in 0..self.places.len() {
+            let range = self.collect(joint, on);
+            for (block, kept) in self.found.iter().zip(&mut self.blocks[range]) {
+                for r in 0..block.size {
+                    kept.force[r] = keep[0] * block.impulses[r] / h;
+                    kept.penalty[r] = (kept.penalty[r] * keep[1]).clamp(PENALTY[0], PENALTY[1]);
+                    kept.first[r] = match block.law {
+                        RowLaw::Rigid | RowLaw::Spring { .. } => block.errors[r],
+                        RowLaw::Limit => block.errors[r].min(0.0),
+                        RowLaw::Motor { .. } => block.travel[r],
+                    };
+                }
+                if matches!(block.law, RowLaw::Limit) && block.errors[0] > 0.0 && kept.force[0] == 0.0 {
+                    kept.penalty[0] = PENALTY[0];
+                }
+            }
+        }
+    }
+
+    /// What the joints of a body, edges `joints`, add to its system: the upper half of the matrix row by row, and the
+    /// right-hand side.
+    pub fn system(
+        &mut self,
+        body: u32,
+        joints: impl Iterator<Item = usize>,
+        on: &mut DescentInput<'_>,
+        alpha: f32,
+    ) -> [f32; 9] {
+        let mut sum = [0.0_f32; 9];
+        for joint in joints {
+            let range = self.collect(joint, on);
+            for (block, kept) in self.found.iter().zip(&self.blocks[range]) {
+                let Forces { force, stiffness, .. } = forces(block, kept, on.h, alpha);
+                let side = usize::from(block.bodies[1] == body);
+                let sign = if side == 0 { -1.0 } else { 1.0 };
+                let turns = if on.rows[body as usize].delta[3] > 0.0 { sign } else { 0.0 };
+                let j = block.jacobians.map(|j| [sign * j.axis[0], sign * j.axis[1], turns * j.arms[side]]);
+                for r in 0..block.size {
+                    (0..3).for_each(|i| sum[6 + i] += j[r][i] * force[r]);
+                    for c in 0..block.size {
+                        let k = stiffness[r][c];
+                        for (at, (u, v)) in
+                            [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate()
+                        {
+                            sum[at] += k * j[r][u] * j[c][v];
+                        }
+                    }
+                    if turns != 0.0 && j[r][..2] != [0.0; 2] {
+                        let (reach, arm) = (block.reach[side], j[r][2]);
+                        sum[5] += force[r].abs() * (reach * reach - arm * arm).max(0.0).sqrt();
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// Multipliers take the forces over; penalties of rows within their bounds grow by `beta` (N/m²).
+    pub fn raise(&mut self, on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
+        for joint in 0..self.places.len() {
+            let range = self.collect(joint, on);
+            for (block, kept) in self.found.iter().zip(&mut self.blocks[range]) {
+                let Forces { force, error, grows, .. } = forces(block, kept, on.h, alpha);
+                kept.force = force;
+                for r in 0..if grows { block.size } else { 0 } {
+                    kept.penalty[r] = beta.mul_add(error[r].abs(), kept.penalty[r]).min(PENALTY[1]);
+                }
+            }
+        }
+    }
+
+    /// Impulses h f become those of the joints.
+    pub fn store(&mut self, on: &mut DescentInput<'_>) {
+        for joint in 0..self.places.len() {
+            let range = self.collect(joint, on);
+            for (block, kept) in self.found.iter_mut().zip(&self.blocks[range]) {
+                block.impulses = kept.force.map(|force| on.h * force);
+            }
+            let ([t, i], placed) = (self.places[joint], Placed { rows: on.rows, poses: on.poses });
+            on.types[t as usize].kind.replace(i as usize, placed, &self.found);
+        }
+    }
+}
+
+/// See the [module](self).
+fn forces(block: &RowBlock, kept: &Kept, h: f32, alpha: f32) -> Forces {
+    let mut stiffness = [[0.0; ROWS]; ROWS];
+    let mut error = [0.0; ROWS];
+    let inv_square = 1.0 / (h * h);
+    let mut force = [0.0; ROWS];
+    let mut cap = None;
+    match block.law {
+        RowLaw::Rigid | RowLaw::Limit => {
+            for r in 0..block.size {
+                error[r] = alpha.mul_add(-kept.first[r], block.errors[r]);
+                stiffness[r][r] = kept.penalty[r];
+                force[r] = kept.penalty[r].mul_add(-error[r], kept.force[r]);
+            }
+        }
+        RowLaw::Motor { speed, cap: bound } => {
+            (0..block.size).for_each(|r| error[r] = block.travel[r] - kept.first[r] - speed * h);
+            stiffness = inverse(block, inv_square);
+            let change = block.solved(error).map(|x| x * inv_square);
+            (0..block.size).for_each(|r| force[r] = kept.force[r] - change[r]);
+            cap = Some(bound / h);
+        }
+        RowLaw::Spring { stiffness: s, damping: d, cap: bound } => {
+            let moved = |r: usize| block.errors[r] - kept.first[r];
+            let x = std::array::from_fn(|r| s * kept.first[r] / h + d * moved(r) * inv_square);
+            stiffness = inverse(block, d * inv_square);
+            let x = block.solved(x);
+            (0..block.size).for_each(|r| force[r] = -x[r]);
+            cap = bound.map(|bound| bound / h);
+        }
+    }
+    if matches!(block.law, RowLaw::Limit) {
+        force[0] = force[0].max(0.0);
+    }
+    if let Some(cap) = cap {
+        let norm = force.iter().map(|f| f * f).sum::<f32>().sqrt();
+        if norm > cap {
+            // A constant force has no stiffness.
+            force = force.map(|f| f * (cap / norm));
+            stiffness = [[0.0; ROWS]; ROWS];
+        }
+    }
+    let grows = match block.law {
+        RowLaw::Rigid => true,
+        RowLaw::Limit => force[0] > 0.0,
+        RowLaw::Motor { .. } | RowLaw::Spring { .. } => false,
+    };
+    Forces { force, stiffness, error, grows }
+}
+
+/// K⁻¹ times `scale`.
+fn inverse(block: &RowBlock, scale: f32) -> [Rows; ROWS] {
+    let mut columns = [[0.0; ROWS]; ROWS];
+    for (c, column) in columns.iter_mut().enumerate().take(block.size) {
+        let mut unit = [0.0; ROWS];
+        unit[c] = scale;
+        *column = block.solved(unit);
+        column[block.size..].fill(0.0);
+    }
+    columns
+}
