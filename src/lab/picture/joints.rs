@@ -171,7 +171,7 @@ fn one(
     }
 }
 
-/// The marks of joints with their names, in a row at this height (pixels).
+/// The marks of these joints with their names, in a row at this height (pixels).
 pub(super) fn legend(picture: &mut Picture, joints: &[JointRecord], [mut x, y]: [f64; 2], ink: Color) {
     const NAMES: [(JointMark, &str); 8] = [
         (JointMark::Revolute, "hinge"),
