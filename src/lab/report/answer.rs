@@ -37,7 +37,7 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
     let ranking = ranking(records);
     let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
     text += &warnings(records, steps);
-    text += &head(records, environment, scenes.len());
+    text += &wrapped(&head(records, environment, scenes.len()));
     text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
     text += &fallen(records);
     text += &format!(
