@@ -192,16 +192,16 @@ impl IteratedSchedule {
 ///
 /// ```
 /// use simpulse::engine::solvers::find;
-/// use simpulse::lab::converge::{Options, converge};
+/// use simpulse::lab::converge::{ConvergeOptions, converge};
 /// use simpulse::lab::reference::gallery;
 ///
 /// let problem = gallery::disc_column(4);
-/// let options = Options {
+/// let options = ConvergeOptions {
 ///     solvers: vec![find("pgs")?],
 ///     max_iterations: 100,
 ///     rounds: 0,
 ///     baseline: false,
-///     ..Options::default()
+///     ..ConvergeOptions::default()
 /// };
 /// let report = converge(&problem, None, &options)?;
 /// let curve = &report.curves[0];
