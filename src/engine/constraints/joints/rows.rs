@@ -252,23 +252,27 @@ impl<'v, L: Lanes> JointPass<'v, L> {
         solve(self.response(j), x)
     }
 
+    /// The same bodies and anchors.
+    #[inline(always)]
+    fn copied(&self) -> JointPass<'v, L> {
+        let &JointPass { bodies, turns, anchors, task, names, .. } = self;
+        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), vectors: None, names }
+    }
+
     /// What a block has in vectors.
     ///
     /// A row asks for J v + b + R λ = 0 within its bounds: b = β C where it is rigid, C/h where a limit is open, −u of a
     /// motor, and b = (S/D) C, R = K/D of a spring, which is the line of the [module](self) at rest.
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
+    #[inline(never)]
     fn vector_block<const N: usize>(
         &mut self,
-        j: &[Jacobian<L>; N],
+        j: [Jacobian<L>; N],
         error: [L; N],
         law: RowLaw<L>,
         impulse: &mut [L],
-        of: VectorTask,
-        solver: Softness,
-        inv_h: f32,
     ) {
         const VELOCITY: [usize; 3] = [VX, VY, W];
+        let Task::Vector { of, law: solver, inv_h } = self.task else { return };
         let Some(([x, y], mut places)) = self.vectors.take() else { return };
         let at = |i: usize| places.first + (places.next + i) * places.stride;
         let one = L::splat(1.0);
@@ -279,7 +283,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             VectorTask::Velocities => (0..N).for_each(|i| x[at(i)] = self.rate(&j[i], VELOCITY)),
             VectorTask::Push => (0..N).for_each(|i| self.apply(&j[i], x[at(i)], VELOCITY)),
             VectorTask::Masses => {
-                let k = self.response(j);
+                let k = self.response(&j);
                 let more = match law {
                     RowLaw::Spring { damping, .. } => one + one / damping.max(least),
                     _ => one,
@@ -304,7 +308,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             }
             VectorTask::Soften => {
                 if let RowLaw::Spring { damping, .. } = law {
-                    let (k, scale) = (self.response(j), one / damping.max(least));
+                    let (k, scale) = (self.response(&j), one / damping.max(least));
                     for r in 0..N {
                         for c in 0..N {
                             let k = k[r.max(c)][r.min(c)];
@@ -338,7 +342,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
     #[inline(never)]
     fn collected<const N: usize>(
         &self,
-        j: &[Jacobian<L>; N],
+        j: [Jacobian<L>; N],
         error: [L; N],
         law: RowLaw<L>,
         impulse: &[L],
@@ -357,7 +361,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             impulses: [0.0; ROWS],
             reach: arms.map(|arm| first(dot(arm, arm)).sqrt()),
         };
-        let k = self.response(j);
+        let k = self.response(&j);
         for r in 0..N {
             block.jacobians[r] = Jacobian { axis: j[r].axis.map(first), arms: j[r].arms.map(first) };
             block.errors[r] = first(error[r]);
@@ -470,11 +474,15 @@ impl<'v, L: Lanes> JointPass<'v, L> {
                     self.apply(&j[i], x[i], VELOCITY);
                 }
             }
-            Task::Vector { of, law: solver, inv_h } => {
-                self.vector_block(&j, error, law, impulse, of, solver, inv_h)
+            // On a copy: what is called by reference stays in memory, and sweeps have their bodies in registers.
+            Task::Vector { .. } => {
+                let mut alone = self.copied();
+                alone.vectors = self.vectors.take();
+                alone.vector_block(j, error, law, impulse);
+                (self.bodies, self.vectors) = (alone.bodies, alone.vectors);
             }
             Task::Collect => {
-                let block = self.collected(&j, error, law, impulse);
+                let block = self.copied().collected(j, error, law, impulse);
                 self.blocks.push(block);
             }
             Task::Replace => {
