@@ -311,7 +311,7 @@ impl<T: JointType> Joints<T> {
 
 impl<T: JointType> Joints<T> {
     /// The pass over one joint, in one lane.
-    fn alone(&self, i: usize, Placed { rows, poses }: Placed<'_>, task: Task) -> JointPass<'static, f32> {
+    fn alone<'v>(&self, i: usize, Placed { rows, poses }: Placed<'_>, task: Task) -> JointPass<'v, f32> {
         let [a, b] = self.ends[i];
         let names = if self.swapped { [b, a] } else { [a, b] };
         let [a, b] = names.map(|body| body as usize);
@@ -330,7 +330,7 @@ impl<T: JointType> Joints<T> {
     }
 
     /// States the rows of a joint to `pass`.
-    fn state(&mut self, joint: usize, pass: &mut JointPass<f32>) {
+    fn state(&mut self, joint: usize, pass: &mut JointPass<'_, f32>) {
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let (numbers, kept) =
             (&self.numbers[joint * numbers..][..numbers], &mut self.kept[joint * kept..][..kept]);
@@ -417,14 +417,14 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
         let mut pass = self.alone(constraint, on, Task::Collect);
-        pass.blocks = std::mem::take(to);
+        pass.blocks = Some(to);
         self.state(constraint, &mut pass);
-        *to = pass.blocks;
     }
 
     fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
         let mut pass = self.alone(constraint, on, Task::Replace);
-        pass.blocks.extend(blocks.iter().rev());
+        let mut reversed: Vec<RowBlock> = blocks.iter().rev().copied().collect();
+        pass.blocks = Some(&mut reversed);
         self.state(constraint, &mut pass);
     }
 

@@ -143,7 +143,7 @@ pub struct JointPass<'v, L> {
     anchors: [L; ANCHORS],
     task: Task,
     /// See [`Task::Collect`].
-    pub(super) blocks: Vec<RowBlock>,
+    pub(super) blocks: Option<&'v mut Vec<RowBlock>>,
     /// x and y of [`Task::Vector`].
     pub(super) vectors: Option<([&'v mut [L]; 2], Places)>,
     /// Of the bodies of a joint alone.
@@ -167,7 +167,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
     pub(crate) fn new(bodies: [[L; 8]; 2], anchors: &[L], task: Task) -> Self {
         let anchors = [anchors[0], anchors[1], anchors[2], anchors[3], anchors[4], anchors[5]];
         let turns = [turn(bodies[0][TURN]), turn(bodies[1][TURN])];
-        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), vectors: None, names: [u32::MAX; 2] }
+        JointPass { bodies, turns, anchors, task, blocks: None, vectors: None, names: [u32::MAX; 2] }
     }
 
     /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
@@ -256,7 +256,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
     #[inline(always)]
     fn copied(&self) -> JointPass<'v, L> {
         let &JointPass { bodies, turns, anchors, task, names, .. } = self;
-        JointPass { bodies, turns, anchors, task, blocks: Vec::new(), vectors: None, names }
+        JointPass { bodies, turns, anchors, task, blocks: None, vectors: None, names }
     }
 
     /// What a block has in vectors.
@@ -483,10 +483,12 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             }
             Task::Collect => {
                 let block = self.copied().collected(j, error, law, impulse);
-                self.blocks.push(block);
+                if let Some(blocks) = self.blocks.as_deref_mut() {
+                    blocks.push(block);
+                }
             }
             Task::Replace => {
-                if let Some(block) = self.blocks.pop() {
+                if let Some(block) = self.blocks.as_deref_mut().and_then(Vec::pop) {
                     impulse.iter_mut().zip(block.impulses).for_each(|(to, from)| *to = L::splat(from));
                 }
             }
