@@ -270,7 +270,7 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
     assert!(answer.lines().count() <= 60 && answer.contains("Ranking over all scenes"), "{answer}");
     assert!(tables.contains("Equal time") && tables.contains("Performance profiles"));
     let widest = answer.lines().map(|line| line.chars().count()).max();
-    assert!(widest <= Some(160), "{answer}");
+    assert!(widest <= Some(120), "{answer}");
 }
 
 #[test]
@@ -560,6 +560,10 @@ fn what_a_solver_ignores_is_refused_with_who_has_it() {
     refused(folder.path(), &relax, &["--relax-iterations", "pgs", "soft_step"]);
     let hertz = ["run", "stack:2", "--solver", "pgs", "--set", "contact_hertz=60"];
     refused(folder.path(), &hertz, &["contact_hertz", "pgs", "soft_step"]);
+    // Where others have it, a line says who does not.
+    let both = ["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs,soft_step", "--lanes", "1"];
+    let output = simpulse(folder.path(), &[&both[..], &["--set", "contact_hertz=60"]].concat());
+    assert_eq!(text(&output.stderr), "contact_hertz has no effect on pgs\n");
 }
 
 #[test]

@@ -14,9 +14,9 @@ use std::process::ExitCode;
 
 /// Leave out each mechanism of a solver in turn, and show what is lost
 ///
-/// A solver names its mechanisms in its row. Each is left out alone: the hard cases that then fail are listed,
-/// with the lines of code that it takes; on some scenes its overlap, its speed at rest and its time are
-/// compared with those of the whole solver, which is stepped in turns with it.
+/// A solver names its mechanisms in its row. Each is left out alone. The output lists the hard cases that then
+/// fail and the lines of code of the mechanism. On some scenes it compares overlap, speed at rest and time with
+/// those of the whole solver; both are stepped interleaved.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

@@ -259,10 +259,10 @@ fn rejected(plan: &SearchPlan, advice: &Advice) -> String {
     let mut rows = table(&["  rejected although faster", "µs/step", "longest", "why"]);
     let rejected = advice.rejected();
     for trial in &rejected {
-        let [median, longest] = [|t: FoundTime| t.median_ns, |t: FoundTime| t.worst_ns]
+        let [mean, longest] = [|t: FoundTime| t.mean_ns, |t: FoundTime| t.worst_ns]
             .map(|of| trial.time.map_or("–".into(), |t| digits(1e-3 * of(t))));
         let why = trial.fails(&plan.limits).unwrap_or_default();
-        rows.add_row([format!("  {}", trial.setting.text()), median, longest, why]);
+        rows.add_row([format!("  {}", trial.setting.text()), mean, longest, why]);
     }
     if rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
 }
@@ -353,7 +353,7 @@ fn finalists(plan: &SearchPlan, advice: &Advice) -> String {
             trial
                 .truth
                 .map_or("–".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),
-            trial.fails(&plan.limits).unwrap_or("kept".into()),
+            trial.fails(&plan.limits).unwrap_or("met".into()),
         ]);
     }
     finish(rows, 2)

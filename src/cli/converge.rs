@@ -77,6 +77,7 @@ impl ConvergeArgs {
     fn options(&self) -> Result<ConvergeOptions, Error> {
         let solvers = self.solvers.chosen();
         overrides::check(&solvers, &self.set)?;
+        note(&overrides::partly(&solvers, &self.set));
         Ok(ConvergeOptions {
             solvers,
             max_iterations: self.max_iterations,

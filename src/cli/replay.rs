@@ -44,7 +44,7 @@ pub fn run(args: &ReplayArgs) -> Result<ExitCode, Error> {
     let text = page(&panels);
     files::write(&args.output, text.as_bytes())?;
     let size = text.len().div_ceil(1024);
-    let count = panels.len();
-    let text = format!("wrote {} ({count} recordings, {size} KiB)\n", args.output.display());
+    let plural = if panels.len() == 1 { "" } else { "s" };
+    let text = format!("wrote {} ({} recording{plural}, {size} KiB)\n", args.output.display(), panels.len());
     print_beside([args.output.as_path()], &text)
 }

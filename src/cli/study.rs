@@ -11,7 +11,7 @@ use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::estimate::free_memory;
 use crate::lab::files;
-use crate::lab::overrides::Override;
+use crate::lab::overrides::{self, Override};
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::{self, answer, html, orders, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
@@ -28,12 +28,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Below the help.
 pub const EXAMPLES: &str = "\
-Without any budget option, each solver runs on a scene of the default study at up to three settings
-that were found for both by errors, with the same rule and effort for all (--thorough finds them anew);
-on other scenes at half, once and twice its standard budget. With budget options, every combination
-runs; values that a solver ignores are dropped.
-A sweep runs at each solver's standard budget, in colored order at the widest native lanes,
-unless other options say so.
+Without budget options, a solver runs on each scene of the default study at up to three settings.
+They come from a search by errors, with the same rule and effort for all solvers (--thorough
+repeats it). On other scenes it runs at half, once and twice its standard budget. With budget
+options, every combination runs; values that a solver ignores are dropped.
+A sweep runs at each solver's standard budget, in colored order at the widest native lanes, unless
+other options say otherwise.
 
 Examples:
   simpulse study --quick
@@ -243,7 +243,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     // Before the long wait, not after it.
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
-    note(&(without + &not_held + &cost));
+    note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held + &cost));
     if args.thorough {
         let bar = Bar::new();
         plan.found = Arc::new(study::search::search(&plan, &|p| bar.show(p.done, p.total, p.what))?);
@@ -300,11 +300,13 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
         true => sweep::text(&study.records, &study.environment),
         false => answer::text(&study.records, &study.environment, steps),
     };
-    let mut text =
-        study.caution() + &answer + &answer::wrapped(&study.budgets()) + &orders::text(&study.records);
+    let mut text = answer::wrapped(&study.caution())
+        + &answer
+        + &answer::wrapped(&study.budgets())
+        + &orders::text(&study.records);
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
-    text += &format!("\nwrote {} in {}\n", names.join(", "), out.display());
+    text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));
     if verbose {
         text += &format!("\n{}", report::tables(&study.records));
     }

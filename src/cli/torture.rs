@@ -9,7 +9,7 @@ use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::report::environment::Environment;
 use crate::lab::torture::families::{FAMILIES, Family};
-use crate::lab::torture::minimise::minimise;
+use crate::lab::torture::minimize::minimize;
 use crate::lab::torture::table::{lines, text};
 use crate::lab::torture::{Campaign, TortureRow, family, run_solver};
 use clap::Args;
@@ -34,7 +34,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[command(after_help = "\
 Examples:
   simpulse torture                                     a thousand scenes
-  simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; the same again goes on where it stopped
+  simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; run again, it continues
   simpulse torture --families driven,fast --solvers soft_step,box2d,rapier --keep failed/
   simpulse torture --only driven:17 --keep failed/     one scene again, and its minimized file")]
 pub struct TortureArgs {
@@ -59,7 +59,7 @@ pub struct TortureArgs {
     /// Mechanisms
     #[command(flatten)]
     pub without: WithoutArgs,
-    /// Write every scene that fails, minimised, into this folder
+    /// Write every scene that fails, minimized, into this folder
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
     /// Write one line of JSON per scene and solver; scenes already in the file are not run again
@@ -231,7 +231,7 @@ fn one(
     let settings = args.settings(solver)?;
     let outcome = run_solver(&case, &settings)?;
     if let (Some(folder), Some(fault)) = (&args.keep, outcome.faults.first()) {
-        let mut least = minimise(&case, fault.verdict, |case| run_solver(case, &settings))?;
+        let mut least = minimize(&case, fault.verdict, |case| run_solver(case, &settings))?;
         let (verdict, name) = (fault.verdict.word(), solver.name);
         least.scene.name = format!("{}, {verdict} under {name}", least.scene.name);
         let path = folder.join(format!("{}_{number}_{}_{name}_{verdict}.json", family.name, args.seed));

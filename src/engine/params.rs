@@ -101,9 +101,9 @@ pub struct Parameter {
 pub struct Mechanism {
     /// Name for settings, records and the command line, in `snake_case`.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// Its purpose in one line.
     pub meaning: &'static str,
-    /// What fails without it: a case of `simpulse verify`, `torture`, a family and what more of its scenes fail by, or a test.
+    /// A check that fails without it: a case of `simpulse verify`, `torture`, a family and what more of its scenes fail by, or a test.
     pub case: &'static str,
     /// Lines of code in files of its own, see [`lines_of`].
     pub lines: u32,
@@ -145,7 +145,7 @@ impl Without {
     }
 }
 
-/// What several solvers can be given.
+/// Parameters that several solvers share.
 impl Parameter {
     /// Share of the overlap that Baumgarte stabilization removes.
     pub const BAUMGARTE: Parameter = Parameter {

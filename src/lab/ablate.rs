@@ -10,7 +10,7 @@ use crate::lab::scenes;
 use crate::lab::verify::{self, Case, Lab, VerifyMatrix};
 use std::time::Instant;
 
-/// What a scene was without a mechanism.
+/// Errors and time of a scene without a mechanism.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct OnScene {
     /// Its name.
@@ -19,7 +19,7 @@ pub struct OnScene {
     pub overlap_m: [Option<f64>; 2],
     /// Speed in the last second (m/s), likewise.
     pub rest_speed_m_s: [Option<f64>; 2],
-    /// Time of all steps over that of the whole solver, stepped in turns (1).
+    /// Time of all steps over that of the whole solver, stepped interleaved (1).
     pub time: f64,
 }
 
@@ -28,11 +28,11 @@ pub struct OnScene {
 pub struct Ablated {
     /// Its name.
     pub mechanism: String,
-    /// What it does.
+    /// Its purpose.
     pub meaning: String,
     /// Lines of code in files of its own.
     pub lines: u32,
-    /// What a test holds it to: a case, a family of random scenes, or a test.
+    /// The check that needs it: a case, a family of random scenes, or a test.
     pub needed_for: &'static str,
     /// Cases that pass with it and fail without.
     pub lost: Vec<&'static str>,
@@ -42,7 +42,7 @@ pub struct Ablated {
     pub scenes: Vec<OnScene>,
 }
 
-/// What is to be left out, and where it is looked at.
+/// Mechanisms to leave out, and the cases and scenes to compare.
 pub struct AblationPlan {
     /// Solver.
     pub solver: &'static Variant,

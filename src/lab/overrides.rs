@@ -47,6 +47,16 @@ pub fn check(solvers: &[&'static Variant], overrides: &[Override]) -> Result<(),
     solvers.iter().try_for_each(|v| values(v, overrides).map(drop))
 }
 
+/// A line for each override that some of the solvers do not have, and which they are.
+pub fn partly(solvers: &[&'static Variant], overrides: &[Override]) -> String {
+    let line = |given: &Override| {
+        let without: Vec<&str> =
+            solvers.iter().filter(|v| v.parameter(&given.name).is_err()).map(|v| v.name).collect();
+        (!without.is_empty()).then(|| format!("{} has no effect on {}\n", given.name, without.join(", ")))
+    };
+    overrides.iter().filter_map(line).collect()
+}
+
 /// The values of `variant`'s parameters under those overrides that it has.
 pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, Error> {
     let mut values = variant.defaults();
@@ -56,14 +66,14 @@ pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, E
     Ok(values)
 }
 
-/// What differs from the standard, for tables: `contact_hertz 60 Hz`; empty where nothing does.
+/// Differences from the standard values, for tables: `contact_hertz 60 Hz`; empty where nothing does.
 pub fn brief(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     let texts = changed.map(|(p, value)| format!("{} {value} {}", p.name, p.unit).trim_end().to_string());
     texts.collect::<Vec<_>>().join(" ")
 }
 
-/// What differs from the standard, for [`of_words`].
+/// Differences from the standard values, for [`of_words`].
 pub fn changed(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     changed.map(|(p, value)| format!("{}={value}", p.name)).collect::<Vec<_>>().join(" ")
@@ -75,7 +85,7 @@ pub fn words(variant: &Variant, values: &Parameters) -> String {
     each.collect::<Vec<_>>().join(" ")
 }
 
-/// What [`words`] says of; values that are not named are the standard ones.
+/// Parses the text of [`words`]; values that are not named are the standard ones.
 ///
 /// Errors: as [`check`].
 pub fn of_words(variant: &Variant, words: &str) -> Result<Parameters, Error> {

@@ -109,6 +109,21 @@ pub fn quantity(option: &str, text: &str, unit: &str) -> Result<f64, Error> {
     }
 }
 
+/// Text in lines of at most `most` characters, broken between words where there are any.
+pub fn wrapped(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,5 +191,15 @@ mod tests {
             let text = message(text, unit);
             assert!(text.starts_with("max-x: ") && text.contains(part), "{text} / {part}");
         }
+    }
+
+    #[test]
+    fn long_titles_go_on_in_the_next_line() {
+        assert_eq!(
+            wrapped("error of distance to the same stack", 20),
+            ["error of distance to", "the same stack"]
+        );
+        assert_eq!(wrapped("unbreakable", 4), ["unbreakable"]);
+        assert!(wrapped("", 9).is_empty());
     }
 }

@@ -47,7 +47,7 @@ fn needs_are_read_off_the_scene() {
 }
 
 #[test]
-fn the_specialised_and_the_full_kernel_give_the_same_bits() {
+fn the_specialized_and_the_full_kernel_give_the_same_bits() {
     for (name, _) in scenes() {
         for variant in &VARIANTS {
             let mut settings = crate::common::settings(variant);

@@ -1,4 +1,4 @@
-//! Every pair tested: the definition that the other kinds are held to.
+//! Tests every pair: the reference for the other kinds.
 
 use super::Proxy;
 

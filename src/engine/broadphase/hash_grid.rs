@@ -1,4 +1,4 @@
-//! A hash grid with one level per size class, rebuilt from nothing each step.
+//! A hash grid with one level per size class, rebuilt from scratch each step.
 //!
 //! **Cells.** A proxy lies in exactly one cell: that of its lower corner, on a
 //! grid whose cell is larger than the proxy. Memory is therefore linear in the

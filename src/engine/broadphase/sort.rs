@@ -1,4 +1,4 @@
-//! Order for pairs that were met in any order.
+//! Sorts pairs that were found in any order.
 
 use wide::u32x16;
 

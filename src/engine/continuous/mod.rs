@@ -43,7 +43,7 @@ pub struct Continuous {
     fast: Vec<(u32, f32)>,
 }
 
-/// What moves, as [`Continuous::shorten`] needs it.
+/// Moving bodies, in the form that [`Continuous::shorten`] needs.
 #[derive(Clone, Copy)]
 #[doc(hidden)]
 pub struct Moving<'w> {

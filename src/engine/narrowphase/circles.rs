@@ -9,9 +9,9 @@
 //! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)
 //! ```
 //!
-//! A gap is told larger by the last term, if the circles come no closer than the slop on their way: then
-//! it is right at the end of the step, and those that do not touch are left alone. Those that graze each other less
-//! deep, and have passed by the end, may do so until the next step finds them.
+//! The reported gap is larger by the last term if the circles come no closer than the slop on their way. Then it is
+//! right at the end of the step, and circles that do not touch are left alone. Circles that graze each other less
+//! deeply, and have passed by the end of the step, may do so until the next step finds them.
 
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, rotate};
 use crate::engine::lanes::Lanes;

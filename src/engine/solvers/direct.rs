@@ -271,6 +271,9 @@ enum Bound {
     Same,
 }
 
+/// Body, row and side of each row of a body, and its inverse masses (1/kg, 1/kg, 1/(kg·m²)).
+type RowsOfBody<'a> = (&'a [(u32, usize, usize)], [f64; 3]);
+
 /// The law of a step around the impulses that the sweeps left. Rows 2i and 2i + 1 are the normal and the tangential one of
 /// point i; behind the points come rows of joints.
 struct Problem {
@@ -321,7 +324,7 @@ impl Problem {
     /// Adds the rows of a block of a joint.
     fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rate: f32, h: f32) {
         let (bias, softness) = (block.bias(rate, h), f64::from(block.softness()));
-        for r in 0..block.size {
+        for (r, bias) in bias.into_iter().enumerate().take(block.size) {
             let row = Row { bodies: block.bodies, jacobian: [block.on(0, r), block.on(1, r)] };
             let speed = |side: usize| {
                 let body = bodies.get(row.bodies[side] as usize).copied().unwrap_or_default();
@@ -330,7 +333,7 @@ impl Problem {
             let soft = (0..block.size)
                 .map(|c| softness * f64::from(block.response[r][c]) * f64::from(block.impulses[c]))
                 .sum::<f64>();
-            self.velocity.push(speed(0) + speed(1) + f64::from(bias[r]) + soft);
+            self.velocity.push(speed(0) + speed(1) + f64::from(bias) + soft);
             self.start.push(f64::from(block.impulses[r]));
             self.rows.push(row);
             self.bounds.push(match (block.law, block.cap()) {
@@ -351,7 +354,7 @@ impl Problem {
             sides.extend(row.bodies.into_iter().enumerate().map(|(side, body)| (body, i, side)));
         }
         sides.sort_unstable();
-        let mut lists: Vec<[(&[(u32, usize, usize)], [f64; 3]); 2]> = vec![[(&[], [0.0; 3]); 2]; n];
+        let mut lists: Vec<[RowsOfBody; 2]> = vec![[(&[], [0.0; 3]); 2]; n];
         for of_body in sides.chunk_by(|one, other| one.0 == other.0) {
             let Some(mass) = bodies.get(of_body[0].0 as usize) else { continue };
             let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);

@@ -26,7 +26,7 @@ pub(super) struct Narrow {
     pub is_changed: bool,
     /// The jobs are all candidates, with their present contacts.
     pub jobs_are_current: bool,
-    /// What the solver has asked of the collision.
+    /// The solver's requests to the collision phase.
     asked: Collision,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,

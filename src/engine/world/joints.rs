@@ -134,7 +134,7 @@ impl World {
         Ok(state)
     }
 
-    /// What a joint did to its bodies in the last step, with `Settings::record_impulses`; none without, or if the joint came
+    /// Impulses of a joint in the last step, with `Settings::record_impulses`; none without, or if the joint came
     /// since. Errors: it was removed.
     pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<Booked>, Error> {
         self.joint(handle)?;

@@ -55,7 +55,7 @@ struct Surface {
     restitution: f32,
     /// Farthest point from the body's center of mass (m).
     reach: f32,
-    /// What the narrow phase knows it as.
+    /// Its index in the narrow phase.
     class: Class,
     /// What the narrow phase calls it.
     number: u32,
@@ -122,7 +122,7 @@ pub struct World {
     continuous: Continuous,
     /// Bodies came or went since `continuous` took them in.
     continuous_is_stale: bool,
-    /// What the present lanes were assigned for.
+    /// The features that the present lanes were assigned for.
     lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
     /// Substep that the impulses of `contacts` belong to (s); none before there are any.
     impulses_of: Option<f32>,
@@ -131,7 +131,7 @@ pub struct World {
     solver_is: &'static Variant,
     work: Workspace,
     slots: Slots,
-    /// What is to be as it was before the next step.
+    /// State to restore before the next step.
     applied: Vec<StandingForces>,
     events: Events,
     joints: JointSlots,

@@ -36,14 +36,14 @@ use crate::lab::units::{ratio, si};
 use limits::Limits;
 use search::Search;
 
-/// What to search, and how long.
+/// The scene, the solvers and the time limit of a search.
 #[derive(Clone, Debug)]
 pub struct SearchPlan {
     /// Name of the catalog with its size, or a `.json` file.
     pub scene: String,
     /// Limits of a good-enough setting.
     pub limits: Limits,
-    /// What happens where bodies hit each other.
+    /// Treatment of impacts.
     pub impacts: Impacts,
     /// Rows of [`crate::engine::solvers::VARIANTS`].
     pub solvers: Vec<&'static Variant>,
@@ -77,7 +77,7 @@ pub struct SearchSetting {
     pub budget: Budget,
     /// The solver's own parameters.
     pub parameters: Parameters,
-    /// What happens where bodies hit each other.
+    /// Treatment of impacts.
     pub impacts: Impacts,
 }
 
@@ -126,7 +126,7 @@ pub struct FoundTime {
 /// A setting with what it costs and how wrong it is.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// What was tried.
+    /// The setting.
     pub setting: SearchSetting,
     /// At the fastest width; none if the run failed.
     pub time: Option<FoundTime>,
@@ -199,7 +199,7 @@ impl Trial {
     }
 }
 
-/// What the search found.
+/// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Advice {
     /// The settings of the final timing: those that are good enough, fastest first, then the

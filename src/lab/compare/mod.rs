@@ -49,7 +49,7 @@ pub struct SettingPair {
     pub lanes: usize,
     /// Work per step, for tables.
     pub budget: String,
-    /// What happened where it did not hold, before and after.
+    /// The failures before and after, if a setting did not hold.
     #[serde(rename = "holds", serialize_with = "words")]
     pub marks: [Option<Mark>; 2],
     /// Errors that both have, by axis.
@@ -195,7 +195,7 @@ impl SettingPair {
 /// The whole comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// What was allowed for.
+    /// The noise that was allowed for.
     pub noise: Noise,
     /// Median ratio of times over all settings (1); none without times.
     pub common: Option<f64>,
@@ -263,7 +263,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
 }
 
-/// What the two runs differ by where nothing was changed.
+/// Differences between two runs of the same program.
 fn noise(before: &StudyFile, after: &StudyFile, pairs: &[SettingPair]) -> Noise {
     let logs: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio.ln())).collect();
     let mean = |study: &StudyFile, of: fn(&Sample) -> f64| {
@@ -312,7 +312,7 @@ fn pair(one: &Record, other: &Record) -> SettingPair {
     }
 }
 
-/// What was chosen differently, and where it ran.
+/// Differences in settings and machine.
 fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
     let mut found = Vec::new();
     let mut differ = |what: &str, a: String, b: String| {

@@ -1,6 +1,6 @@
 //! Times of one solver against those of the others.
 //!
-//! A slow spell of the machine hits all settings of a scene alike, because they are timed in turns. So the deviation
+//! A slow spell of the machine hits all settings of a scene alike, because they are timed interleaved. So the deviation
 //! of a setting from its scene's common ratio says what the solver did: the median over a solver's settings finds a
 //! slowdown that no single setting shows.
 

@@ -15,7 +15,7 @@ struct ChangeLine {
     verdict: Verdict,
 }
 
-/// What changed, first what became worse; every change with `all`.
+/// The changes, regressions first; every change with `all`.
 pub fn text(found: &Comparison, all: bool) -> String {
     let [only_before, only_after] = found.alone;
     let mut text = format!("{} settings in both", found.pairs.len());

@@ -49,7 +49,7 @@ use warm::{WarmStartSource, Warmed};
 /// Residuals whose first iteration is reported (1).
 pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
-/// What to run.
+/// Solvers and options of a run.
 #[derive(Clone, Debug)]
 pub struct ConvergeOptions {
     /// Solvers, in this order.
@@ -192,16 +192,16 @@ impl IteratedSchedule {
 ///
 /// ```
 /// use simpulse::engine::solvers::find;
-/// use simpulse::lab::converge::{Options, converge};
+/// use simpulse::lab::converge::{ConvergeOptions, converge};
 /// use simpulse::lab::reference::gallery;
 ///
 /// let problem = gallery::disc_column(4);
-/// let options = Options {
+/// let options = ConvergeOptions {
 ///     solvers: vec![find("pgs")?],
 ///     max_iterations: 100,
 ///     rounds: 0,
 ///     baseline: false,
-///     ..Options::default()
+///     ..ConvergeOptions::default()
 /// };
 /// let report = converge(&problem, None, &options)?;
 /// let curve = &report.curves[0];

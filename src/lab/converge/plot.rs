@@ -1,4 +1,4 @@
-//! `converge.svg`: residual against sweeps and against time, a row of two panels per law and start.
+//! `converge.svg`: residual against sweeps and, below it, against time, for each law and start.
 //!
 //! Both axes are logarithmic. One color per solver, one line style and marker per order; a marker
 //! stands where a curve first reaches a tolerance. Thin curves are the `f64` methods, which have no
@@ -11,13 +11,18 @@ use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
 use crate::lab::picture;
 use crate::lab::picture::axes::{Area, Drawn, GRID, INK, write};
-use crate::lab::units::si_short;
+use crate::lab::units::{si_short, wrapped};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 const PANEL: (i32, i32) = (560, 300);
 const LEGEND_LINE: i32 = 20;
+/// Columns of the legend.
+const COLUMNS: usize = 2;
+/// Height of a line of a note, and its characters.
+const NOTE_LINE: i32 = 15;
+const NOTE: usize = 78;
 const HEADING: i32 = 30;
 /// Space for labels left of and below a panel, and to its right.
 const LEFT: i32 = 64;
@@ -54,27 +59,36 @@ fn draw(report: &ConvergeReport, colors: Colors, text: &mut String) -> Drawn {
         }
     }
     let rows = rows(report);
-    let legend_lines = solvers.len().div_ceil(4) as i32 + 2;
+    let legend_lines = solvers.len().div_ceil(COLUMNS) as i32 + 3;
     let top = HEADING + LEGEND_LINE * legend_lines;
-    let size = (2 * PANEL.0, top + (HEADING + PANEL.1) * rows.len() as i32);
+    let timed = report.curves.iter().any(|c| c.iteration.is_some());
+    let panels = if timed { 2 } else { 1 };
+    let notes: Vec<Vec<String>> = rows.iter().map(|row| coinciding(report, row)).collect();
+    let note_lines: usize = notes.iter().map(Vec::len).sum();
+    let height = (HEADING + panels * PANEL.1) * rows.len() as i32 + NOTE_LINE * note_lines as i32;
+    // One panel below the other, so that a narrow screen shows them large enough.
+    let size = (PANEL.0, top + height);
     let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
     write(&root, &format!("{}: residual against work", report.problem), (8, 18), 18, HPos::Left)?;
     legend(&root, &solvers, report, colors)?;
-    for (i, row) in rows.iter().enumerate() {
-        let y = top + (HEADING + PANEL.1) * i as i32;
+    let mut y = top;
+    for (row, notes) in rows.iter().zip(&notes) {
         write(&root, &row.title, (8, y + 16), 16, HPos::Left)?;
-        let alike = coinciding(report, row);
-        if !alike.is_empty() {
-            let text = format!("curves that coincide: {}", alike.join("; "));
-            write(&root, &text, (size.0 - 16, y + 16), 12, HPos::Right)?;
+        y += HEADING;
+        for note in notes {
+            write(&root, note, (LEFT, y), 12, HPos::Left)?;
+            y += NOTE_LINE;
         }
-        panel(&root, (0, y + HEADING), report, colors, row, "constraint sweeps", |_, p| {
+        panel(&root, (0, y), report, colors, row, "constraint sweeps", |_, p| {
             (p.sweeps > 0).then_some(p.sweeps as f64)
         })?;
-        panel(&root, (PANEL.0, y + HEADING), report, colors, row, "time, set-up excluded", |c, p| {
-            Some(1e-9 * c.iteration?.median_ns * f64::from(p.iterations)).filter(|&t| t > 0.0)
-        })?;
+        if timed {
+            panel(&root, (0, y + PANEL.1), report, colors, row, "time, set-up excluded", |c, p| {
+                Some(1e-9 * c.iteration?.median_ns * f64::from(p.iterations)).filter(|&t| t > 0.0)
+            })?;
+        }
+        y += panels * PANEL.1;
     }
     root.present()?;
     Ok(())
@@ -102,13 +116,14 @@ fn rows(report: &ConvergeReport) -> Vec<PanelRow> {
     rows
 }
 
-/// The color of a curve: its solver's, whatever stage of it is drawn.
-fn color(solver: &str, colors: Colors) -> RGBColor {
-    let picture::Color(r, g, b, _) = colors(solver.split(' ').next().unwrap_or(solver));
-    RGBColor(r, g, b)
+/// The color of a curve: its solver's; paler for a part of the solver, such as `shim without relaxing`.
+fn color(solver: &str, colors: Colors) -> RGBAColor {
+    let (name, part) = solver.split_once(" without ").map_or((solver, false), |(name, _)| (name, true));
+    let picture::Color(r, g, b, _) = colors(name.split(' ').next().unwrap_or(name));
+    RGBColor(r, g, b).mix(if part { 0.4 } else { 1.0 })
 }
 
-/// Solvers whose curves cover each other in a row, `a = b`.
+/// Solvers whose curves cover each other in a row, `a = b`, in lines; none where no curves do.
 fn coinciding(report: &ConvergeReport, row: &PanelRow) -> Vec<String> {
     let curves: Vec<&ReplayCurve> = report.curves.iter().filter(|c| c.start == row.start).collect();
     let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (row.residual)(p))).collect::<Vec<_>>();
@@ -125,27 +140,31 @@ fn coinciding(report: &ConvergeReport, row: &PanelRow) -> Vec<String> {
         groups.into_iter().filter(|(_, names)| names.len() > 1).map(|(_, names)| names.join(" = ")).collect();
     found.sort();
     found.dedup();
-    found
+    match found.is_empty() {
+        true => Vec::new(),
+        false => wrapped(&format!("curves that coincide: {}", found.join("; ")), NOTE),
+    }
 }
 
 fn legend(area: &Area, solvers: &[(&str, &str)], report: &ConvergeReport, colors: Colors) -> Drawn {
     for (i, (solver, arithmetic)) in solvers.iter().enumerate() {
-        let at = (12 + 275 * (i % 4) as i32, HEADING + 10 + LEGEND_LINE * (i / 4) as i32);
+        let (column, line) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
+        let at = (12 + 275 * column, HEADING + 10 + LEGEND_LINE * line);
         let style = color(solver, colors).stroke_width(width(arithmetic));
         area.draw(&PathElement::new(vec![at, (at.0 + 26, at.1)], style))?;
         let name = if *arithmetic == "f32" { solver.to_string() } else { format!("{solver} ({arithmetic})") };
         write(area, &name, (at.0 + 32, at.1), 14, HPos::Left)?;
     }
-    let y = HEADING + 10 + LEGEND_LINE * solvers.len().div_ceil(4) as i32;
+    let below = HEADING + 10 + LEGEND_LINE * solvers.len().div_ceil(COLUMNS) as i32;
     let orders = [
         (Sequence::Natural, "natural order".to_string()),
         (Sequence::Colored, format!("colored, {} lanes{}", report.lanes, emulated(report.lanes))),
         (Sequence::Shuffled(0), "shuffled".to_string()),
     ];
     for (i, (order, name)) in orders.into_iter().enumerate() {
-        let x = 12 + 275 * i as i32;
+        let (x, y) = (12 + 275 * (i % COLUMNS) as i32, below + LEGEND_LINE * (i / COLUMNS) as i32);
         line(area, vec![(x, y), (x + 52, y)], order, INK.stroke_width(2))?;
-        marker(area, (x + 26, y), order, &INK)?;
+        marker(area, (x + 26, y), order, &INK.mix(1.0))?;
         write(area, &name, (x + 60, y), 14, HPos::Left)?;
     }
     Ok(())
@@ -164,7 +183,7 @@ fn line(area: &Area, points: Vec<(i32, i32)>, order: Sequence, style: ShapeStyle
     Ok(())
 }
 
-fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBColor) -> Drawn {
+fn marker(area: &Area, at: (i32, i32), order: Sequence, color: &RGBAColor) -> Drawn {
     match order {
         Sequence::Natural => area.draw(&Circle::new(at, 4, color.filled()))?,
         Sequence::Colored => {

@@ -308,7 +308,7 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// What stands opposite the dynamic body of a contact.
+/// The kind of the other body of a contact.
 fn opposite(problem: &ContactProblem, body_a: u32) -> OppositeKind {
     match problem.bodies.get(body_a as usize) {
         None => OppositeKind::Static,

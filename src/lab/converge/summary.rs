@@ -4,7 +4,7 @@ use super::replay::{Sequence, Start};
 use super::{ConvergeReport, Reached, ReplayCurve, TOLERANCES};
 use crate::engine::lanes::native_width;
 
-/// Places in [`TOLERANCES`] of the two that are told.
+/// Places in [`TOLERANCES`] of the two that the summary names.
 const TOLD: [usize; 2] = [1, 3];
 
 /// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of
@@ -23,9 +23,9 @@ pub fn text(report: &ConvergeReport) -> String {
             text += &sentence(&own, at, start);
         }
     }
-    let changed: Vec<&ReplayCurve> = own.iter().copied().filter(|c| !c.own_is_rigid).collect();
-    if !changed.is_empty() {
-        let each = changed.iter().filter(|c| c.start == Start::Cold).map(|c| {
+    let changed = || own.iter().copied().filter(|c| !c.own_is_rigid && c.start == Start::Cold);
+    if changed().next().is_some() {
+        let each = changed().map(|c| {
             let sweeps = TOLD.map(|at| match to(c, &c.own, at) {
                 Some(n) => format!("{n} to {:.0e}", TOLERANCES[at]),
                 None => format!("none to {:.0e}", TOLERANCES[at]),
@@ -65,7 +65,7 @@ fn sentence(curves: &[&ReplayCurve], at: usize, start: Start) -> String {
                 1 => "in 1 sweep".to_string(),
                 n => format!("in {n} sweeps"),
             };
-            let mut text = format!("To {goal}: {} {when}", first.join(" and "));
+            let mut text = format!("To {goal}: {} {when}", first.join(", "));
             let others: Vec<String> =
                 reached.iter().filter(|r| r.0 > *least).map(|(n, name)| format!("{name} {n}")).collect();
             if !others.is_empty() {

@@ -37,7 +37,7 @@ impl JointErrors {
     }
 }
 
-/// What the joints of a step gave to the dynamic bodies.
+/// Impulses and energy that the joints gave to dynamic bodies in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Given {
     /// From bodies that do not move by forces (N·s).

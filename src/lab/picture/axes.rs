@@ -3,6 +3,7 @@
 //! Axes are drawn here and not by the chart builder, so that a panel of any range has
 //! readable ticks within tight limits.
 
+pub use crate::lab::units::wrapped;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -153,21 +154,6 @@ pub fn marker(area: &Area, (x, y): (i32, i32), budget: usize, color: &RGBColor) 
     Ok(())
 }
 
-/// Text in lines of at most `most` characters, broken between words where there are any.
-pub fn wrapped(text: &str, most: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_string()),
-        }
-    }
-    lines
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,15 +176,5 @@ mod tests {
     fn a_pixel_is_where_the_logarithm_is() {
         let scale = LogScale { limits: [1.0, 100.0], ticks: Vec::new() };
         assert_eq!([1.0, 10.0, 100.0].map(|v| scale.pixel(v, 300, 100)), [300, 200, 100]);
-    }
-
-    #[test]
-    fn long_titles_go_on_in_the_next_line() {
-        assert_eq!(
-            wrapped("error of distance to the same stack", 20),
-            ["error of distance to", "the same stack"]
-        );
-        assert_eq!(wrapped("unbreakable", 4), ["unbreakable"]);
-        assert!(wrapped("", 9).is_empty());
     }
 }

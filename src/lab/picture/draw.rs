@@ -30,6 +30,8 @@ pub const WIDTHS: [u32; 2] = [400, 8000];
 const MARGIN: f64 = 28.0;
 const HEADER: f64 = 66.0;
 const LEGEND: f64 = 84.0;
+/// What a row for the marks of joints adds to it.
+const JOINTS: f64 = 26.0;
 /// Height over width of the part with the scene, at least and at most.
 const ASPECT: [f64; 2] = [0.3, 0.95];
 
@@ -133,7 +135,8 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         bottom: HEADER + height - 0.5 * (height - scale * h),
         low,
     };
-    let size = [width, (HEADER + height + LEGEND).round() as u32];
+    let legend_height = if stage.joints.is_empty() { LEGEND } else { LEGEND + JOINTS };
+    let size = [width, (HEADER + height + legend_height).round() as u32];
     let mut picture = Picture::new(size, Color::rgb(0xffffff));
     let deepest = if frame.deepest() > 0.0 { darkest } else { 0.0 };
     let depth_of = depths(stage, frame);
@@ -167,10 +170,13 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     // Whatever of the ground reaches into them.
     let top = HEADER + height;
     picture.rectangle([0.0, 0.0], [f64::from(width), HEADER - 6.0], Color::rgb(0xffffff));
-    picture.rectangle([0.0, top], [f64::from(width), LEGEND], Color::rgb(0xffffff));
-    picture.text([MARGIN, 30.0], 21.0, Anchor::Start, INK, title);
-    picture.text([MARGIN, 52.0], 14.0, Anchor::Start, FAINT, subtitle);
+    picture.rectangle([0.0, top], [f64::from(width), legend_height], Color::rgb(0xffffff));
+    // In a narrow picture letters are smaller, so that no line ends outside of it.
+    let fitted = |text: &str, size: f64| size.min(1.5 * inner / text.chars().count().max(1) as f64);
+    picture.text([MARGIN, 30.0], fitted(title, 21.0), Anchor::Start, INK, title);
+    picture.text([MARGIN, 52.0], fitted(subtitle, 14.0), Anchor::Start, FAINT, subtitle);
     legend(&mut picture, top, &view, [deepest, frame.deepest()], arrow, stage.dt);
+    super::joints::legend(&mut picture, &stage.joints, [MARGIN, top + LEGEND], INK);
     picture
 }
 
@@ -266,8 +272,9 @@ fn legend(
     let (bar_y, text_y, quarter) =
         (top + 34.0, top + 58.0, (f64::from(picture.size[0]) - 2.0 * MARGIN) / 4.0);
     let column = |k: usize| MARGIN + quarter * k as f64;
+    let size = (0.06 * quarter).min(13.0);
     let text = |picture: &mut Picture, x: f64, y: f64, anchor, text: String| {
-        picture.text([x, y], 13.0, anchor, INK, text);
+        picture.text([x, y], size, anchor, INK, text);
     };
     // A length.
     let meters = round_down(0.6 * quarter / view.scale);
@@ -314,7 +321,7 @@ fn legend(
         text(picture, x, bar_y + 4.0, Anchor::Start, "no impulses".into());
     }
     // Points and normals.
-    let x = column(3) + 0.25 * quarter;
+    let x = column(3) + (quarter - 200.0).clamp(6.0, 0.25 * quarter);
     picture.line([x, bar_y], [x, bar_y - 14.0], NORMAL, 1.6);
     picture.items.push(Item::Disc { at: [x, bar_y], radius: 4.0, color: INK, title: String::new() });
     picture.items.push(Item::Disc { at: [x, bar_y], radius: 3.0, color: RAMP[0], title: String::new() });

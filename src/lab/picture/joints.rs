@@ -1,7 +1,7 @@
 //! Joints as people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
 
 use super::outline::placed;
-use super::{Color, Item, Picture};
+use super::{Anchor, Color, Item, Picture};
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
 
@@ -100,55 +100,95 @@ pub(super) fn draw(
         if !p.iter().chain(&q).all(|x| x.is_finite()) {
             continue;
         }
-        let width = (0.18 * size).clamp(0.7, 1.8);
-        let line = |picture: &mut Picture, from, to| picture.line(from, to, COLOR, width);
-        let ring = |picture: &mut Picture, corners: u32, start: f64, radius: f64| {
-            let corner = |k: u32| {
-                let (sin, cos) =
-                    (start + std::f64::consts::TAU * f64::from(k) / f64::from(corners)).sin_cos();
-                [q[0] + radius * cos, q[1] + radius * sin]
-            };
-            let title =
-                format!("{:?} joint of bodies {} and {}", joint.mark, joint.bodies[0], joint.bodies[1]);
-            picture.items.push(Item::Polygon {
-                points: (0..corners).map(corner).collect(),
-                fill: Some(Color::rgb(0xfbf7fd)),
-                stroke: Some((COLOR, width)),
-                title,
-            });
-        };
-        match joint.mark {
-            JointMark::Revolute => {
-                line(picture, p, q);
-                for (k, end) in [p, q].into_iter().enumerate() {
-                    let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
-                    if anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
-                        line(picture, at([poses[i][0], poses[i][1]]), end);
-                    }
-                }
-                ring(picture, 16, 0.0, 0.5 * size);
-            }
-            JointMark::Distance => {
-                line(picture, p, q);
-                ring(picture, 12, 0.0, 0.3 * size);
-            }
-            JointMark::Spring => zigzag(p, q, 0.5 * size).windows(2).for_each(|w| line(picture, w[0], w[1])),
-            JointMark::Prismatic => {
-                line(picture, ends[0], ends[1]);
-                ring(picture, 4, axis[1].atan2(axis[0]) + 0.25 * std::f64::consts::PI, 0.7 * size);
-            }
-            JointMark::Wheel => {
-                line(picture, ends[0], ends[1]);
-                ring(picture, 16, 0.0, 0.5 * size);
-            }
-            JointMark::Weld => ring(picture, 4, 0.25 * std::f64::consts::PI - a[2], 0.7 * size),
-            JointMark::Motor | JointMark::Mouse => {
-                dashes(p, q, size).into_iter().for_each(|[from, to]| line(picture, from, to));
-                if joint.mark == JointMark::Motor {
-                    ring(picture, 4, 0.0, 0.6 * size);
+        let title = format!("{:?} joint of bodies {} and {}", joint.mark, joint.bodies[0], joint.bodies[1]);
+        if joint.mark == JointMark::Revolute {
+            for (k, end) in [p, q].into_iter().enumerate() {
+                let (i, anchor) = (joint.bodies[k] as usize, joint.anchors[k]);
+                if anchor[0].hypot(anchor[1]) > 1.01 * reach[i] {
+                    picture.line(at([poses[i][0], poses[i][1]]), end, COLOR, width(size));
                 }
             }
         }
+        one(picture, joint.mark, [p, q], ends, a[2], size, title);
+    }
+}
+
+/// Width of the lines of a mark (pixels).
+fn width(size: f64) -> f64 {
+    (0.18 * size).clamp(0.7, 1.8)
+}
+
+/// One mark from anchor to anchor, `size` pixels wide; `ends` are those of its axis, `angle` is that of body a.
+fn one(
+    picture: &mut Picture,
+    mark: JointMark,
+    [p, q]: [[f64; 2]; 2],
+    ends: [[f64; 2]; 2],
+    angle: f64,
+    size: f64,
+    title: String,
+) {
+    let width = width(size);
+    let line = |picture: &mut Picture, from, to| picture.line(from, to, COLOR, width);
+    let ring = |picture: &mut Picture, corners: u32, start: f64, radius: f64| {
+        let corner = |k: u32| {
+            let (sin, cos) = (start + std::f64::consts::TAU * f64::from(k) / f64::from(corners)).sin_cos();
+            [q[0] + radius * cos, q[1] + radius * sin]
+        };
+        picture.items.push(Item::Polygon {
+            points: (0..corners).map(corner).collect(),
+            fill: Some(Color::rgb(0xfbf7fd)),
+            stroke: Some((COLOR, width)),
+            title: title.clone(),
+        });
+    };
+    match mark {
+        JointMark::Revolute => {
+            line(picture, p, q);
+            ring(picture, 16, 0.0, 0.5 * size);
+        }
+        JointMark::Distance => {
+            line(picture, p, q);
+            ring(picture, 12, 0.0, 0.3 * size);
+        }
+        JointMark::Spring => zigzag(p, q, 0.5 * size).windows(2).for_each(|w| line(picture, w[0], w[1])),
+        JointMark::Prismatic => {
+            line(picture, ends[0], ends[1]);
+            let along = (ends[1][1] - ends[0][1]).atan2(ends[1][0] - ends[0][0]);
+            ring(picture, 4, along + 0.25 * std::f64::consts::PI, 0.7 * size);
+        }
+        JointMark::Wheel => {
+            line(picture, ends[0], ends[1]);
+            ring(picture, 16, 0.0, 0.5 * size);
+        }
+        JointMark::Weld => ring(picture, 4, 0.25 * std::f64::consts::PI - angle, 0.7 * size),
+        JointMark::Motor | JointMark::Mouse => {
+            dashes(p, q, size).into_iter().for_each(|[from, to]| line(picture, from, to));
+            if mark == JointMark::Motor {
+                ring(picture, 4, 0.0, 0.6 * size);
+            }
+        }
+    }
+}
+
+/// The marks of these joints with their names, in a row at this height (pixels).
+pub(super) fn legend(picture: &mut Picture, joints: &[JointRecord], [mut x, y]: [f64; 2], ink: Color) {
+    const NAMES: [(JointMark, &str); 8] = [
+        (JointMark::Revolute, "hinge"),
+        (JointMark::Prismatic, "slider"),
+        (JointMark::Distance, "rod"),
+        (JointMark::Spring, "spring"),
+        (JointMark::Weld, "weld"),
+        (JointMark::Wheel, "wheel"),
+        (JointMark::Motor, "motor"),
+        (JointMark::Mouse, "mouse joint"),
+    ];
+    for (mark, name) in NAMES.into_iter().filter(|(mark, _)| joints.iter().any(|j| j.mark == *mark)) {
+        let hinged = matches!(mark, JointMark::Revolute | JointMark::Weld);
+        let places = if hinged { [[x + 12.0, y]; 2] } else { [[x, y], [x + 24.0, y]] };
+        one(picture, mark, places, [[x, y], [x + 24.0, y]], 0.0, 9.0, String::new());
+        picture.text([x + 34.0, y + 4.0], 13.0, Anchor::Start, ink, name);
+        x += 58.0 + 7.0 * name.chars().count() as f64;
     }
 }
 

@@ -59,7 +59,7 @@ pub struct SizeRow {
     pub step: StepTime,
     /// Each phase, in the order of [`Phase::ALL`].
     pub phases: [StepTime; Phase::ALL.len()],
-    /// What the world holds.
+    /// Memory of the world.
     pub memory: Memory,
     /// Errors beside the times.
     pub errors: Option<Errors>,
@@ -91,7 +91,7 @@ const FEWEST: usize = 3;
 /// Steps of a turn, at most: the caches are warm long before.
 const STEPS: usize = 400;
 
-/// What was measured.
+/// Measured values.
 pub struct Measurement {
     /// In the order of the entries.
     pub rows: Vec<SizeRow>,
@@ -213,7 +213,7 @@ pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Grow
     Growth { contacts, ratio, memory, change }
 }
 
-/// What is known of one phase over all sizes.
+/// Growth of one phase over all sizes.
 #[derive(Clone, Debug)]
 pub struct GrowthVerdict {
     /// None for the whole step.

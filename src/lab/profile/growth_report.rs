@@ -35,7 +35,7 @@ pub fn text(rows: &[SizeRow], verdicts: &[GrowthVerdict]) -> String {
     }
     let mut text = format!(
         "Time per contact (ns), of a step and of its phases; a step searches all pairs and recomputes colors; pauses in\n\
-         which the thread waited for a processor are left out.  step: median of the repeats, beside it their mean and the
+         which the thread waited for a processor are left out.  step: median of the repeats, beside it their mean and the\n\
          longest, ± median deviation; phases: medians.  penetration: greatest.\n\
          residual: rms of the contact law in weights of the scene, and of a body, × step\n{}\n",
         finish(times, 1)
@@ -169,13 +169,13 @@ pub fn csv(rows: &[SizeRow]) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|e| Error::invalid("growth.csv", e.to_string()))
 }
 
-const PANEL: (i32, i32) = (620, 430);
-const LEFT: i32 = 76;
-const RIGHT: i32 = 130;
+const PANEL: (i32, i32) = (520, 430);
+const LEFT: i32 = 84;
+const RIGHT: i32 = 150;
 const TOP: i32 = 56;
 const BOTTOM: i32 = 60;
 /// Least distance of two labels.
-const LINE: i32 = 15;
+const LINE: i32 = 17;
 
 /// A curve: name, and a value per row.
 type NamedCurve = (String, Vec<f64>);
@@ -188,7 +188,7 @@ pub fn svg(rows: &[SizeRow], title: &str) -> Result<String, Error> {
 }
 
 fn draw(rows: &[SizeRow], title: &str, text: &mut String) -> Drawn {
-    let root = SVGBackend::with_string(text, (2 * PANEL.0 as u32, PANEL.1 as u32)).into_drawing_area();
+    let root = SVGBackend::with_string(text, (PANEL.0 as u32, 2 * PANEL.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
     write(&root, title, (12, 20), 17, HPos::Left)?;
     let mut times: Vec<NamedCurve> =
@@ -204,8 +204,9 @@ fn draw(rows: &[SizeRow], title: &str, text: &mut String) -> Drawn {
         let held = rows.iter().map(|r| per(r.memory.components[k].held, r)).collect();
         memory.push((component.name.into(), held));
     }
+    // One below the other, so that a narrow screen shows them large enough.
     panel(&root, 0, rows, &times, "ns per contact", &|v| digits_short(v))?;
-    panel(&root, PANEL.0, rows, &memory, "bytes held per contact", &|v| digits_short(v))?;
+    panel(&root, PANEL.1, rows, &memory, "bytes held per contact", &|v| digits_short(v))?;
     root.present()?;
     Ok(())
 }
@@ -217,14 +218,14 @@ fn digits_short(value: f64) -> String {
 
 fn panel(
     area: &Area,
-    corner: i32,
+    above: i32,
     rows: &[SizeRow],
     curves: &[NamedCurve],
     name: &str,
     label: &dyn Fn(f64) -> String,
 ) -> Drawn {
-    let (left, right) = (corner + LEFT, corner + PANEL.0 - RIGHT);
-    let (top, bottom) = (TOP, PANEL.1 - BOTTOM);
+    let (left, right) = (LEFT, PANEL.0 - RIGHT);
+    let (top, bottom) = (above + TOP, above + PANEL.1 - BOTTOM);
     let contacts: Vec<f64> = rows.iter().map(|r| r.counts.contacts.max(1) as f64).collect();
     // What is nothing at some size has no place on a logarithmic axis, and none matters below 0.1.
     let shown = |value: &f64| value.is_finite() && *value >= 0.1;
@@ -232,8 +233,8 @@ fn panel(
     let (x, y) = (LogScale::of(contacts.iter().copied(), 7), LogScale::of(values.iter().copied(), 8));
     Edges { left, right, top, bottom }.grid(area, [&x, &y], 13, [&si_count, &label])?;
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write(area, "contacts", ((left + right) / 2, bottom + 34), 13, HPos::Center)?;
-    write_upwards(area, name, (corner + 18, (top + bottom) / 2), 13)?;
+    write(area, "contacts", ((left + right) / 2, bottom + 36), 15, HPos::Center)?;
+    write_upwards(area, name, (20, (top + bottom) / 2), 15)?;
     let mut ends = Vec::new();
     for (i, (name, values)) in curves.iter().enumerate() {
         // The first is the sum.
@@ -262,7 +263,7 @@ fn panel(
         // Room for those that are still to come.
         let y = py.max(free).min(bottom - LINE * (count - 1 - i as i32)).max(free);
         area.draw(&PathElement::new(vec![(px, py), (right + 14, y)], color.mix(0.5).stroke_width(1)))?;
-        write(area, name, (right + 18, y), 12, HPos::Left)?;
+        write(area, name, (right + 18, y), 15, HPos::Left)?;
         free = y + LINE;
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::PhaseReport;
 
-/// What a pass spends its time on.
+/// The resource that limits a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// Moving bytes between the level of memory that holds the working set and the core.

@@ -31,7 +31,7 @@ use ceilings::{Buffer, MemoryLevel, levels, multiply_adds};
 use std::time::{Duration, Instant};
 use traffic::Traffic;
 
-/// What to repeat, and for how long.
+/// The phase to repeat, and for how long.
 #[derive(Clone, Debug)]
 pub struct ProfileOptions {
     /// Phases that take turns.
@@ -65,7 +65,7 @@ impl Bandwidth {
 /// One phase.
 #[derive(Clone, Debug)]
 pub struct PhaseReport {
-    /// What it does in a step.
+    /// Its part in a step.
     pub probe: Probe,
     /// Bytes of one pass.
     pub traffic: Traffic,

@@ -37,7 +37,7 @@ pub fn text(report: &ProfileReport) -> String {
     text
 }
 
-/// What is held still.
+/// The frozen state.
 pub fn head(report: &ProfileReport) -> String {
     let c = &report.counts;
     format!(
@@ -181,7 +181,7 @@ fn several(report: &ProfileReport, phases: &[PhaseReport]) -> String {
     text
 }
 
-/// What this machine reached in the same run.
+/// Limits of this machine, measured in the same run.
 fn ceilings(report: &ProfileReport, multiply_adds: f64) -> String {
     let mut rows = table(&["level", "working set", "read GB/s", "update GB/s"]);
     for (level, bandwidth) in &report.levels {

@@ -40,7 +40,7 @@ use crate::lab::picture::joints::JointRecord;
 
 /// First bytes of every recording.
 const MAGIC: [u8; 8] = *b"SIMPREC\x1a";
-/// What is written; nothing else is read.
+/// The version that is written, and the only one that is read.
 const VERSION: u32 = 1;
 /// Bytes before the compressed payload.
 const FIXED: usize = 16;
@@ -53,7 +53,7 @@ const NORMAL_TURN: u64 = 1 << 16;
 /// Farthest from the origin, in quanta: whole numbers stay exact in a browser's `f64`.
 const FARTHEST: i64 = 1 << 50;
 
-/// What the frames belong to.
+/// The run that the frames belong to.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Header {
     /// Name of the scene.

@@ -10,14 +10,14 @@ pub const MOST: usize = 4;
 
 /// How a replay looks.
 pub const STYLE: &str = include_str!("replay.css");
-/// What plays it.
+/// The script that plays it.
 pub const SCRIPT: &str = include_str!("replay.js");
 
 /// A recording on a page.
 pub struct RecordingPanel {
     /// The bytes of the file.
     pub bytes: Vec<u8>,
-    /// What it is of.
+    /// The run that it shows.
     pub header: Header,
     /// CSS color of its curves.
     pub color: String,

@@ -11,7 +11,7 @@ use std::path::Path;
 /// A recording with its numbers as they were, to within a quantum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// What it is of.
+    /// The run that it was made from.
     pub header: Header,
     /// The start, then one every `header.every` steps; positions from the first body's start.
     pub frames: Vec<Frame>,

@@ -403,7 +403,9 @@
       box2("impulses", "forces");
       box2(`penetration (to ${si(deepest, "m")})`, "depths");
     }
-    if (recordings.some((r) => r.joints)) box2("joints", "joints");
+    const marks = { revolute: "○ hinge", prismatic: "□ slider", distance: "— rod", spring: "⌇ spring", weld: "□ weld", wheel: "○ wheel", motor: "◇ motor", mouse: "┄ mouse" };
+    const used = Object.keys(marks).filter((mark) => recordings.some((r) => (r.joints || []).some((j) => j.mark === mark)));
+    if (used.length) box2(`joints (${used.map((mark) => marks[mark]).join(", ")})`, "joints");
     button("fit", "whole scene", () => { Object.assign(state, { zoom: 1, x: 0, y: 0 }); draw(); }).className = "fit";
 
     function draw() {

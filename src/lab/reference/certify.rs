@@ -69,7 +69,7 @@ pub enum Uniqueness {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Witness {
-    /// Who found it.
+    /// The method that found it.
     pub method: Method,
     /// Its own residual (1).
     pub natural_map: f64,
@@ -81,7 +81,7 @@ pub struct Witness {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
-    /// Who found it.
+    /// The method that found it.
     pub method: Method,
     /// Natural-map residual, see [`certify`] (1).
     pub natural_map: f64,
@@ -109,7 +109,7 @@ pub struct Reference {
 pub struct NoReference {
     /// Name of the problem.
     pub problem: String,
-    /// What each method ended with.
+    /// Result of each method.
     pub why: String,
 }
 

@@ -39,7 +39,7 @@ pub enum Status {
     Stalled,
 }
 
-/// What an iterative method found.
+/// Result of an iterative method.
 #[derive(Clone, Debug)]
 pub struct IterativeRun {
     /// Last impulses (N·s).

@@ -2,7 +2,7 @@
 //! what was left out.
 
 use super::environment::Environment;
-use super::table::{finish, table};
+use super::table::{PAGE_WIDTH, finish, narrow, table};
 use super::units::{digits, is_emulated, si};
 use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
@@ -22,13 +22,13 @@ const MOST_NOTES: usize = 7;
 /// Waits beyond this share of the time are worth a warning (1).
 const BUSY: f64 = 0.02;
 
-/// What the columns of the answer are.
+/// The columns of the answer.
 const LEGEND: &str = "\
-Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the tolerances of the
-scene (`simpulse scene NAME`): penetration (1 cm for bodies of 1 m), contact-law residual (10 % of the lighter body's weight), distance
-to the reference value, rest speed. tight: within 10 % of them; exact: within 1 %. Errors in % of the plausible tolerance.
-µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another solver, and how much slower it is;
-tie: too close to call.
+Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the
+tolerances of the scene (`simpulse scene NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
+(10 % of the lighter body's weight); ref., distance to the reference value; rest, speed at rest. tight: within 10 % of
+them; exact: within 1 %. µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another
+solver, and how much slower it is; tie: too close to call.
 ";
 
 /// The answer of a study, from its records alone; `steps` if runs were cut to so many.
@@ -37,16 +37,19 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
     let ranking = ranking(records);
     let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
     text += &warnings(records, steps);
-    text += &head(records, environment, scenes.len());
+    text += &wrapped(&head(records, environment, scenes.len()));
     text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
     text += &fallen(records);
-    text += &format!("\n{}", accuracies(records));
+    text += &format!(
+        "\nIts errors in % of the tolerances, and the cheapest settings that are tight and exact\n{}",
+        accuracies(&scenes, records)
+    );
     text += &format!("\n{}", standings(&ranking, scenes.len()));
     text += &waves(records);
     text + &format!("\n{LEGEND}") + &left_out(records) + &differing(records)
 }
 
-/// What to use, in a sentence with its conditions; and where the default solver stands. Also for the page.
+/// The recommendation with its conditions, and the rank of the default solver. Also for the page.
 pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
     let standings = &ranking.standings;
     let mut text = String::new();
@@ -109,10 +112,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
     text + "\n"
 }
 
-/// Longest line of prose (characters).
-const WIDTH: usize = 150;
-
-/// The same with lines of 150 characters at most.
+/// The same with lines of 120 characters at most.
 pub fn wrapped(text: &str) -> String {
     let mut wrapped = String::new();
     for line in text.lines() {
@@ -121,7 +121,7 @@ pub fn wrapped(text: &str) -> String {
             let count = word.chars().count();
             let gap = match length {
                 0 => "",
-                _ if length + 1 + count > WIDTH => "\n",
+                _ if length + 1 + count > PAGE_WIDTH => "\n",
                 _ => " ",
             };
             length = if gap == " " { length + 1 + count } else { count };
@@ -146,8 +146,8 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let waited = samples().map(|s| s.waited).sum::<f64>() / count;
     if waited > BUSY {
         text += &format!(
-            "WARNING  this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken out of the times,\n\
-             and differences up to it are shown as ties. Run again on an idle machine.\n",
+            "WARNING  this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken out\n\
+             of the times, and differences up to it are shown as ties. Run again on an idle machine.\n",
             100.0 * waited
         );
     }
@@ -169,7 +169,7 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     text
 }
 
-/// What was tried, and where.
+/// The settings that ran, and the machine.
 fn head(records: &[Record], environment: &Environment, scenes: usize) -> String {
     let mut lanes: Vec<usize> =
         records.iter().filter(|r| r.order == Order::Colored).map(|r| r.lanes).collect();
@@ -210,20 +210,7 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
 
 /// A line per scene.
 fn cheapest(scenes: &[Answer]) -> String {
-    let mut rows = table(&[
-        "scene",
-        "solver",
-        "budget",
-        "µs/step",
-        "median",
-        "longest",
-        "penetr.",
-        "residual",
-        "reference",
-        "rest",
-        "next",
-        "slower",
-    ]);
+    let mut rows = table(&["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"]);
     let mut notes = String::new();
     for answer in scenes {
         match (answer.best(), answer.nearest) {
@@ -235,26 +222,24 @@ fn cheapest(scenes: &[Answer]) -> String {
             }
             (None, Some(nearest)) => {
                 let [solver, budget, time, ..] = setting(nearest);
-                notes += &format!(
-                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {}\n",
+                notes += &wrapped(&format!(
+                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {}",
                     answer.scene,
                     worst(nearest)
-                );
+                ));
             }
             (None, None) => notes += &format!("{}: no setting holds\n", answer.scene),
         }
     }
-    let table = if scenes.iter().any(|a| a.best().is_some()) { finish(rows, 3) } else { String::new() };
+    let any = scenes.iter().any(|a| a.best().is_some());
+    let table = if any { finish(narrow(rows, PAGE_WIDTH), 3) } else { String::new() };
     table + &notes
 }
 
-/// Solver, budget with lanes, mean, median and longest step, and the errors in their tolerances.
-fn setting(record: &Record) -> [String; 9] {
+/// Solver, budget with lanes, mean, median and longest step.
+fn setting(record: &Record) -> [String; 5] {
     let time = |ns: fn(&crate::lab::study::sample::Sample) -> f64| {
         record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
-    };
-    let share = |axis: ErrorAxis| {
-        record.in_tolerance(axis).map_or("–".to_string(), |e| format!("{} %", percent(e)))
     };
     [
         record.solver.to_string(),
@@ -262,10 +247,6 @@ fn setting(record: &Record) -> [String; 9] {
         time(|sample| sample.mean_ns),
         time(|sample| sample.median_ns),
         time(|sample| sample.worst_ns),
-        share(ErrorAxis::Penetration),
-        share(ErrorAxis::Law),
-        share(ErrorAxis::Truth),
-        share(ErrorAxis::Rest),
     ]
 }
 
@@ -290,7 +271,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// What keeps a setting from being good enough.
+/// The reason why a setting is not good enough.
 fn worst(record: &Record) -> String {
     if let Some(why) = record.fails_later() {
         return why;
@@ -310,7 +291,7 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     if let Some(first) = tied.first() {
         let others = match tied.len() {
             1 => String::new(),
-            count => format!(" and {} more", count - 1),
+            count => format!(" + {}", count - 1),
         };
         return [format!("{first}{others}"), "tie".to_string()];
     }
@@ -357,23 +338,31 @@ fn fallen(records: &[Record]) -> String {
     text
 }
 
-/// The cheapest for each accuracy beyond plausible.
-fn accuracies(records: &[Record]) -> String {
+/// The errors of the cheapest plausible setting (% of their tolerances), and the cheapest settings beyond plausible.
+fn accuracies(scenes: &[Answer], records: &[Record]) -> String {
     let mut rows =
-        table(&["scene", "tight: solver", "budget", "µs/step", "exact: solver", "budget", "µs/step"]);
+        table(&["scene", "pen.", "res.", "ref.", "rest", "tight: solver, budget", "µs", "exact", "µs"]);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        let best = scenes.iter().find(|a| a.scene == scene[0].scene).and_then(Answer::best);
+        let share = |axis: ErrorAxis| best.and_then(|r| r.in_tolerance(axis)).map_or("–".into(), percent);
         let mut cells = vec![scene[0].scene.clone()];
-        for accuracy in [Accuracy::Tight, Accuracy::Exact] {
-            match Answer::at(scene, accuracy).and_then(|a| a.best()) {
-                Some(best) => {
-                    cells.extend([best.solver.into(), budget(best), digits(best.cost_ns() / 1e3)]);
+        cells.extend(ErrorAxis::JUDGED.map(share));
+        let [tight, exact] =
+            [Accuracy::Tight, Accuracy::Exact].map(|a| Answer::at(scene, a).and_then(|a| a.best()));
+        for (found, known) in [(tight, None), (exact, tight)] {
+            match found {
+                Some(best) if known.is_some_and(|k| std::ptr::eq(k, best)) => {
+                    cells.extend(["the same".to_string(), String::new()]);
                 }
-                None => cells.extend(["none".to_string(), "–".to_string(), "–".to_string()]),
+                Some(best) => {
+                    cells.extend([format!("{}, {}", best.solver, budget(best)), digits(best.cost_ns() / 1e3)])
+                }
+                None => cells.extend(["none".to_string(), "–".to_string()]),
             }
         }
         rows.add_row(cells);
     }
-    finish(rows, 3)
+    finish(narrow(rows, PAGE_WIDTH), 1)
 }
 
 /// All solvers over all scenes.
@@ -386,7 +375,7 @@ fn standings(ranking: &Ranking, scenes: usize) -> String {
             vec![own.solver.to_string(), format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")];
         cells.extend(own.good.map(|n| format!("{n} of {scenes}")));
         cells.push(format!("{} of {scenes}", own.fastest));
-        cells.push(if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 4) });
+        cells.push(if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) });
         rows.add_row(cells);
     }
     let more = match ranking.standings.len().saturating_sub(MOST_RANKED) {
@@ -394,13 +383,14 @@ fn standings(ranking: &Ranking, scenes: usize) -> String {
         more => format!("and {more} more in report.html\n"),
     };
     format!(
-        "Ranking over all scenes.  score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, averaged\n\
-         over scenes (0 where it is not good enough); range: with any scene left out, and with half or twice the tolerances\n{}{more}",
-        finish(rows, 1)
+        "Ranking over all scenes.  score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough\n\
+         setting, averaged over scenes (0 where it is not good enough); range: with any scene left out, and with half or\n\
+         twice the tolerances\n{}{more}",
+        finish(narrow(rows, PAGE_WIDTH), 1)
     )
 }
 
-/// What waves of impacts gain and cost, in a line; nothing where both were not run.
+/// Gain and cost of waves of impacts, in a line; empty unless both treatments ran.
 fn waves(records: &[Record]) -> String {
     let found = study::impacts::gains(records);
     if found.is_empty() {
@@ -485,7 +475,7 @@ mod tests {
         };
         // Narrow builds emulate eight lanes and say so.
         let lanes = if is_emulated(8) { "@8 emulated" } else { "@8" };
-        let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 41.0 41.0 9.0 % 0.0 % – – no other solver –");
+        let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 41.0 41.0 no other solver –");
         assert_eq!(line(&records), expected);
         let with = |time| [&records[..], &[other(time)]].concat();
         assert!(line(&with(61.5)).ends_with("soft_step 50 %"), "{}", line(&with(61.5)));
@@ -570,7 +560,7 @@ mod tests {
             let text = page(&all(solvers));
             // What a study adds are two lines: where the files are.
             assert!(text.lines().count() <= 58, "{text}");
-            assert!(text.lines().all(|l| l.chars().count() <= 160), "{text}");
+            assert!(text.lines().all(|l| l.chars().count() <= PAGE_WIDTH), "{text}");
             let left_out = text.split_once("left out").map_or("", |(_, names)| names);
             for name in every.iter().filter(|name| !solvers.contains(name)) {
                 assert!(left_out.split([',', ' ', '\n']).any(|word| word == *name), "{name}: {text}");

@@ -1,4 +1,4 @@
-//! The columns of every CSV file, in one place. Tests hold that no file has another header.
+//! The columns of every CSV file, in one place. Tests check that no file has another header.
 //!
 //! Cells are empty where there is nothing: a run that failed has no errors, a scene without a
 //! reference value no distance to it.
@@ -243,7 +243,7 @@ pub static GROWTH: Sheet = Sheet {
     ],
 };
 
-/// What `run --state` writes.
+/// Columns of `run --state`.
 pub static STATE: Sheet = Sheet {
     file: "FILE of run --state",
     command: "simpulse run --state FILE",
@@ -261,7 +261,7 @@ pub static STATE: Sheet = Sheet {
     ],
 };
 
-/// What `run --contacts` writes.
+/// Columns of `run --contacts`.
 pub static CONTACTS: Sheet = Sheet {
     file: "FILE of run --contacts",
     command: "simpulse run --contacts FILE",

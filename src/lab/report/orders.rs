@@ -6,7 +6,7 @@ use crate::engine::world::Order;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::{Record, answer};
 
-/// What stands above the table.
+/// The text above the table.
 const LEGEND: &str = "\
 Order of contacts.  Settings that hold, of those that ran; median over these of the penetration and of the contact-law residual
 (weights of the lighter body)

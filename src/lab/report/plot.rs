@@ -111,7 +111,7 @@ fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64
     Ok(())
 }
 
-/// What the horizontal axis is, in lines that fit under the panel.
+/// Name of the horizontal axis, in lines that fit under the panel.
 fn title(axis: ErrorAxis, records: &[Record]) -> Vec<String> {
     let truth = records.iter().find_map(|r| r.truth).filter(|_| axis == ErrorAxis::Truth);
     let title = truth.map_or(axis.name().to_string(), |t| format!("error of {}", t.quantity));

@@ -27,7 +27,7 @@ fn profiles(records: &[Record]) -> Vec<Profile> {
     ErrorAxis::ALL.into_iter().map(profile).filter(|p| p.scenes > 0).collect()
 }
 
-/// What counts as solved along an axis.
+/// The condition for "solved" on an axis.
 fn tolerance(axis: ErrorAxis) -> String {
     format!("{} in tolerance", axis.name())
 }
@@ -155,7 +155,7 @@ pub fn slice_tables(records: &[Record]) -> String {
     text
 }
 
-/// What is given, and then the value of each solver.
+/// The limit, and then the value of each solver.
 fn slice_column(slice: &Slice, solvers: &[&str], equal_time: bool) -> Vec<String> {
     let error = |value: f64| match si(value, slice.unit) {
         text if value <= ERROR_FLOOR => format!("≤ {text}"),

@@ -156,7 +156,7 @@ impl StudyFile {
         text
     }
 
-    /// What a reader must know first: scenes that are missing, times of several machines. Empty for a
+    /// Warnings that come first: missing scenes, times of several machines. Empty for a
     /// whole study.
     pub fn caution(&self) -> String {
         let mut text = String::new();

@@ -14,7 +14,7 @@ of contact points and at rest; the contact-law residual, rms, in weights of the 
 distance to the scene's reference value (– none is known); the speed at rest.  What fails after the run was not
 looked for.  budget: substeps, and in each so many velocity, relaxation and position sweeps.
 µs/step: mean over the run, its median, its longest step, ± median deviation of a repeat; all settings of a scene
-were timed in turns.
+were timed interleaved.
 ";
 
 /// Whether these are records of a sweep.

@@ -6,7 +6,7 @@ use crate::lab::metrics::Errors;
 use crate::lab::study::{self, Fronts, Record, TruthError};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-/// What the columns of [`scene_table`] are, once for the whole study.
+/// The columns of [`scene_table`], once for the whole study.
 pub const LEGEND: &str = "\
 budget: substeps; then velocity (vel), relaxation (rel) and position (pos) sweeps per substep.
 lanes: natural means one contact after the other in natural order; a number means colored order in so many lanes.
@@ -26,6 +26,17 @@ pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header(header.to_vec());
+    table
+}
+
+/// Longest line of the page that a study prints (characters).
+pub const PAGE_WIDTH: usize = 120;
+
+/// The same table with at most `width` characters a line: cells that are too long go on below.
+pub(crate) fn narrow(mut table: Table, width: usize) -> Table {
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    // Two of them are the blanks behind the last column.
+    table.set_width(width as u16 + 2);
     table
 }
 
@@ -157,7 +168,7 @@ fn front(fronts: &Fronts) -> String {
     if on.is_empty() { "–".to_string() } else { on }
 }
 
-/// What waves of impacts gain and cost; empty where nothing ran with both treatments.
+/// Gain and cost of waves of impacts; empty unless both treatments ran.
 pub fn impacts_table(records: &[Record]) -> String {
     let found = study::impacts::gains(records);
     if found.is_empty() {

@@ -44,7 +44,7 @@ pub struct Expect {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownValue {
-    /// What is measured.
+    /// The measured quantity.
     pub measure: Measure,
     /// Whose height.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]

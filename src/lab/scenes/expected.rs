@@ -1,4 +1,4 @@
-//! From what a scene expects to what a run is held to, and back.
+//! Converts the expectations of a scene file to conditions on a run, and back.
 
 use super::expect::{Expect, KnownValue, Measure};
 use super::holds::Demand;

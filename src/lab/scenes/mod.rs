@@ -132,7 +132,7 @@ pub struct Entry {
     pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
 
-/// What a size counts where the scene is one mass on another.
+/// Meaning of the size of scenes with one mass on another.
 pub const MASS_RATIO: &str = "times as heavy";
 
 /// A whole number that a scene is made from.
@@ -144,7 +144,7 @@ pub struct Size {
     pub min: u32,
     /// Greatest.
     pub max: u32,
-    /// What it counts.
+    /// The quantity that it counts.
     pub meaning: &'static str,
 }
 
@@ -220,7 +220,7 @@ pub struct Loaded {
     pub scene: Scene,
     /// None where nothing is known.
     pub truth: Option<Truth>,
-    /// What a run has to meet.
+    /// Conditions that a run has to meet.
     pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,
@@ -285,9 +285,9 @@ pub struct Description {
     pub dt: f64,
     /// m/s²
     pub gravity: [f64; 2],
-    /// What the reference value is of, the value, its unit.
+    /// The quantity of the reference value, the value, its unit.
     pub reference: Option<(&'static str, f64, &'static str)>,
-    /// What a run has to meet.
+    /// Conditions that a run has to meet.
     pub demands: Vec<Demand>,
     /// How wrong it may be.
     pub tolerances: Tolerances,

@@ -1,4 +1,4 @@
-//! Words that scenes are written in.
+//! Helpers that scenes are built with.
 
 use super::format::*;
 use super::joints::SceneJoint;

@@ -37,7 +37,7 @@ impl Tolerance {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Accuracy {
-    /// Nothing wrong is seen: a centimeter at bodies of a meter.
+    /// No visible error: a centimeter for bodies of a meter.
     Plausible,
     /// A millimeter.
     Tight,
@@ -101,7 +101,7 @@ pub struct GivenTolerances {
 /// Visible overlap, relative to the size of a body (1): 1 cm at 1 m.
 const SEEN: f64 = 0.01;
 
-/// What is seen to move at rest, in sizes of a body per second: half a centimeter at a meter, a twelfth of a
+/// Speed that is visible at rest, in body sizes per second: half a centimeter at a meter, a twelfth of a
 /// millimeter in each of sixty pictures.
 const SEEN_MOVING: f64 = 0.005;
 

@@ -22,7 +22,7 @@ use std::sync::Arc;
 pub struct StudyPlan {
     /// Names of the catalog, with sizes, or `.json` files.
     pub scenes: Vec<String>,
-    /// Rows of [`VARIANTS`].
+    /// Rows of [`VARIANTS`](crate::engine::solvers::VARIANTS).
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,

@@ -26,7 +26,7 @@ pub const RESTLESS: f64 = 0.005;
 /// Path lengths are summed over every so many steps: what rounds at 10 km is no path.
 const STRIDE: u32 = 6;
 
-/// What the bodies of a scene may have of energy.
+/// Energy that the bodies of a scene may have.
 ///
 /// With heights over the floor and V the fastest point of a kinematic body,
 ///
@@ -34,7 +34,7 @@ const STRIDE: u32 = 6;
 /// lent = Σ ½ m v₀² + ½ I ω₀² + m g y₀  +  [driven] Σ ½ m (2V)² + m g H  +  [overlapping at the start] Σ m g H
 /// ```
 ///
-/// What a kinematic body hits without loss leaves at 2V, and what it or an overlap pushes can be lifted to the ceiling,
+/// A body that a kinematic one hits without loss leaves at 2V. A body pushed by it or by an overlap can be lifted to the ceiling,
 /// H over the floor.
 ///
 /// Energy is read from poses. A body's velocity is its way over a step; of two steps in a row the slower counts, so that
@@ -143,7 +143,7 @@ impl<'c> Judge<'c> {
         true
     }
 
-    /// What was found.
+    /// The findings.
     pub fn finish(mut self) -> CaseOutcome {
         if self.outcome.has(TortureVerdict::Diverged) {
             return self.outcome;

@@ -2,7 +2,7 @@
 //!
 //! Solvers are tuned on known scenes. Here [`families`] draw others, by seed. Each runs under every solver, and a
 //! [`judge`] checks poses only, in double precision: it works for any [`Engine`], this crate's solvers or others.
-//! Failing scenes are [minimized](minimise) into scene files.
+//! Failing scenes are [minimized](minimize) into scene files.
 //!
 //! | verdict | failure |
 //! |---|---|
@@ -19,7 +19,7 @@
 pub mod families;
 #[doc(hidden)]
 pub mod judge;
-pub mod minimise;
+pub mod minimize;
 #[doc(hidden)]
 pub mod shapes;
 #[doc(hidden)]
@@ -114,7 +114,7 @@ impl TortureVerdict {
 /// A verdict with where and how much.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// What happened.
+    /// The result.
     pub verdict: TortureVerdict,
     /// First step at which it was seen, from 1.
     pub step: u32,

@@ -4,12 +4,12 @@ use super::families::FAMILIES;
 use super::{TortureRow, TortureVerdict};
 use crate::lab::report::table::{finish, table};
 
-/// What a family's scenes were under one solver.
+/// Results of a family's scenes under one solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct FamilyLine {
     /// Name, or `all`.
     pub family: String,
-    /// Who ran them.
+    /// The solver.
     pub solver: String,
     /// How many.
     pub scenes: u32,

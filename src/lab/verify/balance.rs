@@ -1,4 +1,4 @@
-//! A25: where balance ends, and which contact carries which load before.
+//! A25: the limit of balance, and how contacts share the load up to it.
 
 use super::Required::Yes;
 use super::lab::*;

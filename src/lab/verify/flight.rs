@@ -1,4 +1,4 @@
-//! A27: impacts of bodies that arrive in flight, and what they may not make.
+//! A27: impacts of bodies that arrive in flight, and the energy that they may not create.
 
 use super::Required::Yes;
 use super::lab::*;

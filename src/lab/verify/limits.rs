@@ -1,4 +1,4 @@
-//! B24: piles that statics lets stand by little.
+//! B24: piles that are barely stable by statics.
 
 use super::Required::Yes;
 use super::lab::*;

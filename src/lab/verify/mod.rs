@@ -128,7 +128,7 @@ impl LawOf {
 pub struct Case {
     /// Family and name: `A1.stick`.
     pub id: &'static str,
-    /// What is measured.
+    /// The measured quantity.
     pub summary: &'static str,
     /// Unit of the measured value, the reference value and the tolerance.
     pub unit: &'static str,
@@ -210,7 +210,7 @@ pub struct ParameterSweep {
 pub struct SweepRow {
     /// Of the parameter.
     pub value: f64,
-    /// What was measured there; infinite if the run diverged.
+    /// The measured value; infinite if the run diverged.
     pub measured: f64,
     /// Whether it is good enough.
     pub holds: bool,

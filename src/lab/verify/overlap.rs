@@ -1,4 +1,4 @@
-//! B3 and B19: bodies that start in each other.
+//! B3 and B19: bodies that start overlapping.
 
 use super::Required::{No, Yes};
 use super::lab::*;

@@ -1,4 +1,4 @@
-//! B24: structures on little width, which statics says stand.
+//! B24: narrow structures that are stable by statics.
 
 use super::Required::Yes;
 use super::lab::*;

@@ -1,4 +1,4 @@
-//! B23: loads that come, go and wander within a step.
+//! B23: loads that appear, disappear or move within a step.
 
 use super::Required::{No, Yes};
 use super::lab::*;

@@ -23,7 +23,7 @@ pub(super) const fn stride(points: usize) -> usize {
     2 * points
 }
 
-/// What bounces.
+/// Points that bounce.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rebound {
     /// Approach (m/s) that a point has to exceed.
@@ -34,7 +34,7 @@ pub struct Rebound {
 
 /// Reads the speeds of approach, before anything moves.
 pub struct ReadApproach {
-    /// What bounces.
+    /// Points that bounce.
     pub rebound: Rebound,
     /// Lane vectors of a side record.
     pub stride: usize,

@@ -10,9 +10,9 @@
 //! other is along n = (d + u t)/R, and not along d, from which that is up to |u| dt/R away: discs
 //! of half a meter that meet at 10 m/s left in directions that were 7 % off. Arms end at the point where they touch then.
 //!
-//! An impact is solved at the beginning of the step, in a row that is put in the place of the one of the beginning, with the gap
-//! −v_n t from which it gets to the touch. Only impacts that are solved before the step: in a crowd, where sweeps do that,
-//! what two bodies do until they touch is not known.
+//! An impact is solved at the beginning of the step. Its row replaces the row of the beginning: it has the frame of the
+//! time t and the gap −v_n t, which the bodies close until then. This holds only for impacts that are solved before the
+//! step: in a crowd, where sweeps solve them, the motion of two bodies until they touch is not known.
 
 use crate::engine::constraints::kernels::frame::turn;
 use crate::engine::constraints::records::features::Layout;
@@ -48,7 +48,7 @@ pub(crate) struct TouchFrame {
 }
 
 impl Round {
-    /// What is round in a contact, if anything is. `is_held`: a is, and the point lies on b's surface.
+    /// The round shapes of a contact, if there are any. `is_held`: a is, and the point lies on b's surface.
     pub fn of(contact: &Contact, is_held: bool) -> Option<Self> {
         let (radii, reach) = (contact.radii, contact.radii[0] + contact.radii[1]);
         if reach == 0.0 || reach == f32::INFINITY {

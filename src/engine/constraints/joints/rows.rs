@@ -363,8 +363,8 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             block.errors[r] = first(error[r]);
             block.travel[r] = first(self.travel(&j[r]));
             block.impulses[r] = first(impulse[r]);
-            for c in 0..=r {
-                (block.response[r][c], block.response[c][r]) = (first(k[r][c]), first(k[r][c]));
+            for (c, &k) in k[r].iter().enumerate().take(r + 1) {
+                (block.response[r][c], block.response[c][r]) = (first(k), first(k));
             }
         }
         block

@@ -45,7 +45,7 @@ pub struct MotionInput {
     pub gravity: [f32; 2],
     /// Substep (s).
     pub h: f32,
-    /// What the scene itself needs.
+    /// Features that the scene itself needs.
     pub features: Features,
     /// How velocities move bodies.
     pub integrator: Integrator,
@@ -56,7 +56,7 @@ pub struct MotionInput {
 /// Data for moving bodies, one entry per row.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// What forces add to a velocity in one substep: `[h aₓ, h a_y, h α, 0]`.
+    /// Velocity that forces add in one substep: `[h aₓ, h a_y, h α, 0]`.
     velocity_increment: Vec<[f32; 4]>,
     /// Damping factors `[1/(1+hc), 1/(1+hc), 1/(1+hc_ω), 1]`; empty when nothing is damped.
     damp: Vec<[f32; 4]>,

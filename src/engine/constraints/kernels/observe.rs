@@ -1,7 +1,7 @@
 //! The law behind a rule, read off the rule itself.
 //!
 //! A sweep under a [`crate::engine::constraints::kernels::velocity::rules::NormalRule`] converges, if it does, to impulses that the rule leaves alone.
-//! Which contact law those obey is asked of the rule by trying it, so that no solver can be
+//! Which contact law those obey is found by trying the rule, so that no solver can be
 //! measured against a law that it does not solve. Nothing is observed unless
 //! [`crate::engine::constraints::step::Workspace::observe`] is set; a step then costs one branch per sweep.
 

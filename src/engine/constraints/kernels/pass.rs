@@ -137,7 +137,7 @@ pub trait Pass {
         PassMode::InTurn
     }
 
-    /// What it makes of errors of rows that are held both ways: constraints of other types follow it.
+    /// Its treatment of position errors of equality rows, which constraints of other types follow.
     fn law(&self) -> Softness {
         Softness::RIGID
     }

@@ -123,7 +123,7 @@ impl<L: Lanes> PairState<L> {
 
 /// A kernel in stages: what it does between gathering bodies and scattering them.
 pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
-    /// What it keeps of a batch from one stage to the next, besides the bodies.
+    /// Data of a batch that it keeps from one stage to the next, besides the bodies.
     type Begun: Copy;
 
     fn nothing() -> Self::Begun;

@@ -30,7 +30,7 @@ pub struct TypeInput<'a> {
     pub phase: Phase,
     /// Whether only effective masses are computed, and the factor on increments in a Jacobi sweep.
     pub mode: PassMode,
-    /// What the pass makes of errors: its rule, for rows that are held both ways.
+    /// The rule of the pass for position errors of equality rows.
     pub law: Softness,
     /// Springs and motors have acted in this substep, in a pass of [`PassMode::Drive`]: they rest.
     pub driven: bool,
@@ -174,7 +174,7 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
         &[]
     }
 
-    /// What a constraint did to its bodies in the last step, where that was booked ([`PassMode::Book`]).
+    /// Impulses of a constraint in the last step, where they were recorded ([`PassMode::Book`]).
     fn booked(&self, _constraint: usize) -> Option<Booked> {
         None
     }
@@ -204,7 +204,7 @@ impl Clone for Box<dyn ConstraintType> {
 pub struct Booked {
     /// All of them.
     pub all: [[f32; 3]; 2],
-    /// Those that give and take energy by what they are: of springs and motors.
+    /// Impulses of springs and motors, which add and remove energy by design.
     pub driving: [[f32; 3]; 2],
 }
 
@@ -224,7 +224,7 @@ pub struct Joined {
     pub kind: Box<dyn ConstraintType>,
     /// Colored batches at the width of the step.
     pub(crate) lanes: Batches,
-    /// What is solved one after the other.
+    /// The constraints that are solved one after the other.
     pub(crate) serial: Batches,
 }
 

@@ -21,7 +21,7 @@ const ROUNDS: usize = 4;
 /// Greatest load of a point over the force on the body (1).
 const GREATEST: f64 = 2.0;
 
-/// What is added to the diagonal of A Aᵀ, which has numbers of the order of 1.
+/// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
 const RIDGE: f64 = 1e-6;
 
 /// A point on which a body stands.

@@ -84,7 +84,7 @@ impl Batches {
         &self.segments
     }
 
-    /// What a pass runs over, in order: all segments unless [`Self::arrange`] said otherwise.
+    /// The segments that a pass runs over, in order: all of them unless [`Self::arrange`] said otherwise.
     pub fn visits(&self) -> &[Segment] {
         &self.visits[self.focus.clone()]
     }

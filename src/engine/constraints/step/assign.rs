@@ -56,7 +56,7 @@ pub struct Assignment {
 pub struct Sides<'a, F> {
     /// Number of bodies; the row of this number is the inert one.
     pub bodies: usize,
-    /// What stands opposite the dynamic body b of a contact, given the body a.
+    /// The kind of the other body of a contact of the dynamic body b, given body a.
     pub opposite: F,
     /// Where contacts are grouped by level, the graph that has the levels.
     pub levels: Option<&'a Graph>,

@@ -62,7 +62,7 @@ impl Passes<'_> {
         self.work.impacts.spread = spread;
     }
 
-    /// What is done before the step where bodies hit each other.
+    /// Treatment of impacts before the step.
     pub(super) fn begin_impacts(&mut self) {
         self.work.impacts.bounces.iter_mut().for_each(Bounces::forget);
         (self.bounces, self.biased) = (false, false);

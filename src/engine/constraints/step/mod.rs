@@ -53,13 +53,13 @@ pub struct Passes<'a> {
     driven: bool,
 }
 
-/// What a solver's own passes over bodies and contacts work on.
+/// Data for a solver's own passes over bodies and contacts.
 pub struct StepParts<'p> {
     /// The workspace.
     pub work: &'p mut Workspace,
     /// The contacts of the step.
     pub contacts: &'p mut [Contact],
-    /// What the step is given.
+    /// Inputs of the step.
     pub input: &'p StepInput,
     /// Books what they read and write.
     pub clock: &'p mut Clock,

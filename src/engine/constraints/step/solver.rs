@@ -45,13 +45,13 @@ impl Clone for Box<dyn Solver> {
     }
 }
 
-/// What a solver sees of a world around a collision.
+/// The part of a world that a solver sees around a collision.
 pub struct CollisionScene<'a> {
     /// At the beginning of the step.
     pub bodies: &'a Bodies,
     /// Sorted by shape pair.
     pub contacts: &'a mut [Contact],
-    /// What the solver keeps per contact, contact point and body, in the order of `contacts`.
+    /// Numbers that the solver keeps per contact, contact point and body, in the order of `contacts`.
     pub kept: &'a mut Kept,
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
@@ -78,12 +78,12 @@ impl CollisionScene<'_> {
     }
 }
 
-/// What a solver asks of the collision that comes.
+/// Requests of a solver to the next collision phase.
 #[derive(Clone, Debug, Default)]
 pub struct Collision {
     /// By candidate, whether its manifold is left as it is; empty if all are found again.
     pub keep: Vec<bool>,
-    /// What rolls, if radii of curvature are to be found ([`Contact::radii`]).
+    /// Which contacts roll, if radii of curvature are to be found ([`Contact::radii`]).
     pub rolling: Option<Rolling>,
 }
 

@@ -24,7 +24,7 @@ pub struct Workspace {
     pub motion: Motion,
     /// Colored batches at the chosen width.
     pub lanes: Batches,
-    /// What is solved one after the other: everything in natural order, else the overflow.
+    /// Contacts that are solved one after the other: all of them in natural order, else the overflow.
     pub serial: Batches,
     /// Constraints of other types than contacts.
     pub types: Vec<Joined>,
@@ -83,7 +83,7 @@ impl Workspace {
     }
 }
 
-/// What a step did.
+/// Counts of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WorkCount {
     /// Passes over all constraints that solve something; warm starts are not counted.
@@ -95,10 +95,10 @@ pub struct WorkCount {
     pub cut_impacts: usize,
 }
 
-/// What a step is given besides the workspace.
+/// Inputs of a step besides the workspace.
 #[derive(Clone, Copy, Debug)]
 pub struct StepInput {
-    /// What the scene has.
+    /// Features of the scene.
     pub features: Features,
     /// Work per step.
     pub budget: Budget,

@@ -171,8 +171,9 @@ impl JointDescent {
             for (block, kept) in self.found.iter().zip(&mut self.blocks[range]) {
                 let Forces { force, error, grows, .. } = forces(block, kept, on.h, alpha);
                 kept.force = force;
-                for r in 0..if grows { block.size } else { 0 } {
-                    kept.penalty[r] = beta.mul_add(error[r].abs(), kept.penalty[r]).min(PENALTY[1]);
+                let rows = if grows { block.size } else { 0 };
+                for (penalty, error) in kept.penalty.iter_mut().zip(error).take(rows) {
+                    *penalty = beta.mul_add(error.abs(), *penalty).min(PENALTY[1]);
                 }
             }
         }

@@ -99,7 +99,7 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
         escaped(&e.version),
     );
     if !study.caution().is_empty() {
-        text += &format!("<p class=\"bad\">{}</p>\n", escaped(&study.caution()));
+        text += &format!("<p class=\"bad\">{}</p>\n", escaped(study.caution().trim_end()));
     }
     let mut contents: Vec<(&str, &str)> = Vec::new();
     let mut body = String::new();
@@ -125,7 +125,12 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
         return text + &body + "</body>\n</html>\n";
     }
     let answer = words::answer(records, study.settings["steps"].as_u64());
-    section("answer", "The answer", "", answer + &format!("<p>{}</p>\n", escaped(&study.budgets())));
+    section(
+        "answer",
+        "The answer",
+        "",
+        answer + &format!("<p>{}</p>\n", escaped(study.budgets().trim_end())),
+    );
     section(
         "overview",
         "Speed against error over all scenes",

@@ -30,7 +30,7 @@ pub struct Panel {
     y: Scale,
 }
 
-/// What a panel looks like.
+/// Size, title, names and strip of a panel.
 pub struct PlotArea<'a> {
     /// Width and height (pixels).
     pub size: [f64; 2],

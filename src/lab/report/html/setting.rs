@@ -1,4 +1,4 @@
-//! What a page asks of a record.
+//! Values of a record that the page needs.
 
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis};
 use crate::lab::study::{Record, answer};
@@ -14,7 +14,7 @@ pub trait Setting {
     fn tolerance(&self, axis: ErrorAxis) -> Option<f64>;
     /// Whether no other setting beats it in time and in that error.
     fn on_front(&self, axis: ErrorAxis) -> bool;
-    /// What went wrong, and when; none if the run holds.
+    /// The failure and its step; none if the run holds.
     fn broke(&self) -> Option<String>;
     /// Whether it has no colors.
     fn is_natural(&self) -> bool;

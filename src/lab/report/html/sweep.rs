@@ -15,7 +15,7 @@ use crate::lab::units::{bodies, si};
 /// Width and height of a plot (pixels).
 const SIZE: [f64; 2] = [330.0, 290.0];
 
-/// What a plot shows against the swept value.
+/// The quantity that a plot shows against the swept value.
 #[derive(Clone, Copy)]
 enum Shown {
     Time,
@@ -84,9 +84,9 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
     let at = |r: &Record| r.swept.map_or(0.0, |s| s.value);
     // Solvers that fail at the same value stand side by side, three in a row.
     let count = solvers_of(scene).len();
-    let rows = count.div_ceil(3).saturating_sub(1).max(1);
-    let grid: Vec<[f64; 2]> =
-        (0..count).map(|i| [9.0 * ((i % 3) as f64 - 1.0), (i / 3) as f64 / rows as f64]).collect();
+    let (columns, rows) = (count.min(3) as f64, count.div_ceil(3) as f64);
+    let place = |i: usize| [9.0 * ((i % 3) as f64 - 0.5 * (columns - 1.0)), ((i / 3) as f64 + 0.5) / rows];
+    let grid: Vec<[f64; 2]> = (0..count).map(place).collect();
     for (i, solver) in solvers_of(scene).into_iter().enumerate() {
         for natural in [true, false] {
             let mut own: Vec<&&Record> =
@@ -150,7 +150,7 @@ pub fn section(records: &[Record]) -> String {
     text + &format!("<pre class=\"sweep-table\">{}</pre>\n", lines.join("\n"))
 }
 
-/// What the reference value of a scene is of; nothing where none is known.
+/// The quantity of a scene's reference value; empty if none is known.
 fn reference(scene: &[Record]) -> String {
     scene.iter().find_map(|r| r.truth).map_or(String::new(), |t| format!("; reference value: {}", t.quantity))
 }
@@ -161,10 +161,14 @@ pub fn svg(records: &[Record]) -> String {
     const HEAD: f64 = 30.0;
     let rows: Vec<(String, Vec<String>)> =
         scenes(records).into_iter().map(|s| (s[0].scene.clone() + &reference(s), panels(s, swept))).collect();
-    let columns = rows.iter().map(|r| r.1.len()).max().unwrap_or(1);
+    // Two side by side can still be read on a telephone.
+    const COLUMNS: usize = 2;
     let solvers = solvers_of(records);
     let [width, height] = SIZE;
-    let whole = [columns as f64 * width, HEAD + rows.len() as f64 * (HEAD + height)];
+    let lines: usize = rows.iter().map(|r| r.1.len().div_ceil(COLUMNS)).sum();
+    let legend = legend_rows(&solvers, COLUMNS as f64 * width);
+    let head = HEAD * legend.len() as f64;
+    let whole = [COLUMNS as f64 * width, head + rows.len() as f64 * HEAD + lines as f64 * height];
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" width=\"{0}\" height=\"{1}\" \
          font-family=\"sans-serif\">\n<style>\n{}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
@@ -172,36 +176,71 @@ pub fn svg(records: &[Record]) -> String {
         whole[1],
         plot_rules(),
     );
-    let mut x = 16.0;
-    for solver in solvers {
-        let Style { color, marker } = Style::of(solver);
-        text += &format!(
-            "<path d=\"{}\" fill=\"{color}\"/><text class=\"row\" x=\"{}\" y=\"22\">{}</text>\n",
-            marker.path([x, 18.0], 5.0),
-            x + 10.0,
-            escaped(solver)
-        );
-        x += 30.0 + 7.5 * solver.chars().count() as f64;
+    for (row, solvers) in legend.iter().enumerate() {
+        let mut x = 16.0;
+        for solver in solvers {
+            let Style { color, marker } = Style::of(solver);
+            let y = HEAD * row as f64 + 18.0;
+            text += &format!(
+                "<path d=\"{}\" fill=\"{color}\"/><text class=\"row\" x=\"{}\" y=\"{}\">{}</text>\n",
+                marker.path([x, y], 5.0),
+                x + 10.0,
+                y + 4.0,
+                escaped(solver)
+            );
+            x += entry_width(solver);
+        }
     }
-    for (row, (scene, panels)) in rows.iter().enumerate() {
-        let top = HEAD + row as f64 * (HEAD + height);
+    let mut top = head;
+    for (scene, panels) in &rows {
         text += &format!("<text class=\"title\" x=\"16\" y=\"{}\">{}</text>\n", top + 20.0, escaped(scene));
-        for (column, panel) in panels.iter().enumerate() {
+        for (i, panel) in panels.iter().enumerate() {
             let place = format!(
                 "<svg x=\"{}\" y=\"{}\" width=\"{width}\" height=\"{height}\" ",
-                column as f64 * width,
-                top + HEAD
+                (i % COLUMNS) as f64 * width,
+                top + HEAD + (i / COLUMNS) as f64 * height
             );
             text += &panel.replacen("<svg ", &place, 1);
         }
+        top += HEAD + panels.len().div_ceil(COLUMNS) as f64 * height;
     }
     text + "</svg>\n"
 }
 
-/// The rules of the page that concern plots, and none that size them to their page.
+/// Width of a solver in the legend (pixels).
+fn entry_width(solver: &str) -> f64 {
+    30.0 + 7.5 * solver.chars().count() as f64
+}
+
+/// Solvers in rows of a legend that is so wide (pixels).
+fn legend_rows(solvers: &[&'static str], width: f64) -> Vec<Vec<&'static str>> {
+    let mut rows: Vec<Vec<&'static str>> = vec![Vec::new()];
+    let mut x = 16.0;
+    for &solver in solvers {
+        if x + entry_width(solver) > width && x > 16.0 {
+            rows.push(Vec::new());
+            x = 16.0;
+        }
+        x += entry_width(solver);
+        if let Some(row) = rows.last_mut() {
+            row.push(solver);
+        }
+    }
+    rows
+}
+
+/// The rules of the page that concern plots, light and dark, and none that size them to their page.
 fn plot_rules() -> String {
-    let rules = include_str!("page.css").lines().filter(|line| line.starts_with("svg ."));
-    rules.map(|line| format!("{line}\n")).collect::<String>() + "svg { font-size: 11px; fill: #1f2933; }\n"
+    let css = include_str!("page.css");
+    let of = |start: &str| css.lines().filter(|l| l.starts_with(start)).collect::<Vec<_>>().join("\n");
+    let (_, dark) = css.split_once("prefers-color-scheme: dark").unwrap_or_default();
+    let dark = dark.split_once("\n}").map_or("", |(rules, _)| rules);
+    let dark: Vec<&str> = dark.lines().filter(|l| l.starts_with("  svg")).collect();
+    format!(
+        "svg {{ font-size: 11px; fill: #1f2933; }}\n{}\n@media (prefers-color-scheme: dark) {{\n{}\n}}\n",
+        of("svg ."),
+        dark.join("\n")
+    )
 }
 
 #[cfg(test)]

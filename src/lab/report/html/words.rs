@@ -53,7 +53,7 @@ pub fn answer(records: &[Record], steps: Option<u64>) -> String {
     text + "</tbody></table>\n"
 }
 
-/// What to use, what speaks against it, and where nothing is good enough.
+/// The recommendation, warnings, and scenes on which nothing is good enough.
 fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: Option<u32>) -> String {
     let said = recommendation(ranking, answers.len(), steps);
     let mut text = said.lines().map(escaped).collect::<Vec<_>>().join("<br/>\n");
@@ -75,7 +75,7 @@ fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: O
     text
 }
 
-/// Who looks good and fails later.
+/// Settings that pass their run and fail later.
 fn later_lines(records: &[Record]) -> Vec<String> {
     fails_later(records).iter().map(|(r, why)| later_line(r, why) + ".").collect()
 }

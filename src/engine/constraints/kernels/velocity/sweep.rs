@@ -1,4 +1,4 @@
-//! The contact sweep: one text for every width, every need, every solver. Bodies and rows are as in [`crate::engine::constraints::kernels::frame`].
+//! The contact sweep: one source for every width, every set of features and every solver. Bodies and rows are as in [`crate::engine::constraints::kernels::frame`].
 //!
 //! # Coupling
 //!
@@ -73,7 +73,7 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     /// Whether arms turn with their bodies within the step.
     const TURNED: bool = false;
 
-    /// What it makes of the errors of rows that are held both ways, such as those of joints.
+    /// Its treatment of position errors of equality rows, such as those of joints.
     fn of_errors(&self) -> Softness {
         Softness::RIGID
     }
@@ -161,7 +161,7 @@ pub(crate) struct Rows<L> {
     impulse: [L; 2],
     /// Accumulated impulse before the sweep (N·s).
     old: [L; 2],
-    /// What the rows have applied (N·s).
+    /// Impulses that the rows have applied (N·s).
     pub(crate) sum: L,
 }
 

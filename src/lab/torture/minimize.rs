@@ -14,7 +14,7 @@ const AFTER: u32 = 10;
 /// (delta debugging). `run` judges a case. Errors: those of `run`.
 ///
 /// Source: Zeller, Hildebrandt 2002 (delta debugging).
-pub fn minimise(
+pub fn minimize(
     case: &TortureCase,
     verdict: TortureVerdict,
     mut run: impl FnMut(&TortureCase) -> Result<CaseOutcome, Error>,
@@ -82,7 +82,7 @@ mod tests {
             }
             Ok(outcome)
         };
-        let least = minimise(&case, TortureVerdict::Flung, run).unwrap();
+        let least = minimize(&case, TortureVerdict::Flung, run).unwrap();
         assert_eq!(least.scene.bodies[4..], culprits);
         assert_eq!(least.scene.steps, 40);
     }
