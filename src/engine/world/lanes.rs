@@ -2,7 +2,7 @@
 
 use super::{Order, World};
 use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::records::assign::Sides;
+use crate::engine::constraints::step::assign::Sides;
 use crate::engine::constraints::{Features, OppositeKind};
 
 impl World {

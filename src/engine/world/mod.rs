@@ -9,7 +9,7 @@ use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kernels::motion::{self, MotionInput};
 use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::records::assign::Assignment;
+use crate::engine::constraints::step::assign::Assignment;
 use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::continuous::{Continuous, Moving};

@@ -1,11 +1,9 @@
 //! Records: where each number of each constraint is stored.
 //!
 //! [`features`] says which numbers a scene needs and where a record keeps them, [`batches`] and [`segment`] how records
-//! follow each other, [`assign`] which contact is in which lane, and [`order`] in which order a sweep visits them. [`rows`] are
+//! follow each other, and [`order`] in which order a sweep visits them. [`rows`] are
 //! those of joints, one by one. [`graph`], [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
 
-#[doc(hidden)]
-pub mod assign;
 pub mod batches;
 #[doc(hidden)]
 pub mod bounces;

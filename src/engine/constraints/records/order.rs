@@ -81,7 +81,7 @@ pub(crate) fn mixed(x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::constraints::OppositeKind;
+    use crate::engine::constraints::records::features::OppositeKind;
 
     fn segment(stage: u32, first_lane: usize, contacts: usize, disjoint: bool) -> Segment {
         let opposite = OppositeKind::Dynamic;

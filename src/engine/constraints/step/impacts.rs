@@ -1,8 +1,7 @@
 //! What bounces, and the impulses of a step.
 
-use super::Passes;
+use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::Workspace;
 use crate::engine::constraints::impacts::restitution::Rebound;
 use crate::engine::constraints::impacts::spread::{self, Find, Leads, SpreadInput};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
@@ -29,7 +28,11 @@ impl Passes<'_> {
         let Spreading { timed, stops, lead, releases } = spreading;
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
-        let Some([least_gain, fastest]) = spread::impact_speeds(self.work, h, dt) else { return };
+        let Some([least_gain, fastest]) =
+            spread::impact_speeds(&self.work.rows, self.work.motion.velocity_increments(), h, dt)
+        else {
+            return;
+        };
         let mut spread = std::mem::take(&mut self.work.impacts.spread);
         for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
             found.clear();
@@ -136,7 +139,7 @@ impl Passes<'_> {
     pub fn book_impulses(&mut self) {
         if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
             self.over_types_alone(Phase::Store, PassMode::Book);
-            let super::Workspace { lanes, serial, .. } = &mut *self.work;
+            let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
                 let width = batches.width();
                 batches.for_each_lane(&self.input.features, |contact, layout, record, lane| {

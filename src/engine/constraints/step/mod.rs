@@ -3,6 +3,8 @@
 //! [`Passes`] is all that a solver sees. Its methods are in files by what they work on: `bodies`, `sweeps`,
 //! `impacts` and `vectors`; here is what runs a pass.
 
+#[doc(hidden)]
+pub mod assign;
 mod bodies;
 mod impacts;
 mod solver;

@@ -6,7 +6,6 @@
 //! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen.
 
 use super::{AHEAD, BOUNCES};
-use crate::engine::constraints::Workspace;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
@@ -130,12 +129,12 @@ fn find<L: Lanes>(
 
 /// The smallest speed that forces add to a dynamic body in a step, and an upper bound of the speed of all points (m/s); none if
 /// the bound is slower than any impact.
-pub(crate) fn impact_speeds(work: &Workspace, h: f32, dt: f32) -> Option<[f32; 2]> {
+pub(crate) fn impact_speeds(rows: &[BodyRow], increments: &[[f32; 4]], h: f32, dt: f32) -> Option<[f32; 2]> {
     /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
     const REACH: f32 = 3.0;
     let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
     let (mut fastest, mut least) = (0.0_f32, f32::INFINITY);
-    for (BodyRow { velocity, delta }, increment) in work.rows.iter().zip(work.motion.velocity_increments()) {
+    for (BodyRow { velocity, delta }, increment) in rows.iter().zip(increments) {
         let [inv_mass, inv_inertia] = [velocity[3], delta[3]];
         // (ω R)²: infinite for a kinematic body that turns, NaN, which is never the maximum, for one that does not.
         let (top, turning) = (REACH.mul_add(REACH * inv_mass, f32::MIN_POSITIVE), velocity[2] * velocity[2]);

@@ -1,12 +1,11 @@
 //! Which constraint goes to which lane: by colors, or one after the other.
 
+use super::Workspace;
 use crate::engine::coloring::{Coloring, EXEMPT};
 use crate::engine::constraints::records::batches::Place;
+use crate::engine::constraints::records::features::{Features, Layout, OppositeKind};
 use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
 use crate::engine::constraints::records::order::mixed;
-use crate::engine::constraints::{
-    records::features::Features, records::features::Layout, records::features::OppositeKind, step::Workspace,
-};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{LaneWidth, held};
 
