@@ -291,7 +291,7 @@ impl JointType for Gear {
         numbers[0] = self.ratio;
     }
 
-    fn rows<L: Lanes>(_: (), numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(_: (), numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let j = Jacobian { axis: [L::zero(); 2], arms: [numbers[0], L::splat(1.0)] };
         on.row(j, on.travel(&j), RowLaw::Rigid, kept);
     }

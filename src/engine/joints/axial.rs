@@ -97,7 +97,7 @@ impl Axial {
         value: L,
         mut numbers: &[L],
         mut kept: &mut [L],
-        on: &mut JointPass<L>,
+        on: &mut impl JointPass<L>,
     ) {
         if form.spring {
             let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: None };

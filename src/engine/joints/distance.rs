@@ -67,7 +67,7 @@ impl JointType for Distance {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let (arms, way) = on.anchors();
         let distance = dot(way, way).sqrt();
         let scale = (distance - L::splat(NO_LINE)).select_positive(L::splat(1.0) / distance, L::zero());

@@ -68,7 +68,7 @@ impl JointType for MotorJoint {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let law = |cap: L| RowLaw::Spring { stiffness: numbers[1], damping: numbers[2], cap: Some(cap) };
         let (of_points, of_angle) = kept.split_at_mut(4);
         on.row(Jacobian::angle(), numbers[0] + on.turn(), law(numbers[4]), of_angle);

@@ -57,7 +57,7 @@ impl JointType for Mouse {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) };
         let (arms, way) = on.anchors();
         on.block(Jacobian::point(arms), way, law, kept);

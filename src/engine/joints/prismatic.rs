@@ -3,7 +3,7 @@
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
 use crate::engine::bodies::def::finite;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw, add, dot};
+use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw, add, dot};
 use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
@@ -60,7 +60,7 @@ const FRAME: usize = 3;
 ///
 /// The axis turns with a, so that a's arm goes on to the anchor of b: (r_a + way) × d.
 #[inline(always)]
-pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPass<L>) -> ([Jacobian<L>; 2], [L; 2]) {
+pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPair<L>) -> ([Jacobian<L>; 2], [L; 2]) {
     let ([ra, rb], way) = on.anchors();
     let axis = on.turned(0, [numbers[0], numbers[1]]);
     let across = [-axis[1], axis[0]];
@@ -90,7 +90,7 @@ impl JointType for Prismatic {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let ([along, across], [way, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(2);
         Axial::rows(form, along, way, &numbers[FRAME..], kept, on);

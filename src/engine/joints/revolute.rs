@@ -60,7 +60,7 @@ impl JointType for Revolute {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let (point, kept) = kept.split_at_mut(2);
         if Axial::numbers(form) > 0 {
             let angle = numbers[0] + on.turn();

@@ -56,7 +56,7 @@ impl JointType for Weld {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let spring =
             |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
         let (linear, angular) = (form.spring, form.motor);

@@ -80,7 +80,7 @@ impl JointType for Wheel {
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+    fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let [suspension, drive] = split(form);
         let ([along, across], [way, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(1);

@@ -13,7 +13,10 @@ use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
 use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
-use rows::{JointPass, Places, RowBlock, Task};
+use rows::{
+    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, Places, RowBlock, Vectors,
+    Velocities, VelocityRule, WarmStart,
+};
 use std::f32::consts::TAU;
 use std::fmt;
 
@@ -35,7 +38,7 @@ pub trait JointType: Clone + fmt::Debug + Send + 'static {
     fn place(&self, form: Self::Form, at: Placing<'_>, numbers: &mut [f32]);
 
     /// States the rows from its numbers.
-    fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>);
+    fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>);
 }
 
 /// Numbers that every record begins with: `[r_a, r_b, way]` (m), arms from the centers of mass to the anchors, and the way
@@ -217,14 +220,14 @@ impl<T: JointType> Joints<T> {
                 let (numbers, kept) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
                 for driving in [false, true] {
-                    let mut pass = JointPass::new(bodies, anchors, Task::WarmStart { driving });
+                    let mut pass = WarmStart { pair: JointPair::new(bodies, anchors), driving };
                     rows_once::<T, L>(self.form, numbers, kept, &mut pass);
                     for (lane, &joint) in
                         joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate()
                     {
                         let booked = &mut self.booked[joint as usize];
                         let sums = if driving { &mut booked.driving } else { &mut booked.all };
-                        for (sum, body) in sums.iter_mut().zip(&pass.bodies) {
+                        for (sum, body) in sums.iter_mut().zip(&pass.pair.bodies) {
                             for (sum, k) in sum.iter_mut().zip([VX, VY, W]) {
                                 *sum += bytemuck::cast_slice::<L, f32>(&body[k..=k])[lane];
                             }
@@ -236,10 +239,10 @@ impl<T: JointType> Joints<T> {
     }
 
     /// A pass between impulses and vectors.
-    fn vector_pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
+    fn vector_pass<L: Lanes>(&self, of: VectorTask, mut on: TypeInput<'_>) {
         let (first_kept, stride, kept) = (self.first_kept(), self.stride(), T::kept(self.form));
-        let pushes = matches!(task, Task::Vector { of: VectorTask::Push, .. });
-        let [mut x, mut y] = on.vectors.map(|blocks| bytemuck::cast_slice_mut::<Block, L>(blocks));
+        let (law, inv_h, pushes) = (on.law, 1.0 / on.h, matches!(of, VectorTask::Push));
+        let [x, y] = on.vectors.map(|blocks| bytemuck::cast_slice_mut::<Block, L>(blocks));
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let pushed = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
@@ -256,12 +259,11 @@ impl<T: JointType> Joints<T> {
                 let per_block = 16 / L::WIDTH;
                 let first = 2 * kept * (slot / 16) * per_block + slot % 16 / L::WIDTH;
                 let places = Places { first, stride: 2 * per_block, next: 0 };
-                let mut pass = JointPass::new(bodies, anchors, task);
-                pass.vectors = Some(([x, y], places));
+                let pair = JointPair::new(bodies, anchors);
+                let mut pass = Vectors { pair, of, law, inv_h, vectors: [&mut *x, &mut *y], places };
                 rows_once::<T, L>(self.form, numbers, impulses, &mut pass);
                 slot += L::WIDTH;
-                let ([a, b], vectors) = (pass.bodies, pass.vectors);
-                ([x, y], _) = vectors.expect("vectors of this pass");
+                let [a, b] = pass.pair.bodies;
                 if pushes && pushed[1] {
                     on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
                 }
@@ -272,8 +274,26 @@ impl<T: JointType> Joints<T> {
         }
     }
 
+    fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
+        self.pass::<L, _>(on, false, |pair| WarmStart { pair, driving: false });
+    }
+
+    fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
+        self.pass::<L, _>(on, false, |pair| Velocities { pair, by });
+    }
+
+    fn displace<L: Lanes>(&self, by: DisplacementRule, on: TypeInput<'_>) {
+        let moves = matches!(by, DisplacementRule::Position { .. });
+        self.pass::<L, _>(on, moves, |pair| Displacements { pair, by });
+    }
+
     #[inline(never)]
-    fn pass<L: Lanes>(&self, task: Task, mut on: TypeInput<'_>) {
+    fn pass<L: Lanes, P: JointPass<L>>(
+        &self,
+        mut on: TypeInput<'_>,
+        moves: bool,
+        of: impl Fn(JointPair<L>) -> P,
+    ) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
@@ -286,10 +306,10 @@ impl<T: JointType> Joints<T> {
                 let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
                 let (numbers, kept) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
-                let mut pass = JointPass::new(bodies, anchors, task);
+                let mut pass = of(JointPair::new(bodies, anchors));
                 T::rows(self.form, numbers, kept, &mut pass);
                 let [a, b] = pass.bodies;
-                if matches!(task, Task::Position { .. }) {
+                if moves {
                     if pushes[1] {
                         on.rows.scatter_delta::<L>(row_b, [b[DX], b[DY], b[TURN], b[INV_INERTIA]]);
                     }
@@ -310,12 +330,12 @@ impl<T: JointType> Joints<T> {
 }
 
 impl<T: JointType> Joints<T> {
-    /// The pass over one joint, in one lane.
-    fn alone<'v>(&self, i: usize, Placed { rows, poses }: Placed<'_>, task: Task) -> JointPass<'v, f32> {
-        let [a, b] = self.ends[i];
+    /// States the rows of one joint, in one lane, to a pass over `blocks`.
+    fn state(&mut self, joint: usize, Placed { rows, poses }: Placed<'_>, blocks: Blocks<'_>) {
+        let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
         let [a, b] = names.map(|body| body as usize);
-        let Quad([ax, ay, bx, by]) = self.anchors[i];
+        let Quad([ax, ay, bx, by]) = self.anchors[joint];
         let turned = |body: usize, [x, y]: [f32; 2]| {
             let [cos, sin, ..] = poses[body].rotation;
             [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
@@ -324,23 +344,22 @@ impl<T: JointType> Joints<T> {
             (turned(a, [ax, ay]), turned(b, [bx, by]), poses[a].position, poses[b].position);
         let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
         let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
-        let mut pass = JointPass::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]], task);
-        pass.names = names;
-        pass
-    }
-
-    /// States the rows of a joint to `pass`.
-    fn state(&mut self, joint: usize, pass: &mut JointPass<'_, f32>) {
+        let pair = JointPair::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let (numbers, kept) =
             (&self.numbers[joint * numbers..][..numbers], &mut self.kept[joint * kept..][..kept]);
-        rows_once::<T, f32>(self.form, numbers, kept, pass);
+        rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
     }
 }
 
 /// [`JointType::rows`] where speed does not matter: compiled once.
 #[inline(never)]
-fn rows_once<T: JointType, L: Lanes>(form: T::Form, numbers: &[L], kept: &mut [L], on: &mut JointPass<L>) {
+fn rows_once<T: JointType, L: Lanes>(
+    form: T::Form,
+    numbers: &[L],
+    kept: &mut [L],
+    on: &mut impl JointPass<L>,
+) {
     T::rows(form, numbers, kept, on);
 }
 
@@ -380,52 +399,48 @@ impl<T: JointType> ConstraintType for Joints<T> {
     fn run(&mut self, on: TypeInput<'_>) {
         let width = on.width.width;
         let inv_h = 1.0 / on.h;
-        let task = match (on.phase, on.mode) {
-            (_, PassMode::Masses) => return,
-            (_, PassMode::Vector(of)) => {
-                return at_width!(
-                    width,
-                    Self::vector_pass(self, Task::Vector { of, law: on.law, inv_h }, on)
-                );
-            }
-            (_, PassMode::Forget) => return at_width!(width, Self::forget(self, on)),
+        match (on.phase, on.mode) {
+            (_, PassMode::Masses) => {}
+            (_, PassMode::Vector(of)) => at_width!(width, Self::vector_pass(self, of, on)),
+            (_, PassMode::Forget) => at_width!(width, Self::forget(self, on)),
             (_, PassMode::Book) => {
                 self.booked.resize(self.joints.len(), Booked::default());
-                return at_width!(width, Self::book(self, on));
+                at_width!(width, Self::book(self, on));
             }
-            (Phase::Prepare, _) => return at_width!(width, Self::fill(self, on)),
-            (Phase::Store, _) => return at_width!(width, Self::store(self, on)),
-            (Phase::WarmStart, _) => Task::WarmStart { driving: false },
+            (Phase::Prepare, _) => at_width!(width, Self::fill(self, on)),
+            (Phase::Store, _) => at_width!(width, Self::store(self, on)),
+            (Phase::WarmStart, _) => at_width!(width, Self::warm_start(self, on)),
             (_, PassMode::Position { max_correction, impulses }) => {
-                Task::Position { max_correction, inv_h: if impulses { inv_h } else { 0.0 } }
+                let by =
+                    DisplacementRule::Position { max_correction, inv_h: if impulses { inv_h } else { 0.0 } };
+                at_width!(width, Self::displace(self, by, on))
             }
-            (Phase::Position, _) => Task::Push { law: on.law },
-            (Phase::Solve | Phase::Relax, mode) => Task::Velocity {
-                law: on.law,
-                acts: match mode {
-                    PassMode::Drive => [false, true],
-                    _ => [true, !on.driven],
-                },
-                relaxing: on.phase == Phase::Relax,
-                relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
-                inv_h,
-            },
-            _ => return,
-        };
-        at_width!(width, Self::pass(self, task, on))
+            (Phase::Position, _) => {
+                at_width!(width, Self::displace(self, DisplacementRule::Push { law: on.law }, on))
+            }
+            (Phase::Solve | Phase::Relax, mode) => {
+                let by = VelocityRule {
+                    law: on.law,
+                    acts: match mode {
+                        PassMode::Drive => [false, true],
+                        _ => [true, !on.driven],
+                    },
+                    relaxing: on.phase == Phase::Relax,
+                    relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
+                    inv_h,
+                };
+                at_width!(width, Self::sweep(self, by, on))
+            }
+            _ => {}
+        }
     }
 
     fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
-        let mut pass = self.alone(constraint, on, Task::Collect);
-        pass.blocks = Some(to);
-        self.state(constraint, &mut pass);
+        self.state(constraint, on, Blocks::To(to));
     }
 
     fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
-        let mut pass = self.alone(constraint, on, Task::Replace);
-        let mut reversed: Vec<RowBlock> = blocks.iter().rev().copied().collect();
-        pass.blocks = Some(&mut reversed);
-        self.state(constraint, &mut pass);
+        self.state(constraint, on, Blocks::From(blocks.iter()));
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {

@@ -51,6 +51,7 @@ use crate::engine::constraints::records::rows::ROWS;
 pub use crate::engine::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
 use crate::engine::lanes::Lanes;
 use std::f32::consts::TAU;
+use std::ops::Deref;
 
 /// S and D of a spring of `hertz` and `damping_ratio` in substeps of `h` (s).
 pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
@@ -73,81 +74,49 @@ pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
     [y * y / h, (damping + unresolved).min(1e9)]
 }
 
-/// What a pass does with blocks.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Task {
-    /// Applies accumulated impulses: of all rows, or only of springs and motors.
-    WarmStart {
-        /// Springs and motors alone.
-        driving: bool,
-    },
-    /// Solves velocities.
-    Velocity {
-        /// Of rigid rows.
-        law: Softness,
-        /// Whether bodies have moved since springs were read.
-        relaxing: bool,
-        /// Whether rigid rows and limits act, and whether springs and motors do.
-        acts: [bool; 2],
-        /// Factor on increments of impulses (1).
-        relaxation: f32,
-        /// 1/h (1/s)
-        inv_h: f32,
-    },
-    /// Solves velocities that only move bodies; accumulates nothing.
-    Push {
-        /// Of rigid rows.
-        law: Softness,
-    },
-    /// Reads or writes vectors.
-    Vector {
-        /// What it does.
-        of: VectorTask,
-        /// Of rigid rows.
-        law: Softness,
-        /// 1/h (1/s)
-        inv_h: f32,
-    },
-    /// Appends the blocks of the first lane to [`JointPass::blocks`].
-    Collect,
-    /// Takes the impulses of the first lane from [`JointPass::blocks`], the last one first.
-    Replace,
-    /// Moves bodies until errors are gone.
-    Position {
-        /// Largest correction (m or rad).
-        max_correction: f32,
-        /// 1/h, where displacements are impulses (1/s); else 0.
-        inv_h: f32,
-    },
+/// What a joint type states its rows to, [`JointType::rows`](super::JointType::rows): one pass over its joints.
+pub trait JointPass<L: Lanes>: Deref<Target = JointPair<L>> {
+    /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s), behind which
+    /// are N numbers more.
+    fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]);
+
+    /// One row of a rigid or limited error, a motor or a spring; see [`Self::block`].
+    #[inline(always)]
+    fn row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L]) {
+        self.block([j], [error], law, kept);
+    }
 }
 
-/// Where the rows of a batch are in vectors, in lane vectors.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Places {
-    /// Of its first row.
-    pub first: usize,
-    /// From row to row.
-    pub stride: usize,
-    /// Rows that have been visited.
-    pub next: usize,
+/// Passes are the pair that they work on.
+macro_rules! is_pair {
+    ($($pass:ident<$($generic:tt),*>)*) => {$(
+        impl<$($generic),*> Deref for $pass<$($generic),*> {
+            type Target = JointPair<L>;
+            #[inline(always)]
+            fn deref(&self) -> &JointPair<L> {
+                &self.pair
+            }
+        }
+    )*};
+}
+is_pair! { WarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
+
+impl Deref for Collected<'_> {
+    type Target = JointPair<f32>;
+    fn deref(&self) -> &JointPair<f32> {
+        &self.pair
+    }
 }
 
-/// The two bodies of a batch of joints, and what the pass does with their rows.
-#[derive(Debug)]
-pub struct JointPass<'v, L> {
+/// The two bodies of a batch of joints, and where they are joined.
+#[derive(Clone, Copy, Debug)]
+pub struct JointPair<L> {
     /// Rows of a and b.
     pub(crate) bodies: [[L; 8]; 2],
     /// sin Δθ and 1 − cos Δθ of a and b.
     turns: [(L, L); 2],
     /// See [`ANCHORS`].
     anchors: [L; ANCHORS],
-    task: Task,
-    /// See [`Task::Collect`].
-    pub(super) blocks: Option<&'v mut Vec<RowBlock>>,
-    /// x and y of [`Task::Vector`].
-    pub(super) vectors: Option<([&'v mut [L]; 2], Places)>,
-    /// Of the bodies of a joint alone.
-    pub(super) names: [u32; 2],
 }
 
 /// u·v
@@ -162,12 +131,11 @@ pub fn add<L: Lanes>(u: [L; 2], v: [L; 2]) -> [L; 2] {
     [u[0] + v[0], u[1] + v[1]]
 }
 
-impl<'v, L: Lanes> JointPass<'v, L> {
+impl<L: Lanes> JointPair<L> {
     #[inline(always)]
-    pub(crate) fn new(bodies: [[L; 8]; 2], anchors: &[L], task: Task) -> Self {
+    pub(crate) fn new(bodies: [[L; 8]; 2], anchors: &[L]) -> Self {
         let anchors = [anchors[0], anchors[1], anchors[2], anchors[3], anchors[4], anchors[5]];
-        let turns = [turn(bodies[0][TURN]), turn(bodies[1][TURN])];
-        JointPass { bodies, turns, anchors, task, blocks: None, vectors: None, names: [u32::MAX; 2] }
+        JointPair { bodies, turns: [turn(bodies[0][TURN]), turn(bodies[1][TURN])], anchors }
     }
 
     /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
@@ -251,39 +219,234 @@ impl<'v, L: Lanes> JointPass<'v, L> {
     fn solved<const N: usize>(&self, j: &[Jacobian<L>; N], x: [L; N]) -> [L; N] {
         solve(self.response(j), x)
     }
+}
 
-    /// The same bodies and anchors.
+const VELOCITY: [usize; 3] = [VX, VY, W];
+
+/// Applies accumulated impulses.
+#[derive(Debug)]
+pub(super) struct WarmStart<L> {
+    pub pair: JointPair<L>,
+    /// Springs and motors alone.
+    pub driving: bool,
+}
+
+impl<L: Lanes> JointPass<L> for WarmStart<L> {
     #[inline(always)]
-    fn copied(&self) -> JointPass<'v, L> {
-        let &JointPass { bodies, turns, anchors, task, names, .. } = self;
-        JointPass { bodies, turns, anchors, task, blocks: None, vectors: None, names }
+    fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], _: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        if self.driving && matches!(law, RowLaw::Rigid | RowLaw::Limit) {
+            return;
+        }
+        for (j, &impulse) in j.iter().zip(kept.iter()) {
+            self.pair.apply(j, impulse, VELOCITY);
+        }
     }
+}
 
-    /// What a block has in vectors.
-    ///
+/// Solves velocities.
+#[derive(Debug)]
+pub(super) struct Velocities<L> {
+    pub pair: JointPair<L>,
+    pub by: VelocityRule,
+}
+
+/// How velocities are solved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VelocityRule {
+    /// Of rigid rows.
+    pub law: Softness,
+    /// Whether bodies have moved since springs were read.
+    pub relaxing: bool,
+    /// Whether rigid rows and limits act, and whether springs and motors do.
+    pub acts: [bool; 2],
+    /// Factor on increments of impulses (1).
+    pub relaxation: f32,
+    /// 1/h (1/s)
+    pub inv_h: f32,
+}
+
+impl<L: Lanes> JointPass<L> for Velocities<L> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        let (impulse, held) = kept.split_at_mut(N);
+        let VelocityRule { law: solver, relaxing, relaxation, inv_h, acts } = self.by;
+        let drives = matches!(law, RowLaw::Motor { .. } | RowLaw::Spring { .. });
+        if !acts[usize::from(drives)] {
+            return;
+        }
+        let one = L::splat(1.0);
+        let mut error = error;
+        let mut speed = L::zero();
+        let mut cap = None;
+        let rigid = [
+            L::splat(1.0 - solver.impulse_scale),
+            L::splat(solver.mass_scale * solver.bias_rate),
+            L::splat(solver.mass_scale),
+        ];
+        let [alpha, p, q] = match law {
+            RowLaw::Rigid => rigid,
+            RowLaw::Limit => {
+                let open = [one, L::splat(inv_h), one];
+                let of = |i: usize| error[0].select_positive(open[i], rigid[i]);
+                [of(0), of(1), of(2)]
+            }
+            RowLaw::Motor { speed: wanted, cap: bound } => {
+                (speed, cap) = (wanted, Some(bound));
+                [one, L::zero(), one]
+            }
+            RowLaw::Spring { stiffness, damping, cap: bound } => {
+                cap = bound;
+                if relaxing {
+                    error.copy_from_slice(&held[..N]);
+                } else {
+                    held[..N].copy_from_slice(&error);
+                }
+                let scale = one / (one + damping);
+                [damping * scale, stiffness * scale, damping * scale]
+            }
+        };
+        let mut x = error;
+        for i in 0..N {
+            x[i] = p.mul_add(error[i], q * (self.pair.rate(&j[i], VELOCITY) - speed));
+        }
+        let x = self.pair.solved(&j, x);
+        let mut new = x;
+        for i in 0..N {
+            let line = alpha.mul_add(impulse[i], -x[i]);
+            new[i] = L::splat(relaxation).mul_add(line - impulse[i], impulse[i]);
+        }
+        if matches!(law, RowLaw::Limit) {
+            new[0] = new[0].max(L::zero());
+        }
+        if let Some(cap) = cap {
+            let norm = new.iter().fold(L::zero(), |sum, &x| x.mul_add(x, sum)).sqrt();
+            let scale = (norm - cap).select_positive(cap / norm, one);
+            for x in &mut new {
+                *x = *x * scale;
+            }
+        }
+        for i in 0..N {
+            self.pair.apply(&j[i], new[i] - impulse[i], VELOCITY);
+            impulse[i] = new[i];
+        }
+    }
+}
+
+/// Moves bodies alone.
+#[derive(Debug)]
+pub(super) struct Displacements<L> {
+    pub pair: JointPair<L>,
+    pub by: DisplacementRule,
+}
+
+/// How bodies are moved.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum DisplacementRule {
+    /// By velocities that only move bodies; accumulates nothing.
+    Push {
+        /// Of rigid rows.
+        law: Softness,
+    },
+    /// Until errors are gone.
+    Position {
+        /// Largest correction (m or rad).
+        max_correction: f32,
+        /// 1/h, where displacements are impulses (1/s); else 0.
+        inv_h: f32,
+    },
+}
+
+impl<L: Lanes> JointPass<L> for Displacements<L> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        let impulse = &mut kept[..N];
+        match self.by {
+            DisplacementRule::Push { law: solver } => {
+                let mut x = error;
+                let is_limit = match law {
+                    RowLaw::Rigid => false,
+                    RowLaw::Limit => true,
+                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
+                };
+                for i in 0..N {
+                    let bias = L::splat(solver.bias_rate) * error[i];
+                    x[i] = L::splat(-solver.mass_scale) * (self.pair.rate(&j[i], VELOCITY) + bias);
+                }
+                let mut x = self.pair.solved(&j, x);
+                if is_limit {
+                    x[0] = error[0].select_positive(L::zero(), x[0].max(L::zero()));
+                }
+                for i in 0..N {
+                    self.pair.apply(&j[i], x[i], VELOCITY);
+                }
+            }
+            DisplacementRule::Position { max_correction, inv_h } => {
+                let mut x = error;
+                match law {
+                    RowLaw::Rigid => {}
+                    RowLaw::Limit => x[0] = x[0].min(L::zero()),
+                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
+                }
+                let bound = L::splat(max_correction);
+                let x = self.pair.solved(&j, x.map(|x| (-x).min(bound).max(-bound)));
+                for i in 0..N {
+                    self.pair.apply(&j[i], x[i], [DX, DY, TURN]);
+                    impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);
+                }
+            }
+        }
+    }
+}
+
+/// Reads or writes vectors.
+#[derive(Debug)]
+pub(super) struct Vectors<'v, L> {
+    pub pair: JointPair<L>,
+    /// What it does.
+    pub of: VectorTask,
+    /// Of rigid rows.
+    pub law: Softness,
+    /// 1/h (1/s)
+    pub inv_h: f32,
+    /// x and y.
+    pub vectors: [&'v mut [L]; 2],
+    pub places: Places,
+}
+
+/// Where the rows of a batch are in vectors, in lane vectors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    /// Of its first row.
+    pub first: usize,
+    /// From row to row.
+    pub stride: usize,
+    /// Rows that have been visited.
+    pub next: usize,
+}
+
+impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
     /// A row asks for J v + b + R λ = 0 within its bounds: b = β C where it is rigid, C/h where a limit is open, −u of a
     /// motor, and b = (S/D) C, R = K/D of a spring, which is the line of the [module](self) at rest.
     #[inline(never)]
-    fn vector_block<const N: usize>(
+    fn block<const N: usize>(
         &mut self,
         j: [Jacobian<L>; N],
         error: [L; N],
         law: RowLaw<L>,
         impulse: &mut [L],
     ) {
-        const VELOCITY: [usize; 3] = [VX, VY, W];
-        let Task::Vector { of, law: solver, inv_h } = self.task else { return };
-        let Some(([x, y], mut places)) = self.vectors.take() else { return };
-        let at = |i: usize| places.first + (places.next + i) * places.stride;
+        let Vectors { pair, of, law: solver, inv_h, vectors: [x, y], places } = self;
+        let (first, stride) = (places.first + places.next * places.stride, places.stride);
+        let at = |i: usize| first + i * stride;
         let one = L::splat(1.0);
         let least = L::splat(1e-9);
         match of {
             VectorTask::Impulses => (0..N).for_each(|i| x[at(i)] = impulse[i]),
             VectorTask::SetImpulses => (0..N).for_each(|i| impulse[i] = x[at(i)]),
-            VectorTask::Velocities => (0..N).for_each(|i| x[at(i)] = self.rate(&j[i], VELOCITY)),
-            VectorTask::Push => (0..N).for_each(|i| self.apply(&j[i], x[at(i)], VELOCITY)),
+            VectorTask::Velocities => (0..N).for_each(|i| x[at(i)] = pair.rate(&j[i], VELOCITY)),
+            VectorTask::Push => (0..N).for_each(|i| pair.apply(&j[i], x[at(i)], VELOCITY)),
             VectorTask::Masses => {
-                let k = self.response(&j);
+                let k = pair.response(&j);
                 let more = match law {
                     RowLaw::Spring { damping, .. } => one + one / damping.max(least),
                     _ => one,
@@ -298,7 +461,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
                 for i in 0..N {
                     x[at(i)] = match law {
                         RowLaw::Rigid => rigid * error[i],
-                        RowLaw::Limit => error[i].select_positive(L::splat(inv_h), rigid) * error[i],
+                        RowLaw::Limit => error[i].select_positive(L::splat(*inv_h), rigid) * error[i],
                         RowLaw::Motor { speed, .. } => -speed,
                         RowLaw::Spring { stiffness, damping, .. } => {
                             stiffness / damping.max(least) * error[i]
@@ -308,7 +471,7 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             }
             VectorTask::Soften => {
                 if let RowLaw::Spring { damping, .. } = law {
-                    let (k, scale) = (self.response(&j), one / damping.max(least));
+                    let (k, scale) = (pair.response(&j), one / damping.max(least));
                     for r in 0..N {
                         for c in 0..N {
                             let k = k[r.max(c)][r.min(c)];
@@ -335,21 +498,47 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             }
         }
         places.next += N;
-        self.vectors = Some(([x, y], places));
     }
+}
 
-    /// A block of the first lane.
+/// Copies the blocks of one joint, or takes their impulses back.
+#[derive(Debug)]
+pub(super) struct Collected<'v> {
+    pub pair: JointPair<f32>,
+    /// The two bodies.
+    pub names: [u32; 2],
+    pub blocks: Blocks<'v>,
+}
+
+/// Which way blocks go.
+#[derive(Debug)]
+pub(super) enum Blocks<'v> {
+    /// Appended.
+    To(&'v mut Vec<RowBlock>),
+    /// One after the other.
+    From(std::slice::Iter<'v, RowBlock>),
+}
+
+impl JointPass<f32> for Collected<'_> {
     #[inline(never)]
-    fn collected<const N: usize>(
-        &self,
-        j: [Jacobian<L>; N],
-        error: [L; N],
-        law: RowLaw<L>,
-        impulse: &[L],
-    ) -> RowBlock {
-        let first = |x: L| bytemuck::cast_slice::<L, f32>(&[x])[0];
+    fn block<const N: usize>(
+        &mut self,
+        j: [Jacobian<f32>; N],
+        error: [f32; N],
+        law: RowLaw<f32>,
+        impulse: &mut [f32],
+    ) {
+        let to = match &mut self.blocks {
+            Blocks::To(to) => to,
+            Blocks::From(from) => {
+                if let Some(block) = from.next() {
+                    impulse[..N].copy_from_slice(&block.impulses[..N]);
+                }
+                return;
+            }
+        };
+        let pair = &self.pair;
         let none = Jacobian { axis: [0.0; 2], arms: [0.0; 2] };
-        let (arms, _) = self.anchors();
         let mut block = RowBlock {
             bodies: self.names,
             size: N,
@@ -357,162 +546,21 @@ impl<'v, L: Lanes> JointPass<'v, L> {
             response: [[0.0; ROWS]; ROWS],
             errors: [0.0; ROWS],
             travel: [0.0; ROWS],
-            law: law.map(first),
+            law,
             impulses: [0.0; ROWS],
-            reach: arms.map(|arm| first(dot(arm, arm)).sqrt()),
+            reach: pair.anchors().0.map(|arm| dot(arm, arm).sqrt()),
         };
-        let k = self.response(&j);
+        block.jacobians[..N].copy_from_slice(&j);
+        block.errors[..N].copy_from_slice(&error);
+        block.impulses[..N].copy_from_slice(&impulse[..N]);
+        let k = pair.response(&j);
         for r in 0..N {
-            block.jacobians[r] = Jacobian { axis: j[r].axis.map(first), arms: j[r].arms.map(first) };
-            block.errors[r] = first(error[r]);
-            block.travel[r] = first(self.travel(&j[r]));
-            block.impulses[r] = first(impulse[r]);
-            for (c, &k) in k[r].iter().enumerate().take(r + 1) {
-                (block.response[r][c], block.response[c][r]) = (first(k), first(k));
+            block.travel[r] = pair.travel(&j[r]);
+            for c in 0..=r {
+                (block.response[r][c], block.response[c][r]) = (k[r][c], k[r][c]);
             }
         }
-        block
-    }
-
-    /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s).
-    #[inline(always)]
-    pub fn block<const N: usize>(
-        &mut self,
-        j: [Jacobian<L>; N],
-        error: [L; N],
-        law: RowLaw<L>,
-        kept: &mut [L],
-    ) {
-        const VELOCITY: [usize; 3] = [VX, VY, W];
-        let (impulse, held) = kept.split_at_mut(N);
-        match self.task {
-            Task::WarmStart { driving } => {
-                if driving && matches!(law, RowLaw::Rigid | RowLaw::Limit) {
-                    return;
-                }
-                for (j, &impulse) in j.iter().zip(impulse.iter()) {
-                    self.apply(j, impulse, VELOCITY);
-                }
-            }
-            Task::Velocity { law: solver, relaxing, relaxation, inv_h, acts } => {
-                let drives = matches!(law, RowLaw::Motor { .. } | RowLaw::Spring { .. });
-                if !acts[usize::from(drives)] {
-                    return;
-                }
-                let one = L::splat(1.0);
-                let mut error = error;
-                let mut speed = L::zero();
-                let mut cap = None;
-                let rigid = [
-                    L::splat(1.0 - solver.impulse_scale),
-                    L::splat(solver.mass_scale * solver.bias_rate),
-                    L::splat(solver.mass_scale),
-                ];
-                let [alpha, p, q] = match law {
-                    RowLaw::Rigid => rigid,
-                    RowLaw::Limit => {
-                        let open = [one, L::splat(inv_h), one];
-                        let of = |i: usize| error[0].select_positive(open[i], rigid[i]);
-                        [of(0), of(1), of(2)]
-                    }
-                    RowLaw::Motor { speed: wanted, cap: bound } => {
-                        (speed, cap) = (wanted, Some(bound));
-                        [one, L::zero(), one]
-                    }
-                    RowLaw::Spring { stiffness, damping, cap: bound } => {
-                        cap = bound;
-                        if relaxing {
-                            error.copy_from_slice(&held[..N]);
-                        } else {
-                            held[..N].copy_from_slice(&error);
-                        }
-                        let scale = one / (one + damping);
-                        [damping * scale, stiffness * scale, damping * scale]
-                    }
-                };
-                let mut x = error;
-                for i in 0..N {
-                    x[i] = p.mul_add(error[i], q * (self.rate(&j[i], VELOCITY) - speed));
-                }
-                let x = self.solved(&j, x);
-                let mut new = x;
-                for i in 0..N {
-                    let line = alpha.mul_add(impulse[i], -x[i]);
-                    new[i] = L::splat(relaxation).mul_add(line - impulse[i], impulse[i]);
-                }
-                if matches!(law, RowLaw::Limit) {
-                    new[0] = new[0].max(L::zero());
-                }
-                if let Some(cap) = cap {
-                    let norm = new.iter().fold(L::zero(), |sum, &x| x.mul_add(x, sum)).sqrt();
-                    let scale = (norm - cap).select_positive(cap / norm, one);
-                    for x in &mut new {
-                        *x = *x * scale;
-                    }
-                }
-                for i in 0..N {
-                    self.apply(&j[i], new[i] - impulse[i], VELOCITY);
-                    impulse[i] = new[i];
-                }
-            }
-            Task::Push { law: solver } => {
-                let mut x = error;
-                let is_limit = match law {
-                    RowLaw::Rigid => false,
-                    RowLaw::Limit => true,
-                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
-                };
-                for i in 0..N {
-                    let bias = L::splat(solver.bias_rate) * error[i];
-                    x[i] = L::splat(-solver.mass_scale) * (self.rate(&j[i], VELOCITY) + bias);
-                }
-                let mut x = self.solved(&j, x);
-                if is_limit {
-                    x[0] = error[0].select_positive(L::zero(), x[0].max(L::zero()));
-                }
-                for i in 0..N {
-                    self.apply(&j[i], x[i], VELOCITY);
-                }
-            }
-            // On a copy: what is called by reference stays in memory, and sweeps have their bodies in registers.
-            Task::Vector { .. } => {
-                let mut alone = self.copied();
-                alone.vectors = self.vectors.take();
-                alone.vector_block(j, error, law, impulse);
-                (self.bodies, self.vectors) = (alone.bodies, alone.vectors);
-            }
-            Task::Collect => {
-                let block = self.copied().collected(j, error, law, impulse);
-                if let Some(blocks) = self.blocks.as_deref_mut() {
-                    blocks.push(block);
-                }
-            }
-            Task::Replace => {
-                if let Some(block) = self.blocks.as_deref_mut().and_then(Vec::pop) {
-                    impulse.iter_mut().zip(block.impulses).for_each(|(to, from)| *to = L::splat(from));
-                }
-            }
-            Task::Position { max_correction, inv_h } => {
-                let mut x = error;
-                match law {
-                    RowLaw::Rigid => {}
-                    RowLaw::Limit => x[0] = x[0].min(L::zero()),
-                    RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
-                }
-                let bound = L::splat(max_correction);
-                let x = self.solved(&j, x.map(|x| (-x).min(bound).max(-bound)));
-                for i in 0..N {
-                    self.apply(&j[i], x[i], [DX, DY, TURN]);
-                    impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);
-                }
-            }
-        }
-    }
-
-    /// One row of a rigid or limited error, a motor or a spring; see [`Self::block`].
-    #[inline(always)]
-    pub fn row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L]) {
-        self.block([j], [error], law, kept);
+        to.push(block);
     }
 }
 

@@ -101,19 +101,6 @@ pub fn cross<L: Lanes>(r: [L; 2], d: [L; 2]) -> L {
     r[0].mul_add(d[1], -(r[1] * d[0]))
 }
 
-impl<L> RowLaw<L> {
-    /// The same law of other numbers.
-    pub(crate) fn map<M>(self, f: impl Fn(L) -> M) -> RowLaw<M> {
-        match self {
-            RowLaw::Rigid => RowLaw::Rigid,
-            RowLaw::Limit => RowLaw::Limit,
-            RowLaw::Motor { speed, cap } => RowLaw::Motor { speed: f(speed), cap: f(cap) },
-            RowLaw::Spring { stiffness, damping, cap } => {
-                RowLaw::Spring { stiffness: f(stiffness), damping: f(damping), cap: cap.map(f) }
-            }
-        }
-    }
-}
 
 impl RowBlock {
     /// K⁻¹ x
