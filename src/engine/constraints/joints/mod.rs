@@ -14,8 +14,8 @@ use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed,
 use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
 use rows::{
-    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, Places, RowBlock, Vectors,
-    Velocities, VelocityRule, WarmStart,
+    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart, Places,
+    RowBlock, Vectors, Velocities, VelocityRule,
 };
 use std::f32::consts::TAU;
 use std::fmt;
@@ -220,7 +220,7 @@ impl<T: JointType> Joints<T> {
                 let (numbers, kept) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
                 for driving in [false, true] {
-                    let mut pass = WarmStart { pair: JointPair::new(bodies, anchors), driving };
+                    let mut pass = JointWarmStart { pair: JointPair::new(bodies, anchors), driving };
                     rows_once::<T, L>(self.form, numbers, kept, &mut pass);
                     for (lane, &joint) in
                         joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate()
@@ -275,7 +275,7 @@ impl<T: JointType> Joints<T> {
     }
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
-        self.pass::<L, _>(on, false, |pair| WarmStart { pair, driving: false });
+        self.pass::<L, _>(on, false, |pair| JointWarmStart { pair, driving: false });
     }
 
     fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {

@@ -99,7 +99,7 @@ macro_rules! is_pair {
         }
     )*};
 }
-is_pair! { WarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
+is_pair! { JointWarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
 
 impl Deref for Collected<'_> {
     type Target = JointPair<f32>;
@@ -225,13 +225,13 @@ const VELOCITY: [usize; 3] = [VX, VY, W];
 
 /// Applies accumulated impulses.
 #[derive(Debug)]
-pub(super) struct WarmStart<L> {
+pub(super) struct JointWarmStart<L> {
     pub pair: JointPair<L>,
     /// Springs and motors alone.
     pub driving: bool,
 }
 
-impl<L: Lanes> JointPass<L> for WarmStart<L> {
+impl<L: Lanes> JointPass<L> for JointWarmStart<L> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], _: [L; N], law: RowLaw<L>, kept: &mut [L]) {
         if self.driving && matches!(law, RowLaw::Rigid | RowLaw::Limit) {

@@ -101,7 +101,6 @@ pub fn cross<L: Lanes>(r: [L; 2], d: [L; 2]) -> L {
     r[0].mul_add(d[1], -(r[1] * d[0]))
 }
 
-
 impl RowBlock {
     /// K⁻¹ x
     pub fn solved(&self, x: [f32; ROWS]) -> [f32; ROWS] {
