@@ -1,7 +1,7 @@
 //! What the race and the check ask of an engine, and the settings it runs with.
 
 use simpulse::engine::broadphase::BroadPhaseKind;
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::{LaneWidth, native_width};
 
 /// A scene inside an engine: one thread, no sleeping.
 pub trait Engine {
@@ -102,7 +102,7 @@ pub enum Maker {
     Rapier,
     /// `soft_step` at a width of ours.
     Simpulse(LaneWidth, BroadPhaseKind),
-    /// Another solver of ours at its own parameters, 16 lanes.
+    /// Another solver of ours at its own parameters, at the width of the CPU.
     Solver(&'static str),
 }
 
@@ -128,7 +128,7 @@ impl Contender {
         match self.maker {
             Maker::Box2d => "Box2D x8".into(),
             Maker::Rapier => "rapier x8".into(),
-            Maker::Solver(name) => format!("our {name} x16"),
+            Maker::Solver(name) => format!("our {name} x{}", native_width().lanes()),
             Maker::Simpulse(width, BroadPhaseKind::HashGrid) => format!("simpulse x{} grid", width.lanes()),
             Maker::Simpulse(width, _) => format!("simpulse x{}", width.lanes()),
         }
@@ -158,11 +158,13 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     let main = if quick { &default[..] } else { &every[..] };
     add(Maker::Box2d, main);
     add(Maker::Rapier, main);
-    add(ours(LaneWidth::W16), main);
+    let native = native_width();
+    add(ours(native), main);
     let widths = if quick { &default[..] } else { &every[..3] };
-    add(ours(LaneWidth::W8), widths);
-    add(ours(LaneWidth::W4), widths);
-    add(Maker::Simpulse(LaneWidth::W16, BroadPhaseKind::HashGrid), &default);
+    for width in [LaneWidth::W16, LaneWidth::W8, LaneWidth::W4].into_iter().filter(|&w| w != native) {
+        add(ours(width), widths);
+    }
+    add(Maker::Simpulse(native, BroadPhaseKind::HashGrid), &default);
     // Contact frequencies of `shim` are its own affair; the others are those engines' methods here.
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
     add(Maker::Solver("box2d"), &default);

@@ -3,7 +3,7 @@
 use crate::engine::{Contender, Engine, Stage, State};
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::clock::Phase;
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::{LaneWidth, native_width};
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
@@ -28,10 +28,10 @@ impl Simpulse {
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
 
-    /// Another solver at the widest lanes and its own parameters. Errors: as above.
+    /// Another solver at the width of the CPU and its own parameters. Errors: as above.
     pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
-        let own = Settings::new(solver).exactly(LaneWidth::W16);
+        let own = Settings::new(solver).exactly(native_width());
         let mut settings = Settings { continuous: contender.continuous, ..own };
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))

@@ -13,7 +13,7 @@ use crate::engine::{Contender, Engine, Maker, Stage};
 use crate::ours::Simpulse;
 use crate::rapier::Rapier;
 use simpulse::engine::clock::waited;
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::native_width;
 use simpulse::lab::scenes::{self, Scene};
 use std::ops::Range;
 use std::time::Instant;
@@ -116,7 +116,7 @@ pub struct Outcome {
     pub waited: f64,
     /// ms per step and stage with the clocks on, and of the whole step.
     pub stages: Option<Breakdown>,
-    /// Time of the whole run against simpulse's widest lanes at as many substeps.
+    /// Time of the whole run against `soft_step` at the width of the CPU and as many substeps.
     pub ratio: Option<f64>,
     /// Block by block the same of warm start, solve, relax and integrate alone.
     pub stages_ratio: Option<Quartiles>,
@@ -246,9 +246,9 @@ pub fn race(
     Ok(errors.into_iter().zip(counts).enumerate().map(outcome).collect())
 }
 
-/// Simpulse's widest lanes at the same settings, without options.
+/// `soft_step` at the width of the CPU and the same settings, without options.
 fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
-    let maker = Maker::Simpulse(LaneWidth::W16, Default::default());
+    let maker = Maker::Simpulse(native_width(), Default::default());
     contenders.iter().position(|c| *c == Contender { maker, recycling: true, ..*of })
 }
 

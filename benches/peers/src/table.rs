@@ -107,20 +107,21 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
                         && (!stands || e.rms_velocity <= ALLOWED * bound.rms_velocity)
                 })
         };
-        let time = |o: &&Outcome| o.step.map_or(f64::INFINITY, |s| s.mean);
-        let best = outcomes.iter().filter(fits).min_by(|a, b| time(a).total_cmp(&time(b)));
-        lines.push(match best {
-            Some(o) => {
-                format!("{}, {}: {} ms", o.contender.name(), o.contender.setting(), significant(time(&o)))
+        let fitting: Vec<&Outcome> = outcomes.iter().filter(fits).collect();
+        let timed = fitting.iter().filter_map(|o| Some((o, o.step.as_ref()?.mean)));
+        lines.push(match timed.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((o, mean)) => {
+                format!("{}, {}: {} ms", o.contender.name(), o.contender.setting(), significant(mean))
             }
-            None => format!("{family}: no setting"),
+            None if fitting.is_empty() => format!("{family}: no setting"),
+            None => format!("{family}: no time, the machine was busy"),
         });
     }
     lines
 }
 
 /// One scene in the summary of all, in Markdown: defaults (n = 4) of all three engines, ours at
-/// its widest; ratios of whole runs, longest steps, and errors of the last second.
+/// the width of the CPU; ratios of whole runs, longest steps, and errors of the last second.
 pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
     let of = |family: &str| {
         outcomes.iter().find(|o| {
