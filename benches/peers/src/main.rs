@@ -66,6 +66,9 @@ struct Args {
     /// The campaign of `simpulse torture` instead: so many random scenes under Box2D and rapier
     #[arg(long, value_name = "N")]
     torture: Option<u32>,
+    /// No race: draws the peers.csv of the folder again
+    #[arg(long)]
+    draw: bool,
     /// Folder for peers.csv and peers.svg
     #[arg(long, default_value = "results")]
     out: PathBuf,
@@ -82,6 +85,13 @@ fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
         return torture::run(args.seed.unwrap_or(1), scenes);
     }
+    let path = args.out.join("peers.csv");
+    let failed = |e: csv::Error| format!("{}: {e}", path.display());
+    if args.draw {
+        let rows: Result<Vec<table::Row>, _> =
+            csv::Reader::from_path(&path).map_err(failed)?.deserialize().collect();
+        return draw(&args.out, &rows.map_err(failed)?);
+    }
     let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
     let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
         [] => SCENES.to_vec(),
@@ -90,8 +100,6 @@ fn run(args: &Args) -> Result<(), String> {
     };
     let contenders = engine::contenders(args.quick);
     std::fs::create_dir_all(&args.out).map_err(|e| format!("{}: {e}", args.out.display()))?;
-    let path = args.out.join("peers.csv");
-    let failed = |e: csv::Error| format!("{}: {e}", path.display());
     let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
     let mut summary = vec![table::SUMMARY.to_string()];
     let mut raced = Vec::new();
@@ -115,13 +123,19 @@ fn run(args: &Args) -> Result<(), String> {
         }
         summary.push(table::summary_line(name, &outcomes));
         for outcome in &outcomes {
-            csv.serialize(table::Row::new(name, outcome)).map_err(failed)?;
+            let row = table::Row::new(name, outcome);
+            csv.serialize(&row).map_err(failed)?;
+            raced.push(row);
         }
         csv.flush().map_err(|e| format!("{}: {e}", path.display()))?;
-        raced.push((name.to_string(), outcomes));
     }
-    let drawn = args.out.join("peers.svg");
-    std::fs::write(&drawn, picture::svg(&raced)?).map_err(|e| format!("{}: {e}", drawn.display()))?;
-    println!("\n{}\n\n{}\n{}", summary.join("\n"), path.display(), drawn.display());
+    println!("\n{}\n\n{}", summary.join("\n"), path.display());
+    draw(&args.out, &raced)
+}
+
+fn draw(out: &std::path::Path, rows: &[table::Row]) -> Result<(), String> {
+    let path = out.join("peers.svg");
+    std::fs::write(&path, picture::svg(rows)?).map_err(|e| format!("{}: {e}", path.display()))?;
+    println!("{}", path.display());
     Ok(())
 }

@@ -3,8 +3,7 @@
 //! Both axes are logarithmic, lower left is better. What failed the check has no time and no place:
 //! it is told under its panel.
 
-use crate::engine::{Contender, Maker};
-use crate::race::Outcome;
+use crate::table::Row;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use simpulse::lab::picture::axes::{
@@ -26,27 +25,25 @@ const LINE: usize = 56;
 /// Who is drawn, in the order of the legend: an engine at all its settings.
 const ENGINES: [&str; 4] = ["Box2D", "rapier", "simpulse soft_step", "simpulse shim"];
 
-/// Place in [`ENGINES`]; none for what other tables compare.
-fn engine(contender: &Contender) -> Option<usize> {
-    match contender.maker {
-        Maker::Box2d if contender.recycling => Some(0),
-        Maker::Rapier if contender.recycling => Some(1),
-        Maker::Simpulse(width, broad_phase) => {
-            (width.lanes() == 16 && broad_phase == Default::default()).then_some(2)
-        }
-        Maker::Solver("shim") => Some(3),
-        _ => None,
+/// Place in [`ENGINES`]; none for what other tables compare. `soft_step` is drawn at the width of the CPU, which comes first.
+fn engine(row: &Row, own: &str) -> Option<usize> {
+    match row.engine.split(' ').next() {
+        Some("Box2D") if row.recycling => Some(0),
+        Some("rapier") if row.recycling => Some(1),
+        Some("simpulse") => (row.engine == own).then_some(2),
+        _ => row.engine.starts_with("our shim").then_some(3),
     }
 }
 
-/// The picture as SVG text; scenes with what was raced in them.
-pub fn svg(scenes: &[(String, Vec<Outcome>)]) -> Result<String, String> {
+/// The picture as SVG text, of all rows of a race.
+pub fn svg(rows: &[Row]) -> Result<String, String> {
     let mut text = String::new();
-    draw(scenes, &mut text).map_err(|e| format!("peers.svg: {e}"))?;
+    draw(&rows.chunk_by(|a, b| a.scene == b.scene).collect::<Vec<_>>(), &mut text)
+        .map_err(|e| format!("peers.svg: {e}"))?;
     Ok(with_dark(&text))
 }
 
-fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
+fn draw(scenes: &[&[Row]], text: &mut String) -> Drawn {
     let rows = scenes.len().div_ceil(COLUMNS) as i32;
     let size = ((COLUMNS as i32 * PANEL.0) as u32, (LEGEND_HEIGHT + rows * PANEL.1) as u32);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
@@ -71,24 +68,25 @@ fn draw(scenes: &[(String, Vec<Outcome>)], text: &mut String) -> Drawn {
         14,
         HPos::Left,
     )?;
-    for (i, (name, outcomes)) in scenes.iter().enumerate() {
+    for (i, rows) in scenes.iter().enumerate() {
         let (column, row) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
-        panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), name, outcomes)?;
+        panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), rows)?;
     }
     root.present()?;
     Ok(())
 }
 
-fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> Drawn {
-    let all = outcomes.iter().filter_map(|o| engine(&o.contender).map(|k| (k, o)));
-    let shown: Vec<(usize, &Outcome, f64, f64)> = all
+fn panel(area: &Area, corner: (i32, i32), rows: &[Row]) -> Drawn {
+    let own = rows.iter().find(|r| r.engine.starts_with("simpulse")).map_or("", |r| &r.engine);
+    let all = rows.iter().filter_map(|row| Some((engine(row, own)?, row)));
+    let shown: Vec<(usize, &Row, f64, f64)> = all
         .clone()
-        .filter_map(|(k, o)| Some((k, o, o.step?.mean, o.errors.as_ref()?.penetration_mean)))
+        .filter_map(|(k, row)| Some((k, row, row.mean_step_ms?, row.penetration_mean_m?)))
         .filter(|&(.., overlap)| overlap > 0.0)
         .collect();
     let (left, right) = (corner.0 + LEFT, corner.0 + PANEL.0 - RIGHT);
     let (top, bottom) = (corner.1 + TOP, corner.1 + PANEL.1 - BOTTOM);
-    write(area, name, (left, top - 14), 15, HPos::Left)?;
+    write(area, &rows[0].scene, (left, top - 14), 15, HPos::Left)?;
     let overlaps = LogScale::of(shown.iter().map(|s| s.3), 5);
     let times = LogScale::of(shown.iter().map(|s| s.2), 6);
     let labels: [&dyn Fn(f64) -> String; 2] =
@@ -97,14 +95,13 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
     write_upwards(area, "time of a step, mean", (corner.0 + 14, (top + bottom) / 2), 12)?;
     write(area, "mean overlap", ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
-    for &(k, outcome, time, overlap) in &shown {
+    for &(k, row, time, overlap) in &shown {
         let (x, y) = (overlaps.pixel(overlap, left, right), times.pixel(time, bottom, top));
         marker(area, (x, y), k, &color(k))?;
-        write(area, &setting(&outcome.contender), (x + 7, y - 7), 11, HPos::Left)?;
+        write(area, &setting(row), (x + 7, y - 7), 11, HPos::Left)?;
     }
-    let failed = all.filter(|(_, o)| o.failed.is_some());
-    let failed: Vec<String> =
-        failed.map(|(k, o)| format!("{} {}", ENGINES[k], setting(&o.contender))).collect();
+    let failed = all.filter(|(_, row)| !row.failed.is_empty());
+    let failed: Vec<String> = failed.map(|(k, row)| format!("{} {}", ENGINES[k], setting(row))).collect();
     if !failed.is_empty() {
         let line = format!("fails: {}", failed.join(", "));
         for (i, line) in wrapped(&line, LINE).iter().enumerate() {
@@ -114,6 +111,6 @@ fn panel(area: &Area, corner: (i32, i32), name: &str, outcomes: &[Outcome]) -> D
     Ok(())
 }
 
-fn setting(contender: &Contender) -> String {
-    format!("{}{}", contender.substeps, if contender.hertz == 30.0 { "" } else { "′" })
+fn setting(row: &Row) -> String {
+    format!("{}{}", row.substeps, if row.contact_hertz == 30.0 { "" } else { "′" })
 }

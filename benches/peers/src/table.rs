@@ -3,7 +3,7 @@
 use crate::engine::{Maker, Stage};
 use crate::race::{Outcome, Quartiles, Steps};
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 const NONE: &str = "–";
 
@@ -159,15 +159,15 @@ pub const SUMMARY: &str = "\
 |---|---|---|---|---|---|---|---|---|";
 
 /// A row of `peers.csv`.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Row {
-    scene: String,
-    engine: String,
-    substeps: u32,
-    contact_hertz: f32,
-    recycling: bool,
-    failed: String,
-    mean_step_ms: Option<f64>,
+    pub scene: String,
+    pub engine: String,
+    pub substeps: u32,
+    pub contact_hertz: f32,
+    pub recycling: bool,
+    pub failed: String,
+    pub mean_step_ms: Option<f64>,
     median_step_ms: Option<f64>,
     quartile_1_ms: Option<f64>,
     quartile_3_ms: Option<f64>,
@@ -189,13 +189,13 @@ pub struct Row {
     bodies: usize,
     points: usize,
     pairs: Option<usize>,
-    penetration_mean_m: Option<f64>,
+    pub penetration_mean_m: Option<f64>,
     penetration_max_m: Option<f64>,
     lost_pairs: Option<f64>,
     rms_velocity_m_s: Option<f64>,
     top_m: Option<f64>,
-    reference: &'static str,
-    reference_unit: &'static str,
+    reference: String,
+    reference_unit: String,
     reference_error: Option<f64>,
 }
 
@@ -240,8 +240,8 @@ impl Row {
             lost_pairs: e.map(|e| e.lost),
             rms_velocity_m_s: e.map(|e| e.rms_velocity),
             top_m: e.map(|e| e.top),
-            reference: truth.map_or("", |t| t.0),
-            reference_unit: truth.map_or("", |t| t.1),
+            reference: truth.map_or("", |t| t.0).into(),
+            reference_unit: truth.map_or("", |t| t.1).into(),
             reference_error: truth.map(|t| t.2),
         }
     }

@@ -1,11 +1,12 @@
-//! `speed_vs_error.svg`: time against error, a row of panels per scene.
+//! `speed_vs_error.svg`: time against error, three panels per scene, one below the other, so that a narrow screen
+//! shows them large enough.
 //!
 //! Both axes are logarithmic. One color per solver, one marker shape per budget, a white dot on
 //! those in natural order; every marker is the fastest lane width of its setting. A line of steps
 //! shows the least time in which the solver has at most that error: settings are different runs,
 //! and between them there is nothing.
 
-use super::style::{solver_color, solver_legend};
+use super::style::{LEGEND_ROW, legend_places, solver_color, solver_legend};
 use super::units::si_short;
 use crate::lab::error::Error;
 use crate::lab::picture::axes::{
@@ -16,16 +17,17 @@ use crate::lab::study::curve::{Curve, ErrorAxis, budgets_of, curves, solvers_of}
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-const PANEL_WIDTH: i32 = 360;
+const PANEL_WIDTH: i32 = 400;
 const PANEL_HEIGHT: i32 = 222;
 const TITLE_HEIGHT: i32 = 34;
-const LEGEND_HEIGHT: i32 = 66;
+/// Of the heading, and of the line about markers.
+const HEADING: i32 = 34;
 /// Space left of, right of and below a panel, for labels.
 const LEFT: i32 = 78;
 const RIGHT: i32 = 26;
 const BOTTOM: i32 = 58;
 /// Characters of a title that fit under a panel.
-const TITLE_LENGTH: usize = 44;
+const TITLE_LENGTH: usize = 48;
 
 /// The picture as SVG text.
 pub fn svg(records: &[Record]) -> Result<String, Error> {
@@ -37,33 +39,34 @@ pub fn svg(records: &[Record]) -> Result<String, Error> {
 fn draw(records: &[Record], text: &mut String) -> Drawn {
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
     let solvers = solvers_of(records);
-    let row_height = TITLE_HEIGHT + PANEL_HEIGHT;
-    let size = (3 * PANEL_WIDTH, LEGEND_HEIGHT + row_height * scenes.len() as i32);
+    let rows = legend_places(&solvers, PANEL_WIDTH).last().map_or(0, |place| place.1 + 1);
+    let head = 2 * HEADING + LEGEND_ROW * rows;
+    let scene_height = TITLE_HEIGHT + PANEL_HEIGHT * ErrorAxis::ALL.len() as i32;
+    let size = (PANEL_WIDTH, head + scene_height * scenes.len() as i32);
     let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
-    legend(&root, &solvers, records)?;
+    legend(&root, &solvers, &scenes)?;
     for (i, scene) in scenes.iter().enumerate() {
-        let top = LEGEND_HEIGHT + row_height * i as i32;
+        let top = head + scene_height * i as i32;
         write(&root, &scene[0].scene, (8, top + 18), 17, HPos::Left)?;
         for (j, axis) in ErrorAxis::ALL.into_iter().enumerate() {
-            let corner = (PANEL_WIDTH * j as i32, top + TITLE_HEIGHT);
-            panel(&root, corner, axis, scene)?;
+            panel(&root, (0, top + TITLE_HEIGHT + PANEL_HEIGHT * j as i32), axis, scene)?;
         }
     }
     root.present()?;
     Ok(())
 }
 
-fn legend(area: &Area, solvers: &[&str], records: &[Record]) -> Drawn {
-    write(area, "Time of a step against error: lower left is better", (8, 18), 18, HPos::Left)?;
-    let mut x = solver_legend(area, solvers, 12, 44)?;
-    let scenes = records.chunk_by(|a, b| a.scene == b.scene);
-    let budgets = scenes.flat_map(|own| solvers.iter().map(|s| budgets_of(own, s).len())).max().unwrap_or(0);
-    for budget in 0..budgets.min(4) {
-        marker(area, (x + 6, 44), budget, &INK)?;
+fn legend(area: &Area, solvers: &[&str], scenes: &[&[Record]]) -> Drawn {
+    write(area, "Time of a step against error: lower left is better", (8, 18), 16, HPos::Left)?;
+    let y = solver_legend(area, solvers, HEADING + 8, PANEL_WIDTH)?;
+    let budgets = scenes.iter().flat_map(|own| solvers.iter().map(|s| budgets_of(own, s).len())).max();
+    let mut x = 12;
+    for budget in 0..budgets.unwrap_or(0).min(4) {
+        marker(area, (x + 6, y), budget, &INK)?;
         x += 20;
     }
-    write(area, "budgets, smallest first; white dot: natural order", (x + 6, 44), 14, HPos::Left)
+    write(area, "budgets, smallest first; white dot: natural order", (x + 6, y), 13, HPos::Left)
 }
 
 fn panel(area: &Area, corner: (i32, i32), axis: ErrorAxis, records: &[Record]) -> Drawn {

@@ -1,6 +1,6 @@
 //! `profiles.svg` and the slices: solvers compared over all scenes.
 
-use super::style::{solver_color, solver_legend};
+use super::style::{LEGEND_ROW, legend_places, solver_color, solver_legend};
 use super::table::{finish, table};
 use super::units::{digits, si};
 use crate::lab::error::Error;
@@ -12,9 +12,15 @@ use crate::lab::study::slices::{Slice, equal_error, equal_time};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-const PANEL_WIDTH: i32 = 360;
-const HEIGHT: i32 = 330;
-const TOP: i32 = 96;
+const PANEL_WIDTH: i32 = 400;
+const PANEL_HEIGHT: i32 = 270;
+/// Lines of the heading.
+const HEADING: [&str; 2] = [
+    "Share of scenes solved within a factor of the fastest solver",
+    "Upper left is better; lines that coincide are drawn side by side",
+];
+const HEADING_LINE: i32 = 20;
+const TOP: i32 = 28;
 const LEFT: i32 = 70;
 const RIGHT: i32 = 24;
 const BOTTOM: i32 = 56;
@@ -40,21 +46,27 @@ pub fn svg(records: &[Record]) -> Result<String, Error> {
 }
 
 fn draw(records: &[Record], text: &mut String) -> Drawn {
-    let size = (3 * PANEL_WIDTH as u32, HEIGHT as u32);
+    let (solvers, profiles) = (solvers_of(records), profiles(records));
+    let rows = legend_places(&solvers, PANEL_WIDTH).last().map_or(0, |place| place.1 + 1);
+    let head = HEADING_LINE * (HEADING.len() as i32 + 1) + LEGEND_ROW * rows;
+    // One panel below the other, so that a narrow screen shows them large enough.
+    let size = (PANEL_WIDTH as u32, (head + PANEL_HEIGHT * profiles.len() as i32) as u32);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
-    let heading = "Share of scenes solved within a factor of the fastest solver: upper left is better; what coincides is drawn side by side";
-    write(&root, heading, (8, 18), 18, HPos::Left)?;
-    solver_legend(&root, &solvers_of(records), 12, 44)?;
-    for (i, profile) in profiles(records).iter().enumerate() {
-        panel(&root, PANEL_WIDTH * i as i32, profile)?;
+    for (i, line) in (0..).zip(HEADING) {
+        write(&root, line, (8, 18 + HEADING_LINE * i), 14, HPos::Left)?;
+    }
+    solver_legend(&root, &solvers, 18 + HEADING_LINE * HEADING.len() as i32, PANEL_WIDTH)?;
+    for (i, profile) in (0..).zip(&profiles) {
+        panel(&root, head + PANEL_HEIGHT * i, profile)?;
     }
     root.present()?;
     Ok(())
 }
 
-fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
-    let (left, right, top, bottom) = (x + LEFT, x + PANEL_WIDTH - RIGHT, TOP, HEIGHT - BOTTOM);
+fn panel(area: &Area, top: i32, profile: &Profile) -> Drawn {
+    let (left, right, bottom) = (LEFT, PANEL_WIDTH - RIGHT, top + PANEL_HEIGHT - BOTTOM);
+    let top = top + TOP;
     let all = || profile.ratios.iter().flat_map(|(_, r)| r.iter().copied());
     let most = all().fold(2.0, f64::max);
     let mut scale = LogScale::of([1.0, most].into_iter(), 5);
@@ -73,7 +85,7 @@ fn panel(area: &Area, x: i32, profile: &Profile) -> Drawn {
         write(area, &format!("{:.0} %", 100.0 * share), (left - 6, y(share)), 12, HPos::Right)?;
     }
     area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write_upwards(area, &format!("share of {} scenes", profile.scenes), (x + 14, (top + bottom) / 2), 12)?;
+    write_upwards(area, &format!("share of {} scenes", profile.scenes), (14, (top + bottom) / 2), 12)?;
     write(area, "time relative to the fastest solver", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
     for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {

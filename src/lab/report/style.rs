@@ -135,19 +135,40 @@ pub fn solver_color(solver: &str) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// A name and a stroke per solver, from `x` on; returns where the next thing may stand.
+/// Height of a row of [`solver_legend`] (pixels).
+pub const LEGEND_ROW: i32 = 20;
+
+/// Where the entries of [`solver_legend`] stand: columns in pixels, rows by number.
+pub fn legend_places(solvers: &[&str], right: i32) -> Vec<(i32, i32)> {
+    let (mut x, mut row) = (LEGEND_LEFT, 0);
+    let place = |name: &&str| {
+        let width = 46 + 8 * name.chars().count() as i32;
+        if x + width > right && x > LEGEND_LEFT {
+            (x, row) = (LEGEND_LEFT, row + 1);
+        }
+        x += width;
+        (x - width, row)
+    };
+    solvers.iter().map(place).collect()
+}
+
+const LEGEND_LEFT: i32 = 12;
+
+/// A name and a stroke per solver, the first row at `y`, as wide as `right`; returns where the row below them is.
 pub fn solver_legend(
     area: &Area,
     solvers: &[&str],
-    mut x: i32,
     y: i32,
+    right: i32,
 ) -> Result<i32, Box<dyn std::error::Error>> {
-    for name in solvers {
+    let mut below = y;
+    for (name, (x, row)) in solvers.iter().zip(legend_places(solvers, right)) {
+        let y = y + LEGEND_ROW * row;
         area.draw(&PathElement::new(vec![(x, y), (x + 26, y)], solver_color(name).stroke_width(3)))?;
         write(area, name, (x + 32, y), 14, HPos::Left)?;
-        x += 56 + 7 * name.chars().count() as i32;
+        below = y + LEGEND_ROW;
     }
-    Ok(x)
+    Ok(below)
 }
 
 #[cfg(test)]
