@@ -257,14 +257,13 @@ fn sentence(plan: &SearchPlan, best: &Trial) -> String {
 /// What is faster and was not taken, with the reason.
 fn rejected(plan: &SearchPlan, advice: &Advice) -> String {
     let mut rows = table(&["  rejected although faster", "µs/step", "longest", "why"]);
-    let rejected = advice.rejected();
-    for trial in &rejected {
+    for trial in &advice.rejected {
         let [mean, longest] = [|t: FoundTime| t.mean_ns, |t: FoundTime| t.worst_ns]
             .map(|of| trial.time.map_or("–".into(), |t| digits(1e-3 * of(t))));
         let why = trial.fails(&plan.limits).unwrap_or_default();
         rows.add_row([format!("  {}", trial.setting.text()), mean, longest, why]);
     }
-    if rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
+    if advice.rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
 }
 
 /// The setting with its lanes.

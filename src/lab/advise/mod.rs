@@ -205,6 +205,9 @@ pub struct Advice {
     /// The settings of the final timing: those that are good enough, fastest first, then the
     /// others, nearest first. The first one is the advice if it is good enough.
     pub finalists: Vec<Trial>,
+    /// Faster than the best and not good enough: the slowest such setting of each solver, those first that fail
+    /// only later. Timed in the same rounds as the finalists.
+    pub rejected: Vec<Trial>,
     /// Everything that was tried, in that order, with the times of the trials.
     pub trials: Vec<Trial>,
     /// Settings skipped because they cannot be cheaper.
@@ -224,24 +227,6 @@ impl Advice {
     /// The next one that is good enough.
     pub fn runner_up(&self) -> Option<&Trial> {
         self.finalists.get(1).filter(|t| t.is_good())
-    }
-
-    /// What is faster than the best and not good enough: of each solver the fastest, those first that only fail
-    /// later.
-    pub fn rejected(&self) -> Vec<&Trial> {
-        let Some(best) = self.best() else { return Vec::new() };
-        let mut faster: Vec<&Trial> =
-            self.trials.iter().filter(|t| !t.is_good() && t.time_ns() < best.time_ns()).collect();
-        faster.sort_by(|a, b| {
-            b.later.is_some().cmp(&a.later.is_some()).then(b.time_ns().total_cmp(&a.time_ns()))
-        });
-        let mut kept: Vec<&Trial> = Vec::new();
-        for trial in faster {
-            if kept.iter().all(|k| k.setting.solver.name != trial.setting.solver.name) {
-                kept.push(trial);
-            }
-        }
-        kept
     }
 
     /// The nearest setting that is not good enough.
@@ -275,10 +260,36 @@ pub fn advise(plan: &SearchPlan, progress: &dyn Fn(Progress)) -> Result<Advice, 
     let Search { trials, left_out, is_cut_short, .. } = search;
 
     let mut finalists = choose(&trials);
+    let rejected = match finalists.first() {
+        Some(best) if best.is_good() => insufficient(&trials, LIKELY_FASTER * best.time_ns()),
+        _ => Vec::new(),
+    };
+    let count = finalists.len();
+    finalists.extend(rejected);
     let steps = loaded.scene.steps.min(RACE_STEPS);
     race_again(plan, &loaded.scene, &mut finalists, steps)?;
+    let mut rejected = finalists.split_off(count);
     rank(&mut finalists);
-    Ok(Advice { finalists, trials, left_out, is_cut_short, timing: [plan.repeats, steps] })
+    let mean = |t: &Trial| t.time.map_or(f64::INFINITY, |t| t.mean_ns);
+    rejected.retain(|t| mean(t) < mean(&finalists[0]));
+    Ok(Advice { finalists, rejected, trials, left_out, is_cut_short, timing: [plan.repeats, steps] })
+}
+
+/// Trials are not timed side by side: what took so many times as long may be faster in the final timing.
+const LIKELY_FASTER: f64 = 1.2;
+
+/// Not good enough in less than `time_ns`: the slowest such setting of each solver, those first that fail only later.
+fn insufficient(trials: &[Trial], time_ns: f64) -> Vec<Trial> {
+    let mut faster: Vec<&Trial> = trials.iter().filter(|t| !t.is_good() && t.time_ns() < time_ns).collect();
+    faster
+        .sort_by(|a, b| b.later.is_some().cmp(&a.later.is_some()).then(b.time_ns().total_cmp(&a.time_ns())));
+    let mut kept: Vec<Trial> = Vec::new();
+    for trial in faster {
+        if kept.iter().all(|k| k.setting.solver.name != trial.setting.solver.name) {
+            kept.push(trial.clone());
+        }
+    }
+    kept
 }
 
 /// The best few, and the best of every solver that is not among them. Where none is good, all
@@ -395,6 +406,7 @@ mod tests {
         assert_eq!(trials.each_ref().map(|t| t.time_ns()), [20.0, 30.0, 99.0, 1.0]);
         let advice = Advice {
             finalists: trials.to_vec(),
+            rejected: Vec::new(),
             trials: Vec::new(),
             left_out: 0,
             is_cut_short: false,
@@ -423,6 +435,15 @@ mod tests {
         let times = |trials: &[Trial]| choose(trials).iter().map(Trial::time_ns).collect::<Vec<_>>();
         assert_eq!(times(&trials), [1.0, 2.0, 3.0, 4.0, 50.0, 9.0]);
         assert_eq!(times(&trials[8..10]), [9.0]);
+    }
+
+    #[test]
+    fn of_what_is_faster_and_not_good_the_nearest_of_each_solver_is_told() {
+        let mut other = trial(3.0, 2.0);
+        other.setting.solver = find("soft_step").unwrap();
+        let trials = [trial(1.0, 9.0), trial(4.0, 2.0), trial(2.0, 0.5), trial(6.0, 2.0), other];
+        let times: Vec<f64> = insufficient(&trials, 5.0).iter().map(Trial::time_ns).collect();
+        assert_eq!(times, [4.0, 3.0]);
     }
 
     #[test]
