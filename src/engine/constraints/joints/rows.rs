@@ -556,8 +556,8 @@ impl JointPass<f32> for Collected<'_> {
         let k = pair.response(&j);
         for r in 0..N {
             block.travel[r] = pair.travel(&j[r]);
-            for c in 0..=r {
-                (block.response[r][c], block.response[c][r]) = (k[r][c], k[r][c]);
+            for (c, &k) in k[r].iter().enumerate().take(r + 1) {
+                (block.response[r][c], block.response[c][r]) = (k, k);
             }
         }
         to.push(block);
