@@ -119,7 +119,7 @@ const MECHANISMS: [Mechanism; 11] = [
     Mechanism {
         name: "depth",
         meaning: "springs see no deeper than their load earns",
-        case: "elastic::a_gas_of_smooth_elastic_boxes_keeps_its_energy",
+        case: "ablation::pistons_give_more_energy_without_depth",
         lines: 0,
     },
     Mechanism {
