@@ -255,7 +255,7 @@ fn described(scene: &Description) -> String {
     for demand in &scene.demands {
         text += &format!("; {}", demand.meaning());
     }
-    text += "\ntolerances of a plausible run; a tight run keeps 10 % of them, an exact run 1 %\n";
+    text += "\ntolerances of a plausible run; a tight run is within 10 % of them, an exact run within 1 %\n";
     let own = scene.tolerances;
     let unit = scene.reference.map_or("", |(_, _, unit)| unit);
     let lines = [

@@ -120,5 +120,5 @@ fn a_sweep_says_which_values_are_the_same_run() {
     let args = ["study", "--quick", "--scenes", "stack:2", "--solvers", "soft_step"];
     let output = simpulse(folder.path(), &[&args[..], &["--sweep", "contact-hertz=15,30,60,120"]].concat());
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("30, 60, 120 Hz are the same run"), "{text}");
+    assert!(text.contains("30, 60, 120 Hz give the same run"), "{text}");
 }

@@ -8,11 +8,11 @@ use crate::lab::study::curve::solvers_of;
 use crate::lab::study::sweep::Swept;
 
 const LEGEND: &str = "\
-A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and its errors keep
-the tolerances of a plausible run (`simpulse scene NAME` lists them with their reasons): penetration, of 99 %
-of contact points and at rest; the contact-law residual, rms, in weights of the lighter body × step; the
-distance to the scene's reference value (– none is known); the speed at rest.  What fails after the run was not
-looked for.  budget: substeps, and in each so many velocity, relaxation and position sweeps.
+A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and its errors are within
+the tolerances of a plausible run (`simpulse scene NAME` lists them with their reasons): penetration, of 99 % of
+contact points and at rest; the contact-law residual, rms, in weights of the lighter body × step; the distance to
+the scene's reference value (– if none is known); the speed at rest.  Runs were not extended to a minute: later
+failures do not show.  budget: substeps; then velocity, relaxation and position sweeps per substep.
 µs/step: mean over the run, its median, its longest step, ± median deviation of a repeat; all settings of a scene
 were timed interleaved.
 ";
@@ -63,7 +63,7 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
         for values in alike(scene, solver) {
             let list = words(&values, swept);
             text += &format!(
-                "  {:<width$}  {list} are the same run: they come to one value, or it has no effect here\n",
+                "  {:<width$}  {list} give the same run: the solver limits this quantity, or it has no effect here\n",
                 ""
             );
         }
@@ -103,8 +103,8 @@ fn reach(scene: &[Record], solver: &str, swept: Swept) -> String {
     };
     let all = values(&|_| true);
     let list = |chosen: Vec<f64>| match chosen.len() {
-        0 => "none".to_string(),
-        n if n == all.len() => "all".to_string(),
+        0 => "no value".to_string(),
+        n if n == all.len() => "every value".to_string(),
         _ => words(&chosen, swept),
     };
     let (holds, good) = (list(values(&|r| r.holds())), list(values(&|r| r.excess() <= 1.0)));
@@ -117,8 +117,8 @@ fn words(values: &[f64], swept: Swept) -> String {
     format!("{} {}", words.join(", "), swept.unit).trim_end().to_string()
 }
 
-/// Values of the sweep at which a solver does the same to the last digit of every error: a limit of the solver
-/// makes one of them, as that of the stiffness of soft contacts does.
+/// Values of the sweep for which a solver has the same errors to the last digit: it may limit the quantity, as
+/// soft contacts limit their stiffness.
 fn alike(scene: &[Record], solver: &str) -> Vec<Vec<f64>> {
     let mut own: Vec<&Record> = scene.iter().filter(|r| r.solver == solver && r.errors.is_some()).collect();
     own.sort_by(|a, b| value(a).total_cmp(&value(b)));
@@ -194,7 +194,7 @@ mod tests {
         let [mut clamped, other] = [records[2].clone(), records[2].clone()];
         clamped.swept = Some(Swept { value: 90.0, ..clamped.swept.unwrap() });
         let told = tables(&[records[1].clone(), other, clamped]);
-        assert!(told.contains("60, 90 Hz are the same run"), "{told}");
+        assert!(told.contains("60, 90 Hz give the same run"), "{told}");
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("pgs")).collect();
         assert_eq!(lines.len(), 4);
         let cells = |line: &&str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
