@@ -285,6 +285,14 @@ impl RunResult {
             "cost\n".to_string(),
             line("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
             line("longest phase", longest.to_string(), format!("{:.0} % of a median step", 100.0 * share)),
+            match sample.load.unsolved {
+                0.0 => String::new(),
+                share => line(
+                    "solved by sweeps alone",
+                    format!("{:.0} %", 100.0 * share),
+                    "of steps: too many points for the solver's own method".into(),
+                ),
+            },
             "error\n".to_string(),
             line(
                 if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },

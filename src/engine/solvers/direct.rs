@@ -1,5 +1,4 @@
-//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of iterated. For
-//! scenes of a few dozen contact points.
+//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of iterated.
 //!
 //! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search,
 //! proximal outer loop); with `lemke` set, `cottle1992` (Lemke's method on the law as a linear complementarity
@@ -10,17 +9,16 @@
 //! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
 //! Rows of joints are in the same system: a row holds, or has the impulse at its bound. Overlap is pushed apart as in
 //! [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
-//! finds nothing better, and in scenes with more than `largest` points, they are the answer.
+//! finds nothing better, Lemke's method follows, up to 100 points and without joints. A scene of more than `largest` points is left
+//! to the sweeps; runs and studies say so.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
-//! within the envelope of the matrix (`numerics/envelope.rs`), n b² operations in `f64` for n rows in a band of b, one lane.
-//! Whole steps of stacks of 10, 20, 30 and 50 boxes (two points each) take 31, 48, 72 and 121 µs where eight sweeps take 4
-//! to 13 µs and fall from 20 boxes on (AMD EPYC, AVX2, 2026-11-23). Bands of pyramids are wide: with `largest` at 2000,
-//! `pyramid:10` takes 5.6 ms and `pyramid:20` 72 ms. Lemke's method takes 79 and 520 µs for stacks of 5 and 10 boxes: a
-//! pivot goes through a tableau of 16m² entries for m points, and there are more pivots than points. A box on an incline takes 8.3 µs by Lemke's method and 4.6 by Newton's, so that it
-//! loses from the first point on. Sweeps of a step request 1750 B per contact.
+//! of a matrix of 3 × 3 blocks, one row of blocks per body, ordered by breadth (`numerics/block_lu.rs`): n b² products of blocks in `f64` for
+//! n bodies in a band of b, one lane. COST Lemke's method goes through a
+//! tableau of 16m² entries for m points at each pivot, and there are more pivots than points: it loses to Newton's from the first
+//! point on. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** there are many points in wide bands, and where friction lets a point
+//! **Fails when** bands are wide, and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
 //!
 //! # The method
@@ -40,8 +38,8 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::kernels::velocity::rules::NormalRule;
+use crate::engine::constraints::numerics::block_lu::{BlockLu, inverse};
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::numerics::envelope::Envelope;
 use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
 use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::system::{Pair, PointRows};
@@ -68,8 +66,8 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "largest",
             unit: "",
-            default: 100.0,
-            range: [0.0, 2000.0],
+            default: 4000.0,
+            range: [0.0, 100_000.0],
             meaning: "contact points, and pairs of rows of joints, up to which Newton's method, or Lemke's, is tried",
             trials: &[],
         },
@@ -95,6 +93,12 @@ pub static SOLVER: Variant = Variant {
 const SHIFT: f64 = 1e-7;
 /// Pivots of Lemke's method per unknown before it gives up.
 const PIVOTS: usize = 10;
+/// Largest number of points at which Lemke's method takes over where Newton's stalls.
+const LEMKE_POINTS: usize = 100;
+/// Residual, relative to the largest impulse, above which Newton's method has stalled, not ended.
+const STALLED: f64 = 1e-6;
+/// Solves of a linear problem: one, and two for what it leaves.
+const PASSES: usize = 3;
 /// Halvings of a step before Newton gives up.
 const HALVINGS: usize = 8;
 /// Residual, relative to the largest impulse, at which the law is solved.
@@ -121,6 +125,9 @@ fn step(passes: &mut Passes<'_>) {
             (is_small && points + rows / 2 <= largest).then(|| Newton::new(system, &rule, joints, h))
         };
         let mut newton = passes.with_system(Phase::Solve, begin);
+        if newton.is_none() {
+            passes.count_unsolved();
+        }
         for _ in 0..budget.velocity_iterations {
             if let Some(newton) = &mut newton {
                 let step = if by_pivots { Newton::pivot } else { Newton::step };
@@ -136,6 +143,8 @@ fn step(passes: &mut Passes<'_>) {
 /// Newton's method on its way.
 struct Newton {
     problem: Problem,
+    /// Of the bodies' matrix, in its order.
+    factors: BlockLu<3>,
     impulses: Vec<f64>,
     arguments: Vec<f64>,
     merit: f64,
@@ -156,23 +165,28 @@ impl Newton {
         system.gaps_and_friction(&mut surfaces);
         velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
         let points: Vec<PointRows> = system.point_rows().collect();
-        let mut problem = Problem::new(points, &written, &velocities, &surfaces);
+        let mut problem = Problem::new(points, system.rows(), &written, &velocities, &surfaces);
         for block in &joints.blocks {
             problem.join(system.rows(), block, rule.of_errors().bias_rate, h);
         }
-        problem.couple(system.rows(), &joints.blocks);
+        problem.couple();
+        let mut factors = BlockLu::default();
+        factors.begin(problem.neighbors.len(), |body| problem.neighbors[body].iter().copied());
         let impulses = problem.start.clone();
         let arguments = problem.arguments(&impulses);
         let merit = problem.merit(&impulses, &arguments);
         let delta = vec![[0.0; 2]; written.len()];
-        Newton { problem, impulses, arguments, merit, done: false, written, surfaces, delta, joints }
+        Newton { problem, factors, impulses, arguments, merit, done: false, written, surfaces, delta, joints }
     }
 
     /// One step as far as the residual falls; impulses and velocities follow.
     fn step(&mut self, system: &mut System<'_>) {
         let problem = &self.problem;
         self.done |= self.merit <= problem.goal(&self.impulses);
-        let target = if self.done { None } else { problem.solve_states(&problem.states(&self.arguments)) };
+        if self.done {
+            return;
+        }
+        let target = problem.solve_states(&problem.states(&self.arguments), &mut self.factors);
         let mut fraction = 1.0;
         let better = target.and_then(|target| {
             (0..HALVINGS).find_map(|_| {
@@ -187,6 +201,10 @@ impl Newton {
             })
         });
         let Some(better) = better else {
+            let stalls = self.merit > (STALLED / TOLERANCE).powi(2) * problem.goal(&self.impulses);
+            if stalls && problem.points.len() <= LEMKE_POINTS {
+                self.pivot(system);
+            }
             self.done = true;
             return;
         };
@@ -229,8 +247,8 @@ impl Newton {
                 let change = impulse as f32 - std::mem::replace(&mut block.impulses[r], impulse as f32);
                 for (body, j) in row.bodies.into_iter().zip(row.jacobian) {
                     let Some(on) = system.rows().get_mut(body as usize) else { continue };
-                    let inverse = [on.velocity[3], on.velocity[3], on.delta[3]];
-                    (0..3).for_each(|c| on.velocity[c] += inverse[c] * j[c] as f32 * change);
+                    let roots = [on.velocity[3], on.velocity[3], on.delta[3]].map(f32::sqrt);
+                    (0..3).for_each(|c| on.velocity[c] += roots[c] * j[c] as f32 * change);
                 }
             }
         }
@@ -249,12 +267,44 @@ enum State {
     Slips(f64),
 }
 
-/// One row of the Jacobian.
+/// One row of the Jacobian, scaled to unit masses: J M^(-½).
 #[derive(Clone, Copy, Debug)]
 struct Row {
+    /// Rows of bodies a and b.
     bodies: [u32; 2],
+    /// The same among the bodies that can move; [`IMMOVABLE`] for others.
+    movable: [usize; 2],
     /// Of a and b.
     jacobian: [[f64; 3]; 2],
+}
+
+/// In [`Row::movable`].
+const IMMOVABLE: usize = usize::MAX;
+
+impl Row {
+    #[inline]
+    fn dot(&self, velocities: &[[f64; 3]]) -> f64 {
+        self.sides().map(|(body, j)| dot(j, velocities[body])).sum()
+    }
+
+    /// The bodies that can move, with this row on them.
+    #[inline]
+    fn sides(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
+        self.movable.into_iter().zip(self.jacobian).filter(|side| side.0 != IMMOVABLE)
+    }
+
+    /// J M⁻¹ Jᵀ of two rows.
+    #[inline]
+    fn coupling(&self, other: &Row) -> f64 {
+        self.sides()
+            .flat_map(|(a, j)| other.sides().filter(move |s| s.0 == a).map(move |s| dot(j, s.1)))
+            .sum()
+    }
+}
+
+#[inline]
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Bounds of the rows of a joint.
@@ -271,8 +321,49 @@ enum Bound {
     Same,
 }
 
-/// Body, row and side of each row of a body, and its inverse masses (1/kg, 1/kg, 1/(kg·m²)).
-type RowsOfBody<'a> = (&'a [(u32, usize, usize)], [f64; 3]);
+/// The row of the Jacobian on bodies with these rows.
+fn row(bodies: &[BodyRow], of: [u32; 2], jacobian: [[f64; 3]; 2]) -> Row {
+    let side = |side: usize| {
+        let mass = bodies.get(of[side] as usize).copied().unwrap_or_default();
+        let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
+        let moves = inverse != [0.0; 3];
+        let scaled = [0, 1, 2].map(|c| jacobian[side][c] * inverse[c].sqrt());
+        (if moves { of[side] as usize } else { IMMOVABLE }, scaled)
+    };
+    let [a, b] = [side(0), side(1)];
+    Row { bodies: of, movable: [a.0, b.0], jacobian: [a.1, b.1] }
+}
+
+/// A row that holds.
+struct HeldRow {
+    /// Its number.
+    at: usize,
+    /// s µ of a point that slips, 0 of others.
+    slope: f64,
+    /// Inverse root of its diagonal (kg^½).
+    scale: f64,
+    /// Rows of P and Q.
+    seen: Row,
+    acts: Row,
+    b: f64,
+}
+
+/// Rows that hold and share a block of T.
+struct Group {
+    first: usize,
+    size: usize,
+    softness: [[f64; 3]; 3],
+    inverse: [[f64; 3]; 3],
+}
+
+/// Rows of a joint that share their softness R.
+#[derive(Clone, Copy, Debug)]
+struct Softness {
+    first: usize,
+    size: usize,
+    /// 1/kg
+    r: [[f64; 3]; 3],
+}
 
 /// The law of a step around the impulses that the sweeps left. Rows 2i and 2i + 1 are the normal and the tangential one of
 /// point i; behind the points come rows of joints.
@@ -282,20 +373,26 @@ struct Problem {
     rows: Vec<Row>,
     /// Of the rows of joints.
     bounds: Vec<Bound>,
+    joints: Vec<Softness>,
     /// λ₀ (N·s)
     start: Vec<f64>,
     /// u there, the bias included (m/s).
     velocity: Vec<f64>,
-    /// K + R: its entries (1/kg) by rows, columns ascending, and where each row begins. `[rows + 1]`
-    entries: Vec<(usize, f64)>,
-    begins: Vec<usize>,
-    /// Its diagonal (1/kg).
+    /// Of K + R (1/kg).
     diagonal: Vec<f64>,
+    /// Of each body that can move: those that a row ties to it, and it.
+    neighbors: Vec<Vec<usize>>,
 }
 
 impl Problem {
-    /// Of contact points alone, without the matrix.
-    fn new(points: Vec<PointRows>, impulses: &[Pair], velocities: &[Pair], surfaces: &[Pair]) -> Self {
+    /// Of contact points alone.
+    fn new(
+        points: Vec<PointRows>,
+        bodies: &[BodyRow],
+        impulses: &[Pair],
+        velocities: &[Pair],
+        surfaces: &[Pair],
+    ) -> Self {
         let flat = |v: &[Pair]| points.iter().flat_map(|p| v[p.at].map(f64::from)).collect::<Vec<_>>();
         // J of a point on one of its bodies, along u: ±u and ± r × u.
         let of = |p: &PointRows, side: usize, axis: usize| {
@@ -303,121 +400,83 @@ impl Problem {
             let [x, y] = p.axes[axis];
             [x, y, p.arms[axis][side]].map(|j| sign * f64::from(j))
         };
-        let row =
-            |p: &PointRows, axis: usize| Row { bodies: p.bodies, jacobian: [of(p, 0, axis), of(p, 1, axis)] };
-        let rows = points.iter().flat_map(|p| [row(p, 0), row(p, 1)]).collect();
         let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
+        let rows = points
+            .iter()
+            .flat_map(|p| [0, 1].map(|axis| row(bodies, p.bodies, [of(p, 0, axis), of(p, 1, axis)])));
+        let rows = rows.collect();
         let (start, velocity) = (flat(impulses), flat(velocities));
-        Problem {
-            friction,
-            start,
-            velocity,
-            rows,
-            bounds: vec![],
-            entries: vec![],
-            begins: vec![],
-            diagonal: vec![],
-            points,
-        }
+        let (bounds, joints, diagonal, neighbors) = (vec![], vec![], vec![], vec![]);
+        Problem { friction, start, velocity, rows, bounds, joints, diagonal, neighbors, points }
     }
 
     /// Adds the rows of a block of a joint.
     fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rate: f32, h: f32) {
         let (bias, softness) = (block.bias(rate, h), f64::from(block.softness()));
-        for (r, bias) in bias.into_iter().enumerate().take(block.size) {
-            let row = Row { bodies: block.bodies, jacobian: [block.on(0, r), block.on(1, r)] };
+        let first = self.rows.len();
+        let mut r = block.response.map(|row| row.map(|x| softness * f64::from(x)));
+        for (k, bias) in bias.into_iter().enumerate().take(block.size) {
+            let jacobian = [block.on(0, k), block.on(1, k)];
             let speed = |side: usize| {
-                let body = bodies.get(row.bodies[side] as usize).copied().unwrap_or_default();
-                (0..3).map(|c| row.jacobian[side][c] * f64::from(body.velocity[c])).sum::<f64>()
+                let body = bodies.get(block.bodies[side] as usize).copied().unwrap_or_default();
+                (0..3).map(|c| jacobian[side][c] * f64::from(body.velocity[c])).sum::<f64>()
             };
-            let soft = (0..block.size)
-                .map(|c| softness * f64::from(block.response[r][c]) * f64::from(block.impulses[c]))
-                .sum::<f64>();
+            let soft = (0..block.size).map(|c| r[k][c] * f64::from(block.impulses[c])).sum::<f64>();
             self.velocity.push(speed(0) + speed(1) + f64::from(bias) + soft);
-            self.start.push(f64::from(block.impulses[r]));
-            self.rows.push(row);
+            self.start.push(f64::from(block.impulses[k]));
+            self.rows.push(row(bodies, block.bodies, jacobian));
             self.bounds.push(match (block.law, block.cap()) {
                 (RowLaw::Limit, _) => Bound::NotNegative,
-                (_, Some(_)) if r > 0 => Bound::Same,
+                (_, Some(_)) if k > 0 => Bound::Same,
                 (_, Some(cap)) => Bound::Norm { cap: f64::from(cap), size: block.size },
                 _ => Bound::Free,
             });
+            // What nothing can move keeps its impulse.
+            if self.rows[first + k].coupling(&self.rows[first + k]) + r[k][k] <= 0.0 {
+                self.velocity[first + k] = 0.0;
+                r[k][k] = 1.0;
+            }
+        }
+        self.joints.push(Softness { first, size: block.size, r });
+    }
+
+    /// Numbers the bodies that can move; with all rows in place.
+    fn couple(&mut self) {
+        let mut numbers = std::collections::BTreeMap::new();
+        for side in self.rows.iter_mut().flat_map(|row| &mut row.movable).filter(|side| **side != IMMOVABLE) {
+            let next = numbers.len();
+            *side = *numbers.entry(*side).or_insert(next);
+        }
+        self.neighbors = (0..numbers.len()).map(|body| vec![body]).collect();
+        for row in self.rows.iter().filter(|row| !row.movable.contains(&IMMOVABLE)) {
+            let [a, b] = row.movable;
+            self.neighbors[a].push(b);
+            self.neighbors[b].push(a);
+        }
+        for list in &mut self.neighbors {
+            list.sort_unstable();
+            list.dedup();
+        }
+        self.diagonal = self.rows.iter().map(|row| row.coupling(row)).collect();
+        for joint in &self.joints {
+            (0..joint.size).for_each(|k| self.diagonal[joint.first + k] += joint.r[k][k]);
         }
     }
 
-    /// The matrix K + R of all rows, R of `joints`.
-    fn couple(&mut self, bodies: &[BodyRow], joints: &[RowBlock]) {
-        let n = self.rows.len();
-        // Rows of each body, ascending: those that a row couples with are in the lists of its two bodies.
-        let mut sides: Vec<(u32, usize, usize)> = vec![];
-        for (i, row) in self.rows.iter().enumerate() {
-            sides.extend(row.bodies.into_iter().enumerate().map(|(side, body)| (body, i, side)));
+    /// (K + R) x
+    fn times(&self, x: &[f64]) -> Vec<f64> {
+        let mut moved = vec![[0.0; 3]; self.neighbors.len()];
+        for (row, x) in self.rows.iter().zip(x).filter(|(_, x)| **x != 0.0) {
+            row.sides().for_each(|(body, j)| (0..3).for_each(|c| moved[body][c] += j[c] * x));
         }
-        sides.sort_unstable();
-        let mut lists: Vec<[RowsOfBody; 2]> = vec![[(&[], [0.0; 3]); 2]; n];
-        for of_body in sides.chunk_by(|one, other| one.0 == other.0) {
-            let Some(mass) = bodies.get(of_body[0].0 as usize) else { continue };
-            let inverse = [mass.velocity[3], mass.velocity[3], mass.delta[3]].map(f64::from);
-            if inverse != [0.0; 3] {
-                of_body.iter().for_each(|&(_, i, side)| lists[i][side] = (of_body, inverse));
+        let mut product: Vec<f64> = self.rows.iter().map(|row| row.dot(&moved)).collect();
+        for joint in &self.joints {
+            for k in 0..joint.size {
+                product[joint.first + k] +=
+                    (0..joint.size).map(|c| joint.r[k][c] * x[joint.first + c]).sum::<f64>();
             }
         }
-        for (i, [(mut of_a, mass_a), (mut of_b, mass_b)]) in lists.into_iter().enumerate() {
-            self.begins.push(self.entries.len());
-            let product = |side: usize, inverse: [f64; 3], j: usize, other: usize| {
-                let (a, b) = (self.rows[i].jacobian[side], self.rows[j].jacobian[other]);
-                (0..3).map(|c| a[c] * inverse[c] * b[c]).sum::<f64>()
-            };
-            let mut diagonal = 0.0;
-            while let Some(j) = of_a.first().into_iter().chain(of_b.first()).map(|entry| entry.1).min() {
-                let mut sum = 0.0;
-                for (side, list, mass) in [(0, &mut of_a, mass_a), (1, &mut of_b, mass_b)] {
-                    if let Some((&(_, at, other), rest)) = list.split_first()
-                        && at == j
-                    {
-                        sum += product(side, mass, j, other);
-                        *list = rest;
-                    }
-                }
-                self.entries.push((j, sum));
-                diagonal = if i == j { sum } else { diagonal };
-            }
-            if self.begins[i] == self.entries.len() {
-                self.entries.push((i, 0.0));
-            }
-            self.diagonal.push(diagonal);
-        }
-        self.begins.push(self.entries.len());
-        let mut first = 2 * self.points.len();
-        for block in joints.iter() {
-            let softness = f64::from(block.softness());
-            for r in (0..block.size).filter(|_| softness > 0.0).map(|r| first + r) {
-                let row = self.begins[r]..self.begins[r + 1];
-                for (j, value) in &mut self.entries[row] {
-                    if (first..first + block.size).contains(j) {
-                        *value += softness * f64::from(block.response[r - first][*j - first]);
-                    }
-                    self.diagonal[r] = if *j == r { *value } else { self.diagonal[r] };
-                }
-            }
-            first += block.size;
-        }
-        // What nothing can move keeps its impulse.
-        for i in (2 * self.points.len()..n).filter(|&i| self.diagonal[i] <= 0.0).collect::<Vec<_>>() {
-            (self.diagonal[i], self.velocity[i]) = (1.0, 0.0);
-            let row = self.begins[i]..self.begins[i + 1];
-            self.entries[row].iter_mut().for_each(|(j, value)| *value = f64::from(*j == i));
-        }
-    }
-
-    /// Entries of a row, columns ascending.
-    fn row(&self, i: usize) -> &[(usize, f64)] {
-        &self.entries[self.begins[i]..self.begins[i + 1]]
-    }
-
-    /// Product of a row and a vector.
-    fn times(&self, i: usize, x: &[f64]) -> f64 {
-        self.row(i).iter().map(|&(j, k)| k * x[j]).sum()
+        product
     }
 
     fn diagonal(&self, i: usize) -> f64 {
@@ -426,13 +485,11 @@ impl Problem {
 
     /// λ − (u + ε D (λ − λ₀))/D, row by row.
     fn arguments(&self, impulses: &[f64]) -> Vec<f64> {
-        let n = impulses.len();
         let change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
-        let argument = |i: usize| {
-            let u = self.velocity[i] + self.times(i, &change);
-            impulses[i] - u / self.diagonal(i) - SHIFT * change[i]
-        };
-        (0..n).map(argument).collect()
+        let pushed = self.times(&change);
+        let argument =
+            |i: usize| impulses[i] - (self.velocity[i] + pushed[i]) / self.diagonal(i) - SHIFT * change[i];
+        (0..impulses.len()).map(argument).collect()
     }
 
     /// Energy-weighted square of the natural map, Σ K_ii r_i² (J).
@@ -493,51 +550,133 @@ impl Problem {
     }
 
     /// The impulses at which the rows that hold are at rest; none if that is singular.
-    fn solve_states(&self, states: &[State]) -> Option<Vec<f64>> {
-        let n = self.start.len();
-        let unknowns: Vec<usize> = (0..n).filter(|&i| states[i] == State::Holds).collect();
-        let slope = |i: usize| match states.get(i + 1) {
-            Some(State::Slips(slope)) => Some(*slope),
-            _ => None,
-        };
+    ///
+    /// Let P be the rows that hold and Q what acts along them (a slipping point acts along n + s µ t), both scaled to
+    /// unit masses and a unit diagonal, and T = R + ε their own softness. Then (P Qᵀ + T) y = b, and with z = Qᵀ y, the change
+    /// of velocities,
+    ///
+    /// ```text
+    /// y = T⁻¹ (b − P z)        (1 + Qᵀ T⁻¹ P) z = Qᵀ T⁻¹ b
+    /// ```
+    ///
+    /// The second system has three rows per body, however many points it has, and couples bodies that touch. Since T⁻¹
+    /// magnifies rounding by 1/ε, it is solved again for what b − (P Qᵀ + T) y leaves.
+    fn solve_states(&self, states: &[State], system: &mut BlockLu<3>) -> Option<Vec<f64>> {
         let mut impulses: Vec<f64> =
             states.iter().map(|state| if let State::Fixed(value) = state { *value } else { 0.0 }).collect();
-        let scale = |i: usize| 1.0 / self.diagonal(i).sqrt();
-        const KNOWN: usize = usize::MAX;
-        let mut number = vec![KNOWN; n];
-        unknowns.iter().enumerate().for_each(|(r, &i)| number[i] = r);
-        // A slipping point acts along n + s µ t: its tangential column belongs to the normal one.
-        let column = |j: usize| match states[j] {
-            State::Slips(slope) => (number[j - 1], j - 1, slope),
-            _ => (number[j], j, 1.0),
-        };
-        let coupled = |r: usize| {
-            self.row(unknowns[r]).iter().map(|&(j, _)| column(j).0).filter(|&number| number != KNOWN)
-        };
-        let mut system = Envelope::default();
-        system.begin(unknowns.len(), coupled);
-        let mut b = vec![0.0; unknowns.len()];
         let change: Vec<f64> = self.start.iter().zip(&impulses).map(|(l, fixed)| l - fixed).collect();
-        for (r, &i) in unknowns.iter().enumerate() {
-            for &(j, k) in self.row(i) {
-                let (number, j, factor) = column(j);
-                if number != KNOWN {
-                    system.add(r, number, scale(i) * k * factor * scale(j));
+        let pushed = self.times(&change);
+        let held: Vec<HeldRow> = (0..states.len())
+            .filter(|&i| states[i] == State::Holds)
+            .map(|i| {
+                let scale = 1.0 / self.diagonal(i).sqrt();
+                let row = self.rows[i];
+                let slope = if let Some(State::Slips(slope)) = states.get(i + 1) { *slope } else { 0.0 };
+                let along = |side: usize, c: usize| {
+                    row.jacobian[side][c]
+                        + if slope == 0.0 { 0.0 } else { slope * self.rows[i + 1].jacobian[side][c] }
+                };
+                HeldRow {
+                    at: i,
+                    slope,
+                    scale,
+                    seen: Row { jacobian: row.jacobian.map(|j| j.map(|x| scale * x)), ..row },
+                    acts: Row { jacobian: [0, 1].map(|s| [0, 1, 2].map(|c| scale * along(s, c))), ..row },
+                    b: scale * (pushed[i] - self.velocity[i]) + SHIFT * self.start[i] / scale,
                 }
+            })
+            .collect();
+        let groups = self.groups(&held)?;
+        system.clear();
+        let one = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        (0..self.neighbors.len()).for_each(|body| system.add(body, body, one));
+        for group in &groups {
+            // Rows of a group share their bodies.
+            let (members, movable) = (&held[group.first..][..group.size], held[group.first].seen.movable);
+            for (to, from) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                if movable[to] == IMMOVABLE || movable[from] == IMMOVABLE {
+                    continue;
+                }
+                let mut block = [[0.0; 3]; 3];
+                for (q, weights) in members.iter().zip(&group.inverse) {
+                    let mut softened = [0.0; 3];
+                    for (p, t) in members.iter().zip(weights) {
+                        (0..3).for_each(|c| softened[c] += t * p.seen.jacobian[from][c]);
+                    }
+                    for (row, q) in block.iter_mut().zip(q.acts.jacobian[to]) {
+                        (0..3).for_each(|c| row[c] += q * softened[c]);
+                    }
+                }
+                system.add(movable[to], movable[from], block);
             }
-            system.add(r, r, SHIFT);
-            b[r] = scale(i) * (self.times(i, &change) - self.velocity[i]) + SHIFT * self.start[i] / scale(i);
         }
-        if !system.solve(&mut b, 1e-14) {
+        if !system.factorize() {
             return None;
         }
-        for (&i, y) in unknowns.iter().zip(&b) {
-            impulses[i] = y * scale(i);
-            if let Some(slope) = slope(i) {
-                impulses[i + 1] = slope * impulses[i];
+        // T⁻¹ x or T x
+        let soften = |x: &[f64], of: fn(&Group) -> &[[f64; 3]; 3]| {
+            let mut y = vec![0.0; x.len()];
+            for group in &groups {
+                let members = group.first..group.first + group.size;
+                for (y, t) in y[members.clone()].iter_mut().zip(of(group)) {
+                    *y = t.iter().zip(&x[members.clone()]).map(|(t, x)| t * x).sum();
+                }
+            }
+            y
+        };
+        // Qᵀ x
+        let act = |x: &[f64]| {
+            let mut z = vec![[0.0; 3]; self.neighbors.len()];
+            for (row, x) in held.iter().zip(x) {
+                row.acts.sides().for_each(|(body, q)| (0..3).for_each(|c| z[body][c] += q[c] * x));
+            }
+            z
+        };
+        let mut y = vec![0.0; held.len()];
+        let mut left: Vec<f64> = held.iter().map(|row| row.b).collect();
+        for _ in 0..PASSES {
+            let mut z = act(&soften(&left, |group| &group.inverse));
+            system.solve(&mut z);
+            let rest: Vec<f64> = held.iter().zip(&left).map(|(row, b)| b - row.seen.dot(&z)).collect();
+            y.iter_mut().zip(soften(&rest, |group| &group.inverse)).for_each(|(y, dy)| *y += dy);
+            let (moved, given) = (act(&y), soften(&y, |group| &group.softness));
+            let remains = |(row, t): (&HeldRow, f64)| row.b - row.seen.dot(&moved) - t;
+            left = held.iter().zip(given).map(remains).collect();
+        }
+        for (row, y) in held.iter().zip(&y) {
+            impulses[row.at] = y * row.scale;
+            if row.slope != 0.0 {
+                impulses[row.at + 1] = row.slope * impulses[row.at];
             }
         }
         Some(impulses)
+    }
+
+    /// T of the rows that hold: ε, and R of joints. None if that is singular.
+    fn groups(&self, held: &[HeldRow]) -> Option<Vec<Group>> {
+        let mut groups = vec![];
+        let (mut first, mut joints) = (0, self.joints.iter());
+        while let Some(row) = held.get(first) {
+            let joint = if row.at < 2 * self.points.len() {
+                Softness { first: row.at, size: 1, r: [[0.0; 3]; 3] }
+            } else {
+                *joints.find(|joint| row.at < joint.first + joint.size)?
+            };
+            let members = &held[first..];
+            let size = members.iter().take_while(|row| row.at < joint.first + joint.size).count();
+            let mut group = Group { first, size, softness: [[0.0; 3]; 3], inverse: [[0.0; 3]; 3] };
+            for (r, c) in (0..size).flat_map(|r| (0..size).map(move |c| (r, c))) {
+                let entry = joint.r[members[r].at - joint.first][members[c].at - joint.first];
+                let shift = if r == c { SHIFT } else { 0.0 };
+                group.softness[r][c] = shift + members[r].scale * entry * members[c].scale;
+            }
+            let mut padded = group.softness;
+            (size..3).for_each(|k| padded[k][k] = 1.0);
+            group.inverse = inverse(padded)?;
+            first += size;
+            groups.push(group);
+        }
+        Some(groups)
     }
 
     /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::numerics::coulomb_lcp`]; of scenes
@@ -549,13 +688,11 @@ impl Problem {
         let n = self.start.len();
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();
         // u without impulses, pulled toward λ₀ as in Newton's problem.
-        let free = |i: usize| {
-            self.velocity[i] - self.times(i, &self.start) - SHIFT * self.diagonal(i) * self.start[i]
-        };
+        let pushed = self.times(&self.start);
+        let free = |i: usize| self.velocity[i] - pushed[i] - SHIFT * self.diagonal(i) * self.start[i];
         let entry = |i: usize, j: usize| {
             let shift = if i == j { 1.0 + SHIFT } else { 1.0 };
-            let row = self.row(i);
-            row.binary_search_by_key(&j, |entry| entry.0).map_or(0.0, |at| shift * row[at].1)
+            shift * self.rows[i].coupling(&self.rows[j])
         };
         let lcp = CoulombLcp::new(&self.friction, &pair(&|i| self.diagonal(i)), &pair(&free), entry);
         let found = lcp.solve(&vec![1.0; lcp.rows()], PIVOTS * lcp.rows()).ok()?;

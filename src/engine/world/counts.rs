@@ -27,6 +27,8 @@ pub struct StepCounts {
     pub fast: usize,
     /// Bytes of prepared constraint records.
     pub constraint_bytes: usize,
+    /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.
+    pub unsolved: usize,
 }
 
 /// Which quantity of a body is out of bounds.

@@ -162,6 +162,15 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
         text += "WARNING  runs were not extended to a minute, so later failures were not looked for.\n";
     }
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        let mut unsolved: Vec<&str> = scene.iter().filter(|r| r.is_unsolved()).map(|r| r.solver).collect();
+        unsolved.dedup();
+        if !unsolved.is_empty() {
+            let solvers = unsolved.join(", ");
+            text += &format!(
+                "NOT SCORED   {}: too many contact points for the method of {solvers}\n",
+                scene[0].scene
+            );
+        }
         for what in &scene[0].unchecked {
             text += &format!("NOT CHECKED  {}: {what}\n", scene[0].scene);
         }

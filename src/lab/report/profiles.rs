@@ -106,8 +106,15 @@ fn panel(area: &Area, top: i32, profile: &Profile) -> Drawn {
 /// The profiles as a table: shares of scenes, a line per solver and error.
 pub fn profile_table(records: &[Record]) -> String {
     let profiles = profiles(records);
-    let mut rows =
-        table(&["solved if", "scenes", "solver", "fastest or tied", "within 1.5×", "within 4×", "in any time"]);
+    let mut rows = table(&[
+        "solved if",
+        "scenes",
+        "solver",
+        "fastest or tied",
+        "within 1.5×",
+        "within 4×",
+        "in any time",
+    ]);
     for profile in &profiles {
         for (i, (solver, _)) in profile.ratios.iter().enumerate() {
             let share = |factor: f64| format!("{:.0} %", 100.0 * profile.share(i, factor));

@@ -149,6 +149,11 @@ impl Record {
         self.mark().is_none()
     }
 
+    /// Whether most steps were too large for the solver's own method: errors and times are then those of its sweeps.
+    pub fn is_unsolved(&self) -> bool {
+        self.sample.as_ref().is_some_and(|sample| sample.load.unsolved > 0.5)
+    }
+
     /// The error along an axis in its tolerance; none where there is no such error.
     pub fn in_tolerance(&self, axis: ErrorAxis) -> Option<f64> {
         self.in_tolerance_at(axis, Accuracy::Plausible)
@@ -167,7 +172,7 @@ impl Record {
     }
 
     /// The largest of the errors in their tolerances: up to 1 is within all of them. Infinite for a
-    /// run that does not hold, or that never came to what is known.
+    /// run that does not hold, that never came to what is known, or that other sweeps than the solver's own method solved.
     pub fn excess_at(&self, accuracy: Accuracy) -> f64 {
         let known = |axis: &ErrorAxis| match axis {
             ErrorAxis::Truth => self.truth.is_some() && self.tolerances.truth.is_some(),
@@ -176,7 +181,7 @@ impl Record {
         let judged = ErrorAxis::JUDGED.into_iter().filter(known);
         let worst = judged.map(|axis| self.in_tolerance_at(axis, accuracy).unwrap_or(f64::INFINITY));
         let fell = self.later.is_some_and(|later| later.broken.is_some());
-        if self.holds() && !fell { worst.fold(0.0, f64::max) } else { f64::INFINITY }
+        if self.holds() && !fell && !self.is_unsolved() { worst.fold(0.0, f64::max) } else { f64::INFINITY }
     }
 }
 

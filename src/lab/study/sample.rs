@@ -114,6 +114,9 @@ pub struct Load {
     pub occupancy: f64,
     /// Prepared constraint records (bytes per contact, empty lanes left out).
     pub bytes_per_contact: f64,
+    /// Share of steps that were too large for the solver's own method.
+    #[serde(default)]
+    pub unsolved: f64,
 }
 
 /// Sums for [`Load`].
@@ -135,6 +138,7 @@ impl LoadSum {
         t.overflow += counts.overflow;
         t.lane_slots += counts.lane_slots;
         t.constraint_bytes += counts.constraint_bytes;
+        t.unsolved += usize::from(counts.unsolved > 0);
     }
 
     pub(super) fn average(&self) -> Load {
@@ -148,6 +152,7 @@ impl LoadSum {
             overflow: mean(t.overflow),
             occupancy: t.contacts as f64 / t.lane_slots.max(1) as f64,
             bytes_per_contact: t.constraint_bytes as f64 / t.lane_slots.max(1) as f64,
+            unsolved: mean(t.unsolved),
         }
     }
 }

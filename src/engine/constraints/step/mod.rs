@@ -210,6 +210,11 @@ impl<'a> Passes<'a> {
         self.count.row_updates += rows_per_point * self.input.points;
     }
 
+    /// Counts a substep that is too large for the solver's own method, so that sweeps alone solve it.
+    pub fn count_unsolved(&mut self) {
+        self.count.unsolved += 1;
+    }
+
     /// Rows that a sweep with friction solves at a contact point.
     pub fn rows_per_point(&self) -> usize {
         if self.input.features.friction { 2 } else { 1 }

@@ -93,6 +93,8 @@ pub struct WorkCount {
     pub row_updates: usize,
     /// Islands whose impacts were not followed to their end.
     pub cut_impacts: usize,
+    /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.
+    pub unsolved: usize,
 }
 
 /// Inputs of a step besides the workspace.
