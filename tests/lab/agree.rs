@@ -1,8 +1,8 @@
 //! Law: every solver is its source's method, written once more in `f64`, up to departures that its docs name.
 
 use simpulse::engine::solvers::VARIANTS;
-use simpulse::lab::agree::{self, Agreement};
 use simpulse::lab::agree::table::{Against, TABLE};
+use simpulse::lab::agree::{self, Agreement};
 use std::path::Path;
 
 /// Every row of the table of solvers has an entry or says why it has none.
@@ -33,8 +33,8 @@ fn solvers_agree_with_their_sources() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("src/engine/solvers/{}.rs", a.solver));
         let docs: Vec<String> = std::fs::read_to_string(path).unwrap().lines().map_while(docs).collect();
         let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-        if !words(&docs.join(" ")).contains(&words(&a.docs())) {
-            wrong += &format!("docs of {} do not say:\n{}\n", a.solver, a.docs());
+        if !words(&docs.join(" ")).contains(&words(&a.docs)) {
+            wrong += &format!("docs of {} do not say:\n{}\n", a.solver, a.docs);
         }
         all.push(a);
     }

@@ -9,8 +9,12 @@
 //! a proximal problem: ε D (λ − λ₀) is added to the relative velocities, λ₀ being the impulses
 //! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
 //! Rows of joints are in the same system: a row holds, or has the impulse at its bound. Overlap is pushed apart as in
-//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
-//! finds nothing better, and in scenes with more than `largest` points, they are the answer.
+//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; in scenes with more than `largest` points they are the answer.
+//! Where a step of Newton's finds nothing better, eight sweeps in `f64` take its place (not in scenes with joints).
+//!
+//! **Agreement.** The source at its best: until a residual is reached. Here: 20 iterations, baumgarte 0.3, sweeps 8,
+//! largest 100, lemke 0. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (Newton's method
+//! ends at the solution of the same law, or with the sweeps that it began with): `simpulse agree --solvers direct`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
 //! within the envelope of the matrix (`numerics/envelope.rs`), n b² operations in `f64` for n rows in a band of b, one lane.
@@ -97,6 +101,8 @@ const SHIFT: f64 = 1e-7;
 const PIVOTS: usize = 10;
 /// Halvings of a step before Newton gives up.
 const HALVINGS: usize = 8;
+/// Sweeps in `f64` where a step of Newton's finds nothing better.
+const SWEEPS: usize = 8;
 /// Residual, relative to the largest impulse, at which the law is solved.
 const TOLERANCE: f64 = 1e-10;
 
@@ -186,12 +192,25 @@ impl Newton {
                 accepted.then_some((trial, arguments, merit))
             })
         });
-        let Some(better) = better else {
+        let Some(better) = better.or_else(|| self.swept()) else {
             self.done = true;
             return;
         };
         (self.impulses, self.arguments, self.merit) = better;
         self.write(system);
+    }
+
+    /// Some more sweeps where Newton's states lead nowhere, if they come nearer: then states are others.
+    fn swept(&self) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let problem = &self.problem;
+        if self.done || !problem.bounds.is_empty() {
+            return None;
+        }
+        let mut impulses = self.impulses.clone();
+        (0..SWEEPS).for_each(|_| problem.sweep(&mut impulses));
+        let arguments = problem.arguments(&impulses);
+        let merit = problem.merit(&impulses, &arguments);
+        (merit < self.merit).then_some((impulses, arguments, merit))
     }
 
     /// Lemke's answer, if it is better than what is there; nothing is left to do after it.
@@ -433,6 +452,23 @@ impl Problem {
             impulses[i] - u / self.diagonal(i) - SHIFT * change[i]
         };
         (0..n).map(argument).collect()
+    }
+
+    /// One projected Gauss–Seidel sweep over the rows of points.
+    fn sweep(&self, impulses: &mut [f64]) {
+        let mut change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
+        for i in 0..2 * self.points.len() {
+            let u = self.velocity[i] + self.times(i, &change);
+            let argument = impulses[i] - u / self.diagonal(i) - SHIFT * change[i];
+            impulses[i] = match i % 2 {
+                0 => argument.max(0.0),
+                _ => {
+                    let bound = self.friction[i / 2] * impulses[i - 1];
+                    argument.max(-bound).min(bound)
+                }
+            };
+            change[i] = impulses[i] - self.start[i];
+        }
     }
 
     /// Energy-weighted square of the natural map, Σ K_ii r_i² (J).

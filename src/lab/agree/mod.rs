@@ -5,10 +5,10 @@
 //! places and impulses are compared. With Δ the difference and 0 the state without contacts, the distance is the largest of
 //!
 //! ```text
-//! |Δv|_M / |v − v₀|_M      |Δx|_M / (h |v − v₀|_M)      max |Δλ| / max |λ|
+//! |Δv|_M / V      |Δx|_M / (t V)      max |Δλ| / L,      V = max(|v − v₀|_M, |v₀|_M), L = max(max |λ|, the problem's unit)
 //! ```
 //!
-//! over iterations and problems. What a solver does otherwise than its source, the method in `f64` does, too; each such
+//! over iterations and problems; t is the time that has passed. What a solver does otherwise than its source, the method in `f64` does, too; each such
 //! departure is taken back alone to measure by how much it departs. Problems are small, and move as piles do in the middle
 //! of a step that is not at rest: gaps and overlaps, one of them deep, loads that are half right.
 
@@ -24,7 +24,6 @@ use crate::lab::converge::replay::{Replay, Start};
 use crate::lab::error::Error;
 use crate::lab::reference::residual::{Target, natural_map};
 use crate::lab::reference::{ContactProblem, DPair, Velocity, gallery};
-use crate::lab::study::budget;
 use model::Model;
 pub use picture::svg;
 use schedules::Run;
@@ -60,6 +59,8 @@ pub struct Agreement {
     pub departures: Vec<Departure>,
     /// A curve for each problem.
     pub curves: Vec<AgreementCurve>,
+    /// The section of its docs, which a test compares; empty where there is nothing to compare with.
+    pub docs: String,
 }
 
 /// What a solver does otherwise than its source.
@@ -100,8 +101,10 @@ fn problems() -> [ContactProblem; 3] {
     all.map(|problem| {
         seed += 1;
         let depth = problem.contacts[0].gap;
-        let mut shaken = gallery::shaken(problem, seed, 0.1);
-        for (i, c) in shaken.contacts.iter_mut().enumerate() {
+        let mut shaken = gallery::shaken(problem.clone(), seed, 0.1);
+        for (i, (c, before)) in shaken.contacts.iter_mut().zip(&problem.contacts).enumerate() {
+            // Points of a manifold have one friction.
+            c.friction = before.friction;
             // From 11 mm of overlap to 5 mm of gap.
             c.gap = depth + 8.0 * c.gap;
             let load = 5.0 * shaken.h * (1.0 + 0.3 * (i as f64).sin());
@@ -116,12 +119,11 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
     let entry = table::find(variant.name);
     let Entry { against, best, bound, why, .. } = entry;
     let in_substeps = variant.budget.substeps > 1;
-    let parameters: String = variant.parameters.iter().map(|p| format!(", {} {}", p.name, p.default)).collect();
     let mut result = Agreement {
         solver: variant.name,
         source: variant.source,
         best,
-        ours: budget::brief(&variant.budget, variant) + &parameters,
+        ours: settings(variant),
         unit: if in_substeps { "substeps" } else { "iterations" },
         none_because: "",
         apart: None,
@@ -129,6 +131,7 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         why,
         departures: Vec::new(),
         curves: Vec::new(),
+        docs: String::new(),
     };
     let (method, counts) = match against {
         Against::Nothing(why) => {
@@ -160,16 +163,20 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         for &k in &counts {
             let here = replay.run(variant, budget(k), if warm { Start::Warm } else { Start::Cold });
             let here = State { v: here.velocities, x: here.moves, l: here.impulses };
-            let source = there(k, None);
+            let (source, time) = (there(k, None), problem.h * f64::from(budget(k).substeps));
             for (place, most) in departs.iter_mut().enumerate() {
-                *most = most.max(distance(&problem, &there(k, Some(place)), &source));
+                *most = most.max(distance(&problem, time, &there(k, Some(place)), &source));
             }
-            let residual = |s: &State| natural_map(&problem, Target::Rigid, &s.v, &s.l) / problem.impulse_unit();
+            let residual =
+                |s: &State| natural_map(&problem, Target::Rigid, &s.v, &s.l) / problem.impulse_unit();
             ours.push(residual(&here));
             theirs.push(residual(&source));
             // Multipliers of redundant contacts are not determined at the solution.
-            let here = State { l: if matches!(against, Against::Solution(_)) { source.l.clone() } else { here.l }, ..here };
-            apart.push(distance(&problem, &here, &source));
+            let here = State {
+                l: if matches!(against, Against::Solution(_)) { source.l.clone() } else { here.l },
+                ..here
+            };
+            apart.push(distance(&problem, time, &here, &source));
         }
         let name = problem.name.clone();
         result.curves.push(AgreementCurve { problem: name, counts: counts.clone(), ours, theirs, apart });
@@ -177,7 +184,28 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
     result.apart = result.curves.iter().flat_map(|c| &c.apart).copied().reduce(worse);
     let departures = entry.departs.iter().zip(departs).map(|(&what, apart)| Departure { what, apart });
     result.departures = departures.collect();
+    result.docs = result.section();
     Ok(result)
+}
+
+/// Standard settings in words.
+fn settings(variant: &Variant) -> String {
+    let (b, uses) = (&variant.budget, &variant.uses);
+    let mut parts: Vec<String> = [
+        (b.velocity_iterations, "iteration", uses.velocity),
+        (b.relax_iterations, "relaxing sweep", uses.relax),
+        (b.position_iterations, "position sweep", uses.position),
+    ]
+    .iter()
+    .filter(|part| part.2)
+    .map(|&(count, what, _)| format!("{count} {what}{}", if count == 1 { "" } else { "s" }))
+    .collect();
+    if b.substeps > 1 {
+        parts[0] = format!("{} substeps of {}", b.substeps, parts[0]);
+    }
+    let six_digits = |x: f32| (f64::from(x) * 1e6).round() / 1e6;
+    parts.extend(variant.parameters.iter().map(|p| format!("{} {}", p.name, six_digits(p.default))));
+    parts.join(", ")
 }
 
 /// The larger of the two; what is not a number is larger.
@@ -185,26 +213,27 @@ fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
-/// The distance of two states, see the [module](self).
-fn distance(problem: &ContactProblem, one: &State, other: &State) -> f64 {
+/// The distance of two states after `time` (s), see the [module](self).
+fn distance(problem: &ContactProblem, time: f64, one: &State, other: &State) -> f64 {
     let difference = |a: &[Velocity], b: &[Velocity]| {
         a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect::<Vec<_>>()
     };
     let free: Vec<Velocity> = problem.bodies.iter().map(|b| b.free_velocity).collect();
-    let scale = problem.mass_norm(&difference(&other.v, &free));
-    let largest = other.l.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
-    let impulses = one.l.iter().flatten().zip(other.l.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
+    let scale = problem.mass_norm(&difference(&other.v, &free)).max(problem.mass_norm(&free));
+    let largest = other.l.iter().flatten().fold(problem.impulse_unit(), |m, l| m.max(l.abs()));
+    let impulses =
+        one.l.iter().flatten().zip(other.l.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
     let parts = [
         problem.mass_norm(&difference(&one.v, &other.v)) / scale,
-        problem.mass_norm(&difference(&one.x, &other.x)) / (problem.h * scale),
-        if largest > 0.0 { impulses / largest } else { 0.0 },
+        problem.mass_norm(&difference(&one.x, &other.x)) / (time * scale),
+        impulses / largest,
     ];
     parts.into_iter().fold(0.0, worse)
 }
 
 impl Agreement {
     /// The section of its docs: all of it follows from the table and from what is measured in `f64`.
-    pub fn docs(&self) -> String {
+    fn section(&self) -> String {
         let Agreement { solver, best, ours, bound, why, unit, .. } = self;
         let kind = if self.curves[0].counts.len() > 1 {
             format!("the source's method in `f64` over {COUNT} {unit}")
@@ -214,8 +243,11 @@ impl Agreement {
         let why = if why.is_empty() { String::new() } else { format!(" ({why})") };
         let departs: Vec<String> =
             self.departures.iter().map(|d| format!("{}: {}", d.what, percent(d.apart))).collect();
-        let departs =
-            if departs.is_empty() { String::new() } else { format!(" Taken back, each alone: {}.", departs.join("; ")) };
+        let departs = if departs.is_empty() {
+            String::new()
+        } else {
+            format!(" Departures, and how far each moves the result: {}.", departs.join("; "))
+        };
         let without = match table::find(solver).without {
             [] => String::new(),
             names => format!(", both without {}", names.join(", ")),
@@ -239,7 +271,9 @@ pub fn percent(distance: f64) -> String {
 
 /// All comparisons as a table, and what departs below it.
 pub fn text(all: &[Agreement]) -> String {
-    let mut out = String::from("Distance from the source's method in f64 (largest of velocities, places and impulses)\n\n");
+    let mut out = String::from(
+        "Distance from the source's method in f64 (largest of velocities, places and impulses)\n\n",
+    );
     let width = all.iter().map(|a| a.solver.len()).max().unwrap_or(0);
     for a in all {
         let figure = match a.apart {

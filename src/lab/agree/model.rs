@@ -340,12 +340,7 @@ impl<'a> Model<'a> {
         // λ₁ + s₁ k λ₂ = q₁ and s₂ k λ₁ + λ₂ = q₂ where both push.
         let (q1, q2) = (c1 - s1 * (v1 - k * self.l[j][0]), c2 - s2 * (v2 - k * self.l[i][0]));
         let det = 1.0 - s1 * s2 * k * k;
-        let cases = [
-            [(q1 - s1 * k * q2) / det, (q2 - s2 * k * q1) / det],
-            [q1, 0.0],
-            [0.0, q2],
-            [0.0, 0.0],
-        ];
+        let cases = [[(q1 - s1 * k * q2) / det, (q2 - s2 * k * q1) / det], [q1, 0.0], [0.0, q2], [0.0, 0.0]];
         let holds = |&&[a, b]: &&DPair| {
             let wanted = [q1 - s1 * k * b, q2 - s2 * k * a];
             a >= 0.0 && b >= 0.0 && (a > 0.0 || wanted[0] <= 0.0) && (b > 0.0 || wanted[1] <= 0.0)

@@ -23,7 +23,13 @@ fn draw(all: &[Agreement], text: &mut String) -> Drawn {
     let size = ((columns * PANEL.0) as u32, (TOP + drawn.len() as i32 * PANEL.1) as u32);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
-    write(&root, "Residual of the rigid law: solver (dots), source's method in f64 (line)", (8, 18), 14, HPos::Left)?;
+    write(
+        &root,
+        "Residual of the rigid law: solver (dots), source's method in f64 (line)",
+        (8, 18),
+        14,
+        HPos::Left,
+    )?;
     for (row, agreement) in drawn.iter().enumerate() {
         for (column, curve) in agreement.curves.iter().enumerate() {
             panel(&root, (column as i32 * PANEL.0, TOP + row as i32 * PANEL.1), agreement, curve)?;

@@ -3,7 +3,7 @@
 
 use super::model::{Model, Rows, Rule, Spring, Sweep};
 use crate::engine::params::Budget;
-use crate::engine::solvers::Variant;
+use crate::engine::solvers::{Variant, xpbd as positions};
 use crate::lab::reference::DPair;
 use crate::lab::reference::residual::project_cone;
 
@@ -51,7 +51,13 @@ impl Run {
 }
 
 /// Substeps: forces, warm start, `solve` in every iteration, motion, `after`.
-fn substeps(model: &mut Model, run: &Run, turned: bool, solve: impl Fn(&mut Model), after: impl Fn(&mut Model)) {
+fn substeps(
+    model: &mut Model,
+    run: &Run,
+    turned: bool,
+    solve: impl Fn(&mut Model),
+    after: impl Fn(&mut Model),
+) {
     for _ in 0..run.budget.substeps {
         model.accelerate();
         model.warm_start(turned);
@@ -89,6 +95,21 @@ pub(super) fn pgs(model: &mut Model, run: &Run) {
     sweeps(model, run, sweep);
 }
 
+/// Its source displaces bodies: that is [`xpbd`].
+pub(super) fn pgs_substeps(model: &mut Model, run: &Run) {
+    match run.undo {
+        Some(_) => xpbd(
+            model,
+            &Run {
+                variant: &positions::SOLVER,
+                undo: None,
+                budget: Budget { position_iterations: 1, ..run.budget },
+            },
+        ),
+        None => pgs(model, run),
+    }
+}
+
 pub(super) fn sor(model: &mut Model, run: &Run) {
     let rows = if run.undoes(0) { Rows::PointByPoint } else { Rows::NormalsFirst };
     sweeps(model, run, Sweep { relax: run.get("relaxation"), rows, ..Sweep::new(run.baumgarte()) });
@@ -124,9 +145,7 @@ fn levels(model: &Model) -> Vec<usize> {
         let below = |b: Option<u32>, level: &[usize]| b.map_or(0, |b| level[b as usize]);
         let found: Vec<usize> = (model.problem.contacts.iter())
             .flat_map(|c| [(c.body_a, c.body_b), (c.body_b, c.body_a)])
-            .filter(|&(body, other)| {
-                below(body, &level) == usize::MAX && below(other, &level) == next - 1
-            })
+            .filter(|&(body, other)| below(body, &level) == usize::MAX && below(other, &level) == next - 1)
             .filter_map(|(body, _)| body.map(|b| b as usize))
             .collect();
         if found.is_empty() {
@@ -175,9 +194,9 @@ pub(super) fn mass_splitting(model: &mut Model, run: &Run) {
 
 fn all_at_once(model: &mut Model, run: &Run, spring: Spring, split: bool, by_rows: bool) {
     let relax = run.find("relaxation").unwrap_or(1.0);
-    let [soft, rigid] =
-        [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { relax, ..Sweep::new(rule) });
-    let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.jacobi(&rigid, split, by_rows));
+    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { relax, ..Sweep::new(rule) });
+    let after =
+        |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.jacobi(&rigid, split, by_rows));
     substeps(model, run, false, |m| m.jacobi(&soft, split, by_rows), after);
 }
 
@@ -242,9 +261,12 @@ pub(super) fn rapier(model: &mut Model, run: &Run) {
 /// What is left of it without its statics, frames, impacts and jams.
 pub(super) fn shim(model: &mut Model, run: &Run) {
     let rate = run.get("stiffness") / model.h;
-    let spring = Spring { carries: true, ..Spring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h) };
-    let [soft, rigid] =
-        [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { rows: Rows::BlockFirst(1e-3), ..Sweep::new(rule) });
+    let spring = Spring {
+        carries: true,
+        ..Spring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h)
+    };
+    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid]
+        .map(|rule| Sweep { rows: Rows::BlockFirst(1e-3), ..Sweep::new(rule) });
     relaxed(model, run, soft, rigid);
 }
 
@@ -314,7 +336,8 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
     };
     for substep in 0..run.budget.substeps {
         model.accelerate();
-        (0..run.budget.velocity_iterations).for_each(|_| sweep(model, run.get("baumgarte"), run.get("stick")));
+        (0..run.budget.velocity_iterations)
+            .for_each(|_| sweep(model, run.get("baumgarte"), run.get("stick")));
         model.advance();
         if substep + 1 == run.budget.substeps {
             (0..run.budget.relax_iterations).for_each(|_| sweep(model, 0.0, 0.0));
@@ -437,11 +460,14 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
                     };
                 }
                 for i in 0..points {
-                    let Some((_, j)) = m.rows(i, false).into_iter().find(|(b, _)| *b == body) else { continue };
+                    let Some((_, j)) = m.rows(i, false).into_iter().find(|(b, _)| *b == body) else {
+                        continue;
+                    };
                     let (_, force, _) = forces(m, i, alpha, l, k);
                     let rough = m.problem.contacts[i].friction > 0.0;
                     for axis in 0..if rough { 2 } else { 1 } {
-                        let j = if m.inverse[body][2] > 0.0 { j[axis] } else { [j[axis][0], j[axis][1], 0.0] };
+                        let j =
+                            if m.inverse[body][2] > 0.0 { j[axis] } else { [j[axis][0], j[axis][1], 0.0] };
                         for r in 0..3 {
                             f[r] += j[r] * force[axis];
                             (0..3).for_each(|c| a[r][c] += k[i][axis] * j[r] * j[c]);
@@ -568,25 +594,23 @@ fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
     b
 }
 
-/// u = J v(λ) + b with its friction rows, if the problem has any; and the effective masses of normal rows.
+/// u = J v(λ) + b, and the effective masses of normal rows.
 struct Law {
     bias: Vec<f64>,
     mass: Vec<f64>,
     friction: Vec<f64>,
-    rough: bool,
 }
 
 impl Law {
     fn new(model: &Model, rule: Rule) -> Self {
-        let friction: Vec<f64> = model.problem.contacts.iter().map(|c| c.friction).collect();
+        let friction = model.problem.contacts.iter().map(|c| c.friction).collect();
         let mass = (0..model.l.len()).map(|i| model.mass(&model.rows(i, false), 0)).collect();
-        Law { bias: model.bias(rule), mass, rough: friction.iter().any(|&mu| mu > 0.0), friction }
+        Law { bias: model.bias(rule), mass, friction }
     }
 
     fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
         model.jump(at);
-        let with = |(u, b): (DPair, &f64)| [u[0] + b, if self.rough { u[1] } else { 0.0 }];
-        model.speeds().into_iter().zip(&self.bias).map(with).collect()
+        model.speeds().into_iter().zip(&self.bias).map(|(u, b)| [u[0] + b, u[1]]).collect()
     }
 
     fn project(&self, l: &[DPair]) -> Vec<DPair> {
@@ -607,7 +631,8 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
     if run.undoes(0) {
         law.mass.fill(1.0);
         let ones = vec![[1.0; 2]; now.len()];
-        steepness = dot(&model.problem.delassus_product(&ones), &model.problem.delassus_product(&ones)).sqrt()
+        steepness = dot(&model.problem.delassus_product(&ones), &model.problem.delassus_product(&ones))
+            .sqrt()
             / dot(&ones, &ones).sqrt();
     }
     let mut y = now.clone();
@@ -620,7 +645,8 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
             let step = plus(&next, -1.0, &y);
             let curve = dot(&step, &plus(&law.speeds(model, &next), -1.0, &g));
             tries += 1;
-            if curve <= steepness * dot(&step, &law.scaled(&step, |m| 1.0 / m)) * (1.0 + 1e-5) || tries == 20 {
+            if curve <= steepness * dot(&step, &law.scaled(&step, |m| 1.0 / m)) * (1.0 + 1e-5) || tries == 20
+            {
                 break;
             }
             steepness *= 2.0;
@@ -657,11 +683,7 @@ pub(super) fn admm(model: &mut Model, run: &Run) {
         w.fill([0.0; 2]);
     }
     let stiff = |x: &[DPair]| law.scaled(x, |m| rho / m);
-    let rough = law.rough;
-    let product = |model: &Model, x: &[DPair]| {
-        let k = model.problem.delassus_product(x).into_iter().map(|u| [u[0], if rough { u[1] } else { 0.0 }]);
-        plus(&k.collect::<Vec<_>>(), 1.0, &stiff(x))
-    };
+    let product = |model: &Model, x: &[DPair]| plus(&model.problem.delassus_product(x), 1.0, &stiff(x));
     // Steps of conjugate gradients; all that it takes where the solver has no number for them.
     let steps = if run.undoes(1) { 1000 } else { run.find("linear_steps").map_or(1000, |n| n as usize) };
     for _ in 0..run.budget.velocity_iterations {

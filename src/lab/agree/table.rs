@@ -48,7 +48,11 @@ pub fn find(solver: &str) -> Entry {
 
 /// The table, in the order of [`crate::engine::solvers::VARIANTS`].
 pub const TABLE: &[Entry] = &[
-    entry("projection", Against::Method(by::projection), "one push and one projection, bodies against the ground"),
+    entry(
+        "projection",
+        Against::Method(by::projection),
+        "one push and one projection, bodies against the ground",
+    ),
     Entry {
         departs: &[
             "both loads of a contact before both frictions (source: point by point)",
@@ -81,9 +85,16 @@ pub const TABLE: &[Entry] = &[
     },
     Entry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
-        ..entry("pgs_soft", Against::Method(by::pgs_soft), "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 2 m/s")
+        ..entry(
+            "pgs_soft",
+            Against::Method(by::pgs_soft),
+            "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 2 m/s",
+        )
     },
-    entry("pgs_substeps", Against::Method(by::pgs), "many substeps of 1 iteration, on positions"),
+    Entry {
+        departs: &["velocities are solved, with warm starts (source: positions, without, as `xpbd`)"],
+        ..entry("pgs_substeps", Against::Method(by::pgs_substeps), "many substeps of 1 iteration")
+    },
     Entry {
         departs: &["rows of a contact keep their order on the way back (source: reversed)"],
         ..entry("symmetric_gs", Against::Method(by::symmetric), "until a residual is reached")
@@ -127,19 +138,31 @@ pub const TABLE: &[Entry] = &[
     entry("shock", Against::Method(by::shock), "sweeps until contacts are resolved, then 1 upward"),
     Entry {
         departs: &["all overlap by pseudo-velocities (source: beyond 40 mm, by velocities before)"],
-        ..entry("split_impulse", Against::Method(by::split_impulse), "10 sweeps, 0.2 of an overlap per step, no slop")
+        ..entry(
+            "split_impulse",
+            Against::Method(by::split_impulse),
+            "10 sweeps, 0.2 of an overlap per step, no slop",
+        )
     },
     Entry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
-        ..entry("jacobi", Against::Method(by::jacobi), "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 4 m/s")
+        ..entry(
+            "jacobi",
+            Against::Method(by::jacobi),
+            "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 4 m/s",
+        )
     },
     Entry {
-        departs: &["rows of a contact one after the other (source: all at once, a copy for each)"],
+        departs: &["rows of a contact one after the other (otherwise: all at once, a copy for each)"],
         ..entry("mass_splitting", Against::Method(by::mass_splitting), "rigid, until a residual is reached")
     },
     Entry {
         departs: &["arms of velocity rows are those of the start of the step (source: turned)"],
-        ..entry("tgs_ngs", Against::Method(by::tgs_ngs), "4 substeps of 1 sweep and 1 position sweep, correction 0.2")
+        ..entry(
+            "tgs_ngs",
+            Against::Method(by::tgs_ngs),
+            "4 substeps of 1 sweep and 1 position sweep, correction 0.2",
+        )
     },
     Entry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
@@ -152,7 +175,11 @@ pub const TABLE: &[Entry] = &[
             "arms are those of the start of the step (source: turned)",
             "what slides sticks again at once (source: from the next step on)",
         ],
-        ..entry("tgs_sticky", Against::Method(by::tgs_sticky), "4 substeps, 2 relaxing sweeps, β 0.8, stick 0.5, 4 m/s")
+        ..entry(
+            "tgs_sticky",
+            Against::Method(by::tgs_sticky),
+            "4 substeps, 2 relaxing sweeps, β 0.8, stick 0.5, 4 m/s",
+        )
     },
     Entry {
         departs: &["velocities are corrected on arms of the start of the step (source: turned)"],
@@ -171,7 +198,11 @@ pub const TABLE: &[Entry] = &[
             "the push cap is on γ_m β s (source: on β s)",
             "an eighth of the substep rate, 3 m/s (source: a quarter, 2 m/s)",
         ],
-        ..entry("soft_step", Against::Method(by::soft_step), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s")
+        ..entry(
+            "soft_step",
+            Against::Method(by::soft_step),
+            "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s",
+        )
     },
     Entry {
         without: &["statics", "frames", "impacts", "jams"],
