@@ -2,6 +2,7 @@
 
 use super::ablate::AblateArgs;
 use super::advise::AdviseArgs;
+use super::agree::AgreeArgs;
 use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
@@ -70,6 +71,7 @@ pub enum Command {
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
     Ablate(AblateArgs),
+    Agree(AgreeArgs),
     Torture(TortureArgs),
     Profile(ProfileArgs),
     Growth(GrowthArgs),

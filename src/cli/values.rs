@@ -95,7 +95,7 @@ fn described() -> impl Iterator<Item = PossibleValue> {
     VARIANTS.iter().map(|v| PossibleValue::new(v.name))
 }
 
-fn choice() -> impl TypedValueParser<Value = Choice> {
+pub fn choice() -> impl TypedValueParser<Value = Choice> {
     let all = std::iter::once(PossibleValue::new("all"));
     PossibleValuesParser::new(described().chain(all)).try_map(|name| match name.as_str() {
         "all" => Ok(Choice::All),

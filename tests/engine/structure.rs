@@ -86,7 +86,7 @@ const LAB: &[&[&str]] = &[
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["ablate", "profile", "compare", "torture"],
+    &["ablate", "agree", "profile", "compare", "torture"],
 ];
 
 const CONSTRAINTS: &[&[&str]] =

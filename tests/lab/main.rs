@@ -2,6 +2,7 @@
 
 mod ablation;
 mod advise;
+mod agree;
 mod broadphase;
 mod common;
 mod contacts;

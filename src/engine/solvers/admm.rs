@@ -8,6 +8,11 @@
 //! solution on. ρ is scaled by each point's effective mass, the same along n and t. The multiplier
 //! starts where the contact law puts it, at −u.
 //!
+//! **Agreement.** The source at its best: ρ by problem, until both residuals are reached. Here: 20 iterations,
+//! baumgarte 0.3, penalty 0.3, linear_steps 3. Apart from the source's method in `f64` over 10 iterations by less
+//! than 6e-5: `simpulse agree --solvers admm`. Departures, and how far each moves the result: the multiplier starts
+//! at the law's −u (source: 0): 200 %; 3 conjugate-gradient steps (source: linear problem solved): 30 %.
+//!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times
 //! 3·`linear_steps` + 3 passes over vectors, in lanes. Sweeps of a step request 63131 B per contact.
 //!

@@ -6,6 +6,11 @@
 //! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
 //! last sweep is not extrapolated, so that impulses end within their bounds.
 //!
+//! **Agreement.** The source at its best: until a residual is reached, depth by problem. Here: 8 iterations,
+//! baumgarte 0.3, depth 3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
+//! `simpulse agree --solvers anderson`. Departures, and how far each moves the result: growth of |f| by two forgets
+//! all before it (source: keeps it): 0 %.
+//!
 //! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
 //! of a step request 3830 B per contact.
 //!

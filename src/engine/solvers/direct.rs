@@ -8,9 +8,12 @@
 //! a proximal problem: ε D (λ − λ₀) is added to the relative velocities, λ₀ being the impulses
 //! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
 //! Rows of joints are in the same system: a row holds, or has the impulse at its bound. Overlap is pushed apart as in
-//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; where Newton
-//! finds nothing better, Lemke's method follows, up to 100 points and without joints. A scene of more than `largest` points is left
-//! to the sweeps; runs and studies say so.
+//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; a scene of more than `largest` points is left to them, and runs and studies say so.
+//! Where a step of Newton's finds nothing better, eight sweeps in `f64` take its place (not in scenes with joints).
+//!
+//! **Agreement.** The source at its best: until a residual is reached. Here: 20 iterations, baumgarte 0.3, sweeps 8,
+//! largest 4000, lemke 0. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (Newton's method
+//! ends at the solution of the same law, or with the sweeps that it began with): `simpulse agree --solvers direct`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
 //! of a matrix of 3 × 3 blocks, one row of blocks per body, ordered by breadth (`numerics/block_lu.rs`): n b² products of blocks in `f64` for
@@ -93,14 +96,12 @@ pub static SOLVER: Variant = Variant {
 const SHIFT: f64 = 1e-7;
 /// Pivots of Lemke's method per unknown before it gives up.
 const PIVOTS: usize = 10;
-/// Largest number of points at which Lemke's method takes over where Newton's stalls.
-const LEMKE_POINTS: usize = 100;
-/// Residual, relative to the largest impulse, above which Newton's method has stalled, not ended.
-const STALLED: f64 = 1e-6;
 /// Solves of a linear problem: one, and two for what it leaves.
 const PASSES: usize = 3;
 /// Halvings of a step before Newton gives up.
 const HALVINGS: usize = 8;
+/// Sweeps in `f64` where a step of Newton's finds nothing better.
+const SWEEPS: usize = 8;
 /// Residual, relative to the largest impulse, at which the law is solved.
 const TOLERANCE: f64 = 1e-10;
 
@@ -200,16 +201,25 @@ impl Newton {
                 accepted.then_some((trial, arguments, merit))
             })
         });
-        let Some(better) = better else {
-            let stalls = self.merit > (STALLED / TOLERANCE).powi(2) * problem.goal(&self.impulses);
-            if stalls && problem.points.len() <= LEMKE_POINTS {
-                self.pivot(system);
-            }
+        let Some(better) = better.or_else(|| self.swept()) else {
             self.done = true;
             return;
         };
         (self.impulses, self.arguments, self.merit) = better;
         self.write(system);
+    }
+
+    /// Some more sweeps where Newton's states lead nowhere, if they come nearer: then states are others.
+    fn swept(&self) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let problem = &self.problem;
+        if !problem.bounds.is_empty() {
+            return None;
+        }
+        let mut impulses = self.impulses.clone();
+        (0..SWEEPS).for_each(|_| problem.sweep(&mut impulses));
+        let arguments = problem.arguments(&impulses);
+        let merit = problem.merit(&impulses, &arguments);
+        (merit < self.merit).then_some((impulses, arguments, merit))
     }
 
     /// Lemke's answer, if it is better than what is there; nothing is left to do after it.
@@ -285,6 +295,12 @@ impl Row {
     #[inline]
     fn dot(&self, velocities: &[[f64; 3]]) -> f64 {
         self.sides().map(|(body, j)| dot(j, velocities[body])).sum()
+    }
+
+    /// Adds the effect of an impulse.
+    #[inline]
+    fn push(&self, velocities: &mut [[f64; 3]], impulse: f64) {
+        self.sides().for_each(|(body, j)| (0..3).for_each(|c| velocities[body][c] += j[c] * impulse));
     }
 
     /// The bodies that can move, with this row on them.
@@ -463,12 +479,16 @@ impl Problem {
         }
     }
 
+    /// Changes of velocities by impulses, scaled to unit masses.
+    fn moved(&self, x: &[f64]) -> Vec<[f64; 3]> {
+        let mut moved = vec![[0.0; 3]; self.neighbors.len()];
+        self.rows.iter().zip(x).filter(|(_, x)| **x != 0.0).for_each(|(row, x)| row.push(&mut moved, *x));
+        moved
+    }
+
     /// (K + R) x
     fn times(&self, x: &[f64]) -> Vec<f64> {
-        let mut moved = vec![[0.0; 3]; self.neighbors.len()];
-        for (row, x) in self.rows.iter().zip(x).filter(|(_, x)| **x != 0.0) {
-            row.sides().for_each(|(body, j)| (0..3).for_each(|c| moved[body][c] += j[c] * x));
-        }
+        let moved = self.moved(x);
         let mut product: Vec<f64> = self.rows.iter().map(|row| row.dot(&moved)).collect();
         for joint in &self.joints {
             for k in 0..joint.size {
@@ -490,6 +510,25 @@ impl Problem {
         let argument =
             |i: usize| impulses[i] - (self.velocity[i] + pushed[i]) / self.diagonal(i) - SHIFT * change[i];
         (0..impulses.len()).map(argument).collect()
+    }
+
+    /// One projected Gauss–Seidel sweep over the rows of points.
+    fn sweep(&self, impulses: &mut [f64]) {
+        let mut change: Vec<f64> = impulses.iter().zip(&self.start).map(|(l, s)| l - s).collect();
+        let mut moved = self.moved(&change);
+        for i in 0..2 * self.points.len() {
+            let u = self.velocity[i] + self.rows[i].dot(&moved);
+            let argument = impulses[i] - u / self.diagonal(i) - SHIFT * change[i];
+            impulses[i] = match i % 2 {
+                0 => argument.max(0.0),
+                _ => {
+                    let bound = self.friction[i / 2] * impulses[i - 1];
+                    argument.max(-bound).min(bound)
+                }
+            };
+            let by = impulses[i] - self.start[i] - std::mem::replace(&mut change[i], impulses[i] - self.start[i]);
+            self.rows[i].push(&mut moved, by);
+        }
     }
 
     /// Energy-weighted square of the natural map, Σ K_ii r_i² (J).
@@ -627,9 +666,7 @@ impl Problem {
         // Qᵀ x
         let act = |x: &[f64]| {
             let mut z = vec![[0.0; 3]; self.neighbors.len()];
-            for (row, x) in held.iter().zip(x) {
-                row.acts.sides().for_each(|(body, q)| (0..3).for_each(|c| z[body][c] += q[c] * x));
-            }
+            held.iter().zip(x).for_each(|(row, x)| row.acts.push(&mut z, *x));
             z
         };
         let mut y = vec![0.0; held.len()];

@@ -6,6 +6,10 @@
 //! **Departures.** Bias, slop, speculative contacts and warm starts are those of [`super::pgs`], so that the two differ in
 //! the local problem alone. The source stops by a residual; here sweeps are counted.
 //!
+//! **Agreement.** The source at its best: local solver exact, until a residual is reached. Here: 8 iterations,
+//! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
+//! `simpulse agree --solvers nsgs`.
+//!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
 //! 1750 B per contact.
 //!

@@ -7,6 +7,10 @@
 //! **Departures.** The push is shared between two bodies by their masses and inertias,
 //! λ = −s/k; the velocity is only projected along the normal and only while approaching.
 //!
+//! **Agreement.** The source at its best: one push and one projection, bodies against the ground. Here: 4 iterations,
+//! 4 position sweeps. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
+//! `simpulse agree --solvers projection`.
+//!
 //! **Cost.** Per substep 2 body passes, `position_iterations` position sweeps and
 //! `velocity_iterations` velocity sweeps. Sweeps of a step request 1306 B per contact.
 //!

@@ -11,6 +11,10 @@
 //! connected parts of a graph of who rests on whom. The source propagates shocks through contacts
 //! and not through collisions; here both are one.
 //!
+//! **Agreement.** The source at its best: sweeps until contacts are resolved, then 1 upward. Here: 4 iterations,
+//! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
+//! `simpulse agree --solvers shock`.
+//!
 //! **Cost.** That of [`super::pgs`], then per level one pass over bodies and, over its contacts,
 //! three passes: effective masses, a sweep, effective masses. Contacts are grouped by level and
 //! color, so that low levels fill few lanes. Sweeps of a step request 1920 B per contact.

@@ -6,6 +6,11 @@
 //!
 //! **Departures.** Overlap is removed without a slop: what adds no energy need not spare any.
 //!
+//! **Agreement.** The source at its best: 10 sweeps, 0.2 of an overlap per step, no slop. Here: 8 iterations, 4
+//! position sweeps, correction 0.2. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
+//! `simpulse agree --solvers split_impulse`. Departures, and how far each moves the result: all overlap by
+//! pseudo-velocities (source: beyond 40 mm, by velocities before): 20 times.
+//!
 //! **Cost.** Per substep 3 body passes, 1 warm start, `velocity_iterations` rigid sweeps and
 //! `position_iterations` sweeps without friction for pseudo-velocities; impulses and velocities are
 //! put aside and brought back, 4 passes over vectors, in lanes. Sweeps of a step request 2581 B per contact.

@@ -78,6 +78,8 @@ impl fmt::Display for Start {
 pub struct Replayed {
     /// v⁺, one per body.
     pub velocities: Vec<Velocity>,
+    /// How far each body has moved and turned (m, m, rad).
+    pub moves: Vec<Velocity>,
     /// (λn, λt), one per contact point (N·s).
     pub impulses: Vec<DPair>,
     /// Constraint sweeps of every kind.
@@ -126,9 +128,31 @@ impl<'a> Replay<'a> {
         width: LaneWidth,
         parameters: Parameters,
     ) -> Result<Self, Error> {
+        Self::set_up(problem, sequence, width, parameters, false)
+    }
+
+    /// As [`Self::new`] in natural order, without mechanisms: in every substep, which is as long as the problem's step, forces
+    /// act anew and contacts are as deep as bodies have moved.
+    pub fn in_substeps(
+        problem: &'a ContactProblem,
+        parameters: Parameters,
+        without: Without,
+    ) -> Result<Self, Error> {
+        let mut replay = Self::set_up(problem, Sequence::Natural, LaneWidth::W1, parameters, true)?;
+        replay.input.without = without;
+        Ok(replay)
+    }
+
+    fn set_up(
+        problem: &'a ContactProblem,
+        sequence: Sequence,
+        width: LaneWidth,
+        parameters: Parameters,
+        pushed: bool,
+    ) -> Result<Self, Error> {
         problem.validate()?;
         let h = problem.h as f32;
-        let bodies = setup::bodies(problem);
+        let bodies = setup::bodies(problem, pushed);
         let inert = problem.bodies.len() as u32;
         let (contacts, places) = setup::contacts(problem, inert);
         let features = setup::features(problem, &contacts);
@@ -201,9 +225,11 @@ impl<'a> Replay<'a> {
         let input = StepInput { budget, ..self.input };
         let count = self.step(&input, &mut Clock::start(false));
         let velocity = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.velocity[k]));
+        let moves = |row: &BodyRow| [0, 1, 2].map(|k| f64::from(row.delta[k]));
         let bodies = self.problem.bodies.len();
         Replayed {
             velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
+            moves: self.work.rows[..bodies].iter().map(moves).collect(),
             impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
             sweeps: count.sweeps,
             own: self.own_law(),

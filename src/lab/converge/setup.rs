@@ -9,11 +9,12 @@ use crate::lab::error::Error;
 use crate::lab::reference::{ContactProblem, ProblemContact};
 use glam::Vec2;
 
-pub(super) fn bodies(problem: &ContactProblem) -> Bodies {
+/// Bodies at the end of a step without contacts; `pushed`: at its beginning, under forces that act in every substep of h.
+pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
     let mut bodies = Bodies::default();
     for b in &problem.bodies {
         let moves = b.inv_mass > 0.0 || b.inv_inertia > 0.0;
-        let [vx, vy, w] = b.free_velocity;
+        let [vx, vy, w] = if pushed { b.velocity } else { b.free_velocity };
         let def = BodyDef {
             kind: if moves { BodyKind::Dynamic } else { BodyKind::Kinematic },
             position: [0.0; 2],
@@ -29,7 +30,13 @@ pub(super) fn bodies(problem: &ContactProblem) -> Bodies {
         };
         // Zero inverses become infinite masses, and those zero inverses again.
         let mass = MassProperties { mass: 1.0 / b.inv_mass, inertia: 1.0 / b.inv_inertia, center: [0.0; 2] };
-        bodies.push(&def, &mass);
+        let i = bodies.push(&def, &mass);
+        if pushed && moves {
+            let force =
+                |k: usize, inverse: f64| ((b.free_velocity[k] - b.velocity[k]) / problem.h / inverse) as f32;
+            (bodies.force_x[i], bodies.force_y[i]) = (force(0, b.inv_mass), force(1, b.inv_mass));
+            bodies.torque[i] = force(2, b.inv_inertia);
+        }
     }
     bodies
 }

@@ -117,12 +117,12 @@ pub fn law_residual(mu: f64, [un, ut]: DPair, [ln, lt]: DPair, [rho_n, rho_t]: D
     }
 }
 
-/// Euclidean projection onto the wedge K = {|λt| ≤ µ λn}.
+/// Euclidean projection onto the wedge K = {λn ≥ 0, |λt| ≤ µ λn}.
 ///
 /// Inside, it is the identity; in the polar wedge {µ|λt| ≤ −λn}, the apex; else the point of the
 /// nearer edge, whose direction is (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
 pub fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
-    if lt.abs() <= mu * ln {
+    if ln >= 0.0 && lt.abs() <= mu * ln {
         [ln, lt]
     } else if mu * lt.abs() <= -ln {
         [0.0, 0.0]

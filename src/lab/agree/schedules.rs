@@ -1,0 +1,719 @@
+//! The methods as their sources write them, a function each. What a source has otherwise than the solver here is done its way
+//! where [`Run::undo`] names the place of that departure in the [table](super::table).
+
+use super::model::{Model, Rows, Rule, Spring, Sweep};
+use crate::engine::params::Budget;
+use crate::engine::solvers::{Variant, xpbd as positions};
+use crate::lab::reference::DPair;
+use crate::lab::reference::residual::project_cone;
+
+/// Overlap that is left alone (m), push cap (m/s), largest correction of a position sweep (m).
+const SLOP: f64 = 0.005;
+const CAP: f64 = 3.0;
+const MOST: f64 = 0.2;
+
+/// What a schedule is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// The solver here.
+    pub variant: &'static Variant,
+    /// Its budget.
+    pub budget: Budget,
+    /// Place of a departure that is left out.
+    pub undo: Option<usize>,
+}
+
+impl Run {
+    /// Default of a parameter of the solver; none where it has no such.
+    pub fn find(&self, name: &str) -> Option<f64> {
+        self.variant.parameters.iter().find(|p| p.name == name).map(|p| f64::from(p.default))
+    }
+
+    /// The same, zero where there is none.
+    fn get(&self, name: &str) -> f64 {
+        self.find(name).unwrap_or(0.0)
+    }
+
+    /// Whether departure `place` is left out.
+    fn undoes(&self, place: usize) -> bool {
+        self.undo == Some(place)
+    }
+
+    fn baumgarte(&self) -> Rule {
+        Rule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
+    }
+
+    /// Springs at most at this share of the rate of substeps.
+    fn spring(&self, share: f64, h: f64) -> Spring {
+        let damping = self.find("damping_ratio").unwrap_or(10.0);
+        Spring::new(self.get("contact_hertz"), share, damping, self.get("push_speed"), h)
+    }
+}
+
+/// Substeps: forces, warm start, `solve` in every iteration, motion, `after`.
+fn substeps(
+    model: &mut Model,
+    run: &Run,
+    turned: bool,
+    solve: impl Fn(&mut Model),
+    after: impl Fn(&mut Model),
+) {
+    for _ in 0..run.budget.substeps {
+        model.accelerate();
+        model.warm_start(turned);
+        (0..run.budget.velocity_iterations).for_each(|_| solve(model));
+        model.advance();
+        after(model);
+    }
+}
+
+/// Sweeps alone.
+fn sweeps(model: &mut Model, run: &Run, sweep: Sweep) {
+    substeps(model, run, false, |m| m.sweep(&sweep), |_| ());
+}
+
+/// Sweeps, and after motion those of a relaxing rule.
+fn relaxed(model: &mut Model, run: &Run, sweep: Sweep, relax: Sweep) {
+    let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.sweep(&relax));
+    substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
+}
+
+/// Sweeps, and after motion position sweeps.
+fn placed(model: &mut Model, run: &Run, sweep: Sweep, position: impl Fn(&mut Model)) {
+    let after = |m: &mut Model| (0..run.budget.position_iterations).for_each(|_| position(m));
+    substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
+}
+
+pub(super) fn pgs(model: &mut Model, run: &Run) {
+    let mut sweep = Sweep::new(run.baumgarte());
+    match run.undo {
+        Some(0) => sweep.rows = Rows::PointByPoint,
+        Some(1) => sweep.rule = Rule::Baumgarte(0.2, 0.01, CAP),
+        Some(2) => sweep.rule = Rule::Baumgarte(run.get("baumgarte"), SLOP, f64::INFINITY),
+        _ => {}
+    }
+    sweeps(model, run, sweep);
+}
+
+/// Its source displaces bodies: that is [`xpbd`].
+pub(super) fn pgs_substeps(model: &mut Model, run: &Run) {
+    match run.undo {
+        Some(_) => xpbd(
+            model,
+            &Run {
+                variant: &positions::SOLVER,
+                undo: None,
+                budget: Budget { position_iterations: 1, ..run.budget },
+            },
+        ),
+        None => pgs(model, run),
+    }
+}
+
+pub(super) fn sor(model: &mut Model, run: &Run) {
+    let rows = if run.undoes(0) { Rows::PointByPoint } else { Rows::NormalsFirst };
+    sweeps(model, run, Sweep { relax: run.get("relaxation"), rows, ..Sweep::new(run.baumgarte()) });
+}
+
+pub(super) fn nsgs(model: &mut Model, run: &Run) {
+    sweeps(model, run, Sweep { rows: Rows::Cone, ..Sweep::new(run.baumgarte()) });
+}
+
+pub(super) fn symmetric(model: &mut Model, run: &Run) {
+    let sweep = Sweep::new(run.baumgarte());
+    let back = Sweep { reversed: run.undoes(0), ..sweep };
+    let pair = |m: &mut Model| {
+        m.sweep(&sweep);
+        m.sweep_in(&back, (0..m.manifolds.len()).rev());
+    };
+    substeps(model, run, false, pair, |_| ());
+}
+
+pub(super) fn local(model: &mut Model, run: &Run) {
+    let times = if run.undoes(0) { 1000 } else { run.get("local_iterations") as usize };
+    let sweep = Sweep::new(run.baumgarte());
+    let solve = |m: &mut Model| {
+        m.sweep_in(&sweep, (0..m.manifolds.len()).flat_map(|i| std::iter::repeat_n(i, times)));
+    };
+    substeps(model, run, false, solve, |_| ());
+}
+
+/// Levels of bodies: contacts between them and the nearest thing that stands still.
+fn levels(model: &Model) -> Vec<usize> {
+    let mut level = vec![usize::MAX; model.v.len()];
+    for next in 1.. {
+        let below = |b: Option<u32>, level: &[usize]| b.map_or(0, |b| level[b as usize]);
+        let found: Vec<usize> = (model.problem.contacts.iter())
+            .flat_map(|c| [(c.body_a, c.body_b), (c.body_b, c.body_a)])
+            .filter(|&(body, other)| below(body, &level) == usize::MAX && below(other, &level) == next - 1)
+            .filter_map(|(body, _)| body.map(|b| b as usize))
+            .collect();
+        if found.is_empty() {
+            break;
+        }
+        found.into_iter().for_each(|b| level[b] = next);
+    }
+    level
+}
+
+pub(super) fn shock(model: &mut Model, run: &Run) {
+    let level = levels(model);
+    let of = |m: &std::ops::Range<usize>| {
+        let sides = model.problem.contacts[m.start].sides();
+        sides.map(|(b, _)| level[b]).filter(|&l| l < usize::MAX).max().unwrap_or(0)
+    };
+    let of: Vec<usize> = model.manifolds.iter().map(of).collect();
+    let mut order: Vec<usize> = (0..of.len()).collect();
+    order.sort_by_key(|&i| of[i]);
+    let (inverse, sweep) = (model.inverse.clone(), Sweep::new(run.baumgarte()));
+    for _ in 0..run.budget.substeps {
+        model.accelerate();
+        model.warm_start(false);
+        (0..run.budget.velocity_iterations).for_each(|_| model.sweep_in(&sweep, order.iter().copied()));
+        for of_level in order.chunk_by(|&i, &j| of[i] == of[j]) {
+            let here = of[of_level[0]];
+            for (b, m) in model.inverse.iter_mut().enumerate() {
+                *m = if level[b] < here { [0.0; 3] } else { inverse[b] };
+            }
+            model.sweep_in(&sweep, of_level.iter().copied());
+        }
+        model.inverse.clone_from(&inverse);
+        model.advance();
+    }
+}
+
+pub(super) fn jacobi(model: &mut Model, run: &Run) {
+    let mut spring = run.spring(1.0 / 3.0, model.h);
+    spring.scaled = !run.undoes(0);
+    all_at_once(model, run, spring, false, false);
+}
+
+pub(super) fn mass_splitting(model: &mut Model, run: &Run) {
+    all_at_once(model, run, run.spring(1.0 / 3.0, model.h), true, run.undoes(0));
+}
+
+fn all_at_once(model: &mut Model, run: &Run, spring: Spring, split: bool, by_rows: bool) {
+    let relax = run.find("relaxation").unwrap_or(1.0);
+    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { relax, ..Sweep::new(rule) });
+    let after =
+        |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.jacobi(&rigid, split, by_rows));
+    substeps(model, run, false, |m| m.jacobi(&soft, split, by_rows), after);
+}
+
+pub(super) fn pgs_ngs(model: &mut Model, run: &Run) {
+    let mut sweep = Sweep::new(if run.undoes(1) { Rule::Closed } else { Rule::Rigid });
+    if run.undoes(0) {
+        sweep.rows = Rows::FrictionFirst;
+    }
+    placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
+}
+
+pub(super) fn pgs_ngs_block(model: &mut Model, run: &Run) {
+    let rule = if run.undoes(0) { Rule::Closed } else { Rule::Rigid };
+    placed(model, run, Sweep { rows: Rows::BlockLast(1e-3), ..Sweep::new(rule) }, |m| {
+        if run.undoes(1) {
+            m.positions_in_pairs(run.get("correction"), SLOP, MOST);
+        } else {
+            m.positions(run.get("correction"), SLOP, MOST, true);
+        }
+    });
+}
+
+pub(super) fn tgs_ngs(model: &mut Model, run: &Run) {
+    let sweep = Sweep { turned: run.undoes(0), ..Sweep::new(Rule::Rigid) };
+    placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
+}
+
+/// Springs at an eighth of the rate of substeps, or at a third of that of steps.
+fn soft(model: &mut Model, run: &Run, share: f64, turned: bool) {
+    let mut spring = run.spring(share, model.h);
+    spring.scaled = !run.undoes(0);
+    if run.undoes(1) {
+        (spring.omega, spring.cap) = (Spring::new(30.0, 0.25, 10.0, 0.0, model.h).omega, 2.0);
+    }
+    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { turned, ..Sweep::new(rule) });
+    relaxed(model, run, soft, rigid);
+}
+
+pub(super) fn pgs_soft(model: &mut Model, run: &Run) {
+    soft(model, run, 1.0 / 3.0, false);
+}
+
+pub(super) fn soft_step(model: &mut Model, run: &Run) {
+    soft(model, run, 0.125, false);
+}
+
+pub(super) fn tgs_soft(model: &mut Model, run: &Run) {
+    soft(model, run, 0.125, true);
+}
+
+pub(super) fn box2d(model: &mut Model, run: &Run) {
+    let soft = Sweep { friction: false, ..Sweep::new(Rule::Soft(run.spring(0.125, model.h))) };
+    relaxed(model, run, soft, Sweep::new(Rule::Rigid));
+}
+
+pub(super) fn rapier(model: &mut Model, run: &Run) {
+    let rows = Rows::BlockFirst(if run.undoes(0) { 1e-2 } else { 1e-3 });
+    let soft = Sweep { friction: false, rows, ..Sweep::new(Rule::Soft(run.spring(0.125, model.h))) };
+    relaxed(model, run, soft, Sweep { rows, ..Sweep::new(Rule::Rigid) });
+}
+
+/// What is left of it without its statics, frames, impacts and jams.
+pub(super) fn shim(model: &mut Model, run: &Run) {
+    let rate = run.get("stiffness") / model.h;
+    let spring = Spring {
+        carries: true,
+        ..Spring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h)
+    };
+    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid]
+        .map(|rule| Sweep { rows: Rows::BlockFirst(1e-3), ..Sweep::new(rule) });
+    relaxed(model, run, soft, rigid);
+}
+
+pub(super) fn projection(model: &mut Model, run: &Run) {
+    let touching = Sweep { friction: false, ..Sweep::new(Rule::Touching(SLOP)) };
+    for _ in 0..run.budget.substeps {
+        model.l.fill([0.0; 2]);
+        model.accelerate();
+        model.advance();
+        (0..run.budget.position_iterations).for_each(|_| model.positions(1.0, 0.0, MOST, false));
+        (0..run.budget.velocity_iterations).for_each(|_| model.sweep(&touching));
+    }
+}
+
+pub(super) fn split_impulse(model: &mut Model, run: &Run) {
+    let share = run.get("correction");
+    let (rigid, push) = match run.undoes(0) {
+        true => (Rule::Shallow(share, 0.04), Rule::Deep(share, 0.04)),
+        false => (Rule::Rigid, Rule::Baumgarte(share, 0.0, CAP)),
+    };
+    let push = Sweep { friction: false, ..Sweep::new(push) };
+    substeps(
+        model,
+        run,
+        false,
+        |m| m.sweep(&Sweep::new(rigid)),
+        |m| {
+            let kept = (m.v.clone(), m.l.clone());
+            m.v.fill([0.0; 3]);
+            m.l.fill([0.0; 2]);
+            (0..run.budget.position_iterations).for_each(|_| m.sweep(&push));
+            m.advance();
+            (m.v, m.l) = kept;
+        },
+    );
+}
+
+pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
+    let points = model.l.len();
+    let mut drifts = vec![0.0; points];
+    model.l.fill([0.0; 2]);
+    let turned = run.undoes(2);
+    let mut sweep = |m: &mut Model, fraction: f64, stick: f64| {
+        let rule = match run.undoes(1) && fraction == 0.0 {
+            true => Rule::Closed,
+            false => Rule::Baumgarte(fraction, 0.0, run.get("push_speed")),
+        };
+        for range in m.manifolds.clone() {
+            m.contact(range.clone(), &Sweep { friction: false, turned, ..Sweep::new(rule) });
+            let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
+            let share = if run.undoes(0) { 2.0 } else { range.len() as f64 };
+            for i in range {
+                let (rows, mass, [s, drift]) = (m.rows(i, turned), m.mass(&m.rows(i, false), 1), m.place(i));
+                let drifted = drifts[i] + drift;
+                let back = if s < 2.0 * SLOP { stick * drifted / m.h } else { 0.0 };
+                let bound = m.problem.contacts[i].friction * total / share;
+                let wanted = m.l[i][1] - mass * (m.speed(&rows, 1) + back);
+                let new = wanted.clamp(-bound, bound);
+                m.push(&rows, 1, new - m.l[i][1]);
+                m.l[i][1] = new;
+                // What slides begins to stick again where it is.
+                if wanted.abs() > bound && !run.undoes(3) {
+                    drifts[i] = -drift;
+                }
+            }
+        }
+    };
+    for substep in 0..run.budget.substeps {
+        model.accelerate();
+        (0..run.budget.velocity_iterations)
+            .for_each(|_| sweep(model, run.get("baumgarte"), run.get("stick")));
+        model.advance();
+        if substep + 1 == run.budget.substeps {
+            (0..run.budget.relax_iterations).for_each(|_| sweep(model, 0.0, 0.0));
+        }
+    }
+}
+
+pub(super) fn xpbd(model: &mut Model, run: &Run) {
+    let compliance = run.get("compliance") / (model.h * model.h);
+    for _ in 0..run.budget.substeps {
+        model.accelerate();
+        let begin = model.x.clone();
+        model.advance();
+        // λ of displacements (kg·m).
+        let mut l = vec![[0.0; 2]; model.l.len()];
+        for _ in 0..run.budget.position_iterations {
+            for range in model.manifolds.clone() {
+                for (i, axis) in range.clone().map(|i| (i, 0)).chain(range.map(|i| (i, 1))) {
+                    let (rows, place) = (model.rows(i, true), model.place(i));
+                    let change = if axis == 0 {
+                        let error = place[0].clamp(-run.get("push_speed") * model.h, 0.0);
+                        // A point that does not touch takes nothing back where it is rigid.
+                        let wanted = -(error + compliance * l[i][0]);
+                        wanted / (1.0 / model.mass(&rows, 0) + compliance)
+                    } else {
+                        let wanted = -place[1] * model.mass(&rows, 1);
+                        let bound = model.problem.contacts[i].friction * l[i][0];
+                        if l[i][0] > 0.0 && (l[i][1] + wanted).abs() <= bound { wanted } else { 0.0 }
+                    };
+                    l[i][axis] += change;
+                    model.displace(&rows, axis, change);
+                }
+            }
+        }
+        for (v, (x, begin)) in model.v.iter_mut().zip(model.x.iter().zip(&begin)) {
+            *v = [0, 1, 2].map(|k| (x[k] - begin[k]) / model.h);
+        }
+        model.l = l.iter().map(|l| l.map(|l| l / model.h)).collect();
+        for range in model.manifolds.clone() {
+            for (axis, i) in [0, 1].into_iter().flat_map(|axis| range.clone().map(move |i| (axis, i))) {
+                let rows = model.rows(i, run.undoes(0));
+                let bound = model.problem.contacts[i].friction * model.l[i][0];
+                let stop = -model.mass(&rows, axis) * model.speed(&rows, axis);
+                let change = if axis == 0 { stop } else { stop.clamp(-bound, bound) };
+                if model.l[i][0] > 0.0 {
+                    model.push(&rows, axis, change);
+                }
+            }
+        }
+    }
+}
+
+/// Bodies in the order in which contacts name them.
+fn bodies_in_order(model: &Model) -> Vec<usize> {
+    let mut order = Vec::new();
+    for body in model.problem.contacts.iter().flat_map(|c| c.sides().map(|(b, _)| b)) {
+        if !order.contains(&body) && model.inverse[body][0] > 0.0 {
+            order.push(body);
+        }
+    }
+    order
+}
+
+/// From no multipliers and penalties of 1 N/m, as a first step has them.
+pub(super) fn avbd(model: &mut Model, run: &Run) {
+    let (h, points, order) = (model.h, model.l.len(), bodies_in_order(model));
+    let stabilizes = run.budget.position_iterations > 0;
+    let (margin, alpha) = (5e-4, if stabilizes { 1.0 } else { run.get("alpha") });
+    let keep = if stabilizes { 1.0 } else { run.get("alpha") * run.get("gamma") };
+    // λ (N) and k (N/m) of normal and friction rows, the force of the last iteration, velocities of the last substep.
+    let (mut l, mut k) = (vec![[0.0; 2]; points], vec![[1.0; 2]; points]);
+    let mut last: Vec<[f64; 3]> = vec![[0.0; 3]; model.v.len()];
+    for _ in 0..run.budget.substeps {
+        l.iter_mut().flatten().for_each(|l| *l *= keep);
+        k.iter_mut().flatten().for_each(|k| *k = (*k * run.get("gamma")).clamp(1.0, 1e9));
+        let begin = model.x.clone();
+        // Errors are linear in the motion from the start of the step; C₀ is that at the start of the substep.
+        let linear = |m: &Model, i: usize| {
+            let mut c = [m.problem.contacts[i].gap + margin, 0.0];
+            for (b, j) in m.rows(i, false) {
+                (0..2).for_each(|axis| (0..3).for_each(|k| c[axis] += j[axis][k] * m.x[b][k]));
+            }
+            c
+        };
+        let first: Vec<DPair> = (0..points).map(|i| linear(model, i)).collect();
+        let share: Vec<f64> = (0..model.v.len())
+            .map(|b| {
+                let (v, a) = (model.v[b], model.gained[b]);
+                let square = a[0] * a[0] + a[1] * a[1];
+                let along = (v[0] - last[b][0]) * a[0] + (v[1] - last[b][1]) * a[1];
+                if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 1.0 }
+            })
+            .collect();
+        last.clone_from(&model.v);
+        model.accelerate();
+        model.advance();
+        let inertial = model.x.clone();
+        for &b in &order {
+            (0..3).for_each(|c| model.x[b][c] -= (1.0 - share[b]) * h * model.gained[b][c]);
+        }
+        let forces = |m: &Model, i: usize, alpha: f64, l: &[DPair], k: &[DPair]| {
+            let c = linear(m, i);
+            // Gaps have no error to leave alone.
+            let old = [if first[i][0] - margin > 0.0 { 0.0 } else { first[i][0] }, 0.0];
+            let c = [c[0] - alpha * old[0], c[1] - first[i][1]];
+            let normal = (l[i][0] - k[i][0] * c[0]).max(0.0);
+            let bound = m.problem.contacts[i].friction * if run.undoes(0) { l[i][0] } else { normal };
+            (c, [normal, (l[i][1] - k[i][1] * c[1]).clamp(-bound, bound)], bound)
+        };
+        let descend = |m: &mut Model, alpha: f64, l: &[DPair], k: &[DPair]| {
+            for &body in &order {
+                let mut a = [[0.0; 3]; 3];
+                let mut f = [0.0; 3];
+                for c in 0..3 {
+                    let inertia = 1.0 / (m.inverse[body][c] * h * h);
+                    // What does not turn has infinite inertia.
+                    (a[c][c], f[c]) = match inertia.is_finite() {
+                        true => (inertia, inertia * (inertial[body][c] - m.x[body][c])),
+                        false => (1.0, 0.0),
+                    };
+                }
+                for i in 0..points {
+                    let Some((_, j)) = m.rows(i, false).into_iter().find(|(b, _)| *b == body) else {
+                        continue;
+                    };
+                    let (_, force, _) = forces(m, i, alpha, l, k);
+                    let rough = m.problem.contacts[i].friction > 0.0;
+                    for axis in 0..if rough { 2 } else { 1 } {
+                        let j =
+                            if m.inverse[body][2] > 0.0 { j[axis] } else { [j[axis][0], j[axis][1], 0.0] };
+                        for r in 0..3 {
+                            f[r] += j[r] * force[axis];
+                            (0..3).for_each(|c| a[r][c] += k[i][axis] * j[r] * j[c]);
+                        }
+                    }
+                }
+                let change = solve3(a, f);
+                (0..3).for_each(|c| m.x[body][c] += change[c]);
+            }
+        };
+        for _ in 0..run.budget.velocity_iterations {
+            descend(model, alpha, &l, &k);
+            let before = (l.clone(), k.clone());
+            for i in 0..points {
+                let (c, force, bound) = forces(model, i, alpha, &before.0, &before.1);
+                l[i] = force;
+                let within = [force[0] > 0.0, force[1].abs() < bound];
+                for axis in (0..2).filter(|&axis| within[axis]) {
+                    k[i][axis] = (k[i][axis] + run.get("beta") * c[axis].abs()).min(1e9);
+                }
+            }
+        }
+        for (v, (x, begin)) in model.v.iter_mut().zip(model.x.iter().zip(&begin)) {
+            *v = [0, 1, 2].map(|c| (x[c] - begin[c]) / h);
+        }
+        (0..run.budget.position_iterations).for_each(|_| descend(model, 0.0, &l, &k));
+        model.l = l.iter().map(|l| l.map(|l| h * l)).collect();
+    }
+}
+
+/// A x = f by Cramer's rule.
+fn solve3(a: [[f64; 3]; 3], f: [f64; 3]) -> [f64; 3] {
+    let det = |m: [[f64; 3]; 3]| {
+        let minor = |p: usize, q: usize| m[1][p] * m[2][q] - m[1][q] * m[2][p];
+        m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+    };
+    [0, 1, 2].map(|column| {
+        let mut m = a;
+        (0..3).for_each(|r| m[r][column] = f[r]);
+        det(m) / det(a)
+    })
+}
+
+fn dot(a: &[DPair], b: &[DPair]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum()
+}
+
+/// a + s b
+fn plus(a: &[DPair], s: f64, b: &[DPair]) -> Vec<DPair> {
+    a.iter().zip(b).map(|(a, b)| [a[0] + s * b[0], a[1] + s * b[1]]).collect()
+}
+
+pub(super) fn nncg(model: &mut Model, run: &Run) {
+    let sweep = Sweep::new(run.baumgarte());
+    let count = run.budget.velocity_iterations;
+    model.accelerate();
+    model.warm_start(false);
+    let (mut p, mut previous) = (vec![[0.0; 2]; model.l.len()], f64::INFINITY);
+    for k in 0..count {
+        let before = model.l.clone();
+        model.sweep(&sweep);
+        if k + 1 == count && !run.undoes(0) {
+            break;
+        }
+        let r = plus(&model.l, -1.0, &before);
+        let square = dot(&r, &r);
+        let beta = if square <= previous && square > 0.0 { square / previous } else { 0.0 };
+        previous = square;
+        model.jump(&plus(&model.l, beta, &p));
+        p = plus(&r, beta, &p);
+    }
+    model.advance();
+}
+
+pub(super) fn anderson(model: &mut Model, run: &Run) {
+    let sweep = Sweep::new(run.baumgarte());
+    let (count, depth) = (run.budget.velocity_iterations, run.get("depth") as usize);
+    model.accelerate();
+    model.warm_start(false);
+    // f and g of the sweeps since the last start.
+    let mut seen: Vec<[Vec<DPair>; 2]> = Vec::new();
+    for k in 0..count {
+        let before = model.l.clone();
+        model.sweep(&sweep);
+        if k + 1 == count {
+            break;
+        }
+        let (f, g) = (plus(&model.l, -1.0, &before), model.l.clone());
+        if seen.last().is_some_and(|[last, _]| dot(&f, &f) > 4.0 * dot(last, last)) && !run.undoes(0) {
+            seen.clear();
+        }
+        seen.push([f, g]);
+        let difference = |at: usize, of: usize| plus(&seen[at][of], -1.0, &seen[at - 1][of]);
+        let columns: Vec<usize> = (1..seen.len()).rev().take(depth).collect();
+        let [df, dg] = [0, 1].map(|of| columns.iter().map(|&at| difference(at, of)).collect::<Vec<_>>());
+        let [f, g] = &seen[seen.len() - 1];
+        let mut gram: Vec<Vec<f64>> = df.iter().map(|a| df.iter().map(|b| dot(a, b)).collect()).collect();
+        let trace: f64 = (0..df.len()).map(|i| gram[i][i]).sum();
+        (0..df.len()).for_each(|i| gram[i][i] += 1e-9 * trace);
+        let gamma = solve(gram, df.iter().map(|a| dot(a, f)).collect());
+        let next = gamma.iter().zip(&dg).fold(g.clone(), |next, (gamma, dg)| plus(&next, -gamma, dg));
+        model.jump(&next);
+    }
+    model.advance();
+}
+
+/// A x = b by Gaussian elimination.
+fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+    let n = b.len();
+    for i in 0..n {
+        let pivot = (i..n).max_by(|&p, &q| a[p][i].abs().total_cmp(&a[q][i].abs())).unwrap_or(i);
+        a.swap(i, pivot);
+        b.swap(i, pivot);
+        for r in (i + 1)..n {
+            let factor = a[r][i] / a[i][i];
+            (i..n).for_each(|c| a[r][c] -= factor * a[i][c]);
+            b[r] -= factor * b[i];
+        }
+    }
+    for i in (0..n).rev() {
+        let known: f64 = (i + 1..n).map(|c| a[i][c] * b[c]).sum();
+        b[i] = (b[i] - known) / a[i][i];
+    }
+    b
+}
+
+/// u = J v(λ) + b, and the effective masses of normal rows.
+struct Law {
+    bias: Vec<f64>,
+    mass: Vec<f64>,
+    friction: Vec<f64>,
+}
+
+impl Law {
+    fn new(model: &Model, rule: Rule) -> Self {
+        let friction = model.problem.contacts.iter().map(|c| c.friction).collect();
+        let mass = (0..model.l.len()).map(|i| model.mass(&model.rows(i, false), 0)).collect();
+        Law { bias: model.bias(rule), mass, friction }
+    }
+
+    fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
+        model.jump(at);
+        model.speeds().into_iter().zip(&self.bias).map(|(u, b)| [u[0] + b, u[1]]).collect()
+    }
+
+    fn project(&self, l: &[DPair]) -> Vec<DPair> {
+        l.iter().zip(&self.friction).map(|(&l, &mu)| project_cone(mu, l)).collect()
+    }
+
+    /// Every pair times a number of its own.
+    fn scaled(&self, l: &[DPair], by: impl Fn(f64) -> f64) -> Vec<DPair> {
+        l.iter().zip(&self.mass).map(|(l, &m)| l.map(|l| by(m) * l)).collect()
+    }
+}
+
+pub(super) fn apgd(model: &mut Model, run: &Run) {
+    model.accelerate();
+    model.warm_start(false);
+    let mut law = Law::new(model, run.baumgarte());
+    let (mut theta, mut steepness, mut now) = (1.0_f64, 1.0, model.l.clone());
+    if run.undoes(0) {
+        law.mass.fill(1.0);
+        let ones = vec![[1.0; 2]; now.len()];
+        steepness = dot(&model.problem.delassus_product(&ones), &model.problem.delassus_product(&ones))
+            .sqrt()
+            / dot(&ones, &ones).sqrt();
+    }
+    let mut y = now.clone();
+    for _ in 0..run.budget.velocity_iterations {
+        let g = law.speeds(model, &y);
+        let mut next;
+        let mut tries = 0;
+        loop {
+            next = law.project(&plus(&y, -1.0 / steepness, &law.scaled(&g, |m| m)));
+            let step = plus(&next, -1.0, &y);
+            let curve = dot(&step, &plus(&law.speeds(model, &next), -1.0, &g));
+            tries += 1;
+            if curve <= steepness * dot(&step, &law.scaled(&step, |m| 1.0 / m)) * (1.0 + 1e-5) || tries == 20
+            {
+                break;
+            }
+            steepness *= 2.0;
+        }
+        let square = theta * theta;
+        let after = 0.5 * ((square * square + 4.0 * square).sqrt() - square);
+        let mut beta = theta * (1.0 - theta) / (square + after);
+        theta = after;
+        if dot(&g, &plus(&next, -1.0, &now)) > 0.0 {
+            (beta, theta) = (0.0, 1.0);
+        }
+        y = plus(&next, beta, &plus(&next, -1.0, &now));
+        now = next;
+        steepness *= 0.9;
+    }
+    model.jump(&now);
+    model.advance();
+}
+
+pub(super) fn admm(model: &mut Model, run: &Run) {
+    model.accelerate();
+    model.warm_start(false);
+    let law = Law::new(model, run.baumgarte());
+    let rho = run.get("penalty");
+    let mut lambda = model.l.clone();
+    let mut z = lambda.clone();
+    let slide = |u: Vec<DPair>| -> Vec<DPair> {
+        u.iter().zip(&law.friction).map(|(u, mu)| [u[0] + mu * u[1].abs(), u[1]]).collect()
+    };
+    // The multiplier is where the law puts it, in the polar cone.
+    let w = law.scaled(&slide(law.speeds(model, &lambda)), |m| -m / rho);
+    let mut w = plus(&w, -1.0, &law.project(&w));
+    if run.undoes(0) {
+        w.fill([0.0; 2]);
+    }
+    let stiff = |x: &[DPair]| law.scaled(x, |m| rho / m);
+    let product = |model: &Model, x: &[DPair]| plus(&model.problem.delassus_product(x), 1.0, &stiff(x));
+    // Steps of conjugate gradients; all that it takes where the solver has no number for them.
+    let steps = if run.undoes(1) { 1000 } else { run.find("linear_steps").map_or(1000, |n| n as usize) };
+    for _ in 0..run.budget.velocity_iterations {
+        let u = slide(law.speeds(model, &lambda));
+        let mut r = plus(&stiff(&plus(&plus(&z, -1.0, &w), -1.0, &lambda)), -1.0, &u);
+        let scaled = |r: &[DPair]| law.scaled(r, |m| m / (1.0 + rho));
+        let mut p = scaled(&r);
+        let (mut square, goal) = (dot(&r, &p), 1e-28 * dot(&r, &p));
+        for _ in 0..steps {
+            if square <= goal {
+                break;
+            }
+            let image = product(model, &p);
+            let length = square / dot(&p, &image);
+            lambda = plus(&lambda, length, &p);
+            r = plus(&r, -length, &image);
+            let next = dot(&r, &scaled(&r));
+            p = plus(&scaled(&r), next / square, &p);
+            square = next;
+        }
+        let both = plus(&lambda, 1.0, &w);
+        z = law.project(&both);
+        w = plus(&both, -1.0, &z);
+    }
+    model.jump(&z);
+    model.advance();
+}
+
+/// The solution of the law of [`pgs`], which Gauss–Seidel approaches.
+pub(super) fn solution(model: &mut Model, run: &Run) {
+    let budget = Budget { velocity_iterations: 5000, ..run.budget };
+    pgs(model, &Run { budget, undo: None, ..*run });
+}
