@@ -1,5 +1,6 @@
 //! A step's problem as vectors: impulses λ, velocities v and the Jacobian J.
 
 pub mod blocks;
+pub mod body_matrix;
 pub(crate) mod passes;
 pub mod system;

@@ -150,6 +150,11 @@ impl<'a> System<'a> {
         self.over_others(VectorTask::Soften, Softness::RIGID, x, Some(y));
     }
 
+    /// x ← (1 + Y R)⁻¹ x of rows of joints, Y being diagonal with the entries of `y`, in lanes; contacts stay as they are.
+    pub fn yield_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
+        self.over_others(VectorTask::Yield, Softness::RIGID, x, Some(y));
+    }
+
     /// Impulses of joints become the nearest ones within their bounds, in lanes; contacts stay as they are.
     pub fn bound_lanes(&mut self, x: &mut PointVector) {
         self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
