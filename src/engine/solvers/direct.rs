@@ -297,14 +297,8 @@ impl Problem {
     /// Of contact points alone, without the matrix.
     fn new(points: Vec<PointRows>, impulses: &[Pair], velocities: &[Pair], surfaces: &[Pair]) -> Self {
         let flat = |v: &[Pair]| points.iter().flat_map(|p| v[p.at].map(f64::from)).collect::<Vec<_>>();
-        // J of a point on one of its bodies, along u: ±u and ± r × u.
-        let of = |p: &PointRows, side: usize, axis: usize| {
-            let sign = if side == 0 { -1.0 } else { 1.0 };
-            let [x, y] = p.axes[axis];
-            [x, y, p.arms[axis][side]].map(|j| sign * f64::from(j))
-        };
         let row =
-            |p: &PointRows, axis: usize| Row { bodies: p.bodies, jacobian: [of(p, 0, axis), of(p, 1, axis)] };
+            |p: &PointRows, axis: usize| Row { bodies: p.bodies, jacobian: [p.on(0, axis), p.on(1, axis)] };
         let rows = points.iter().flat_map(|p| [row(p, 0), row(p, 1)]).collect();
         let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
         let (start, velocity) = (flat(impulses), flat(velocities));

@@ -64,10 +64,11 @@ pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
 pub mod tgs_sticky;
+pub mod two_level;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 31] = [
+pub static VARIANTS: [&Variant; 32] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -99,6 +100,7 @@ pub static VARIANTS: [&Variant; 31] = [
     &rapier::SOLVER,
     &physx::SOLVER,
     &jolt::SOLVER,
+    &two_level::SOLVER,
 ];
 
 /// The solver that is used where none is named.

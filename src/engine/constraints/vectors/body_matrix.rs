@@ -13,7 +13,7 @@
 use crate::engine::constraints::numerics::envelope::Envelope;
 use crate::engine::constraints::records::rows::{ROWS, RowBlock};
 use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, PointRows, System};
+use crate::engine::constraints::vectors::system::{Pair, System};
 use crate::engine::lanes::BodyRow;
 
 /// The matrix and its factor; keeps its memory.
@@ -74,7 +74,7 @@ impl BodyMatrix {
         let unit = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
         (0..self.roots.len()).for_each(|body| self.envelope.add_block::<3>(body, body, unit));
         for point in system.point_rows() {
-            let rows = [0, 1].map(|axis| self.scaled(point.bodies, |side| on_side(&point, side, axis)));
+            let rows = [0, 1].map(|axis| self.scaled(point.bodies, |side| point.on(side, axis)));
             let diagonal = square(&rows[0]);
             if diagonal > 0.0 {
                 let root = (compliance / diagonal).sqrt();
@@ -156,13 +156,6 @@ impl BodyMatrix {
             self.envelope.add_block::<3>(bodies[0] as usize, bodies[1] as usize, product(0, 1));
         }
     }
-}
-
-/// J of a row of a contact point on body `side`.
-fn on_side(point: &PointRows, side: usize, axis: usize) -> [f64; 3] {
-    let sign = if side == 0 { -1.0 } else { 1.0 };
-    let [x, y] = point.axes[axis];
-    [x, y, point.arms[axis][side]].map(|j| sign * f64::from(j))
 }
 
 /// J M⁻¹ Jᵀ of a row.

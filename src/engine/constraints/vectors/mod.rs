@@ -2,5 +2,7 @@
 
 pub mod blocks;
 pub mod body_matrix;
+pub mod conjugate;
+pub mod levels;
 pub(crate) mod passes;
 pub mod system;

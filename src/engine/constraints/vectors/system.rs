@@ -348,6 +348,15 @@ pub struct PointRows {
     pub arms: [Pair; 2],
 }
 
+impl PointRows {
+    /// J of its row along n (`axis` 0) or t on body a or b: `[u, r × u]` with the sign of its side.
+    pub fn on(&self, side: usize, axis: usize) -> [f64; 3] {
+        let sign = if side == 0 { -1.0 } else { 1.0 };
+        let [x, y] = self.axes[axis];
+        [x, y, self.arms[axis][side]].map(|j| sign * f64::from(j))
+    }
+}
+
 /// Bytes of a point's geometry and its two bodies.
 const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
 
