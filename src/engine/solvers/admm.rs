@@ -8,7 +8,7 @@
 //! points a contact as for one. ρ is scaled by each point's effective mass, the same along n and t; it is balanced on the
 //! ratio of residuals by its square root, at most every `adapt_every` iterations, while the source multiplies it by fixed
 //! powers of the ratio of extreme eigenvalues. No proximal term: rows that depend on each other need none in the space of the bodies.
-//! The multiplier starts where the contact law puts it, at −u. Rows of joints are in the same vectors, with their bounds in
+//! The multiplier starts where the contact law puts it: at −u where points slide or open, at zero where they hold. Rows of joints are in the same vectors, with their bounds in
 //! place of cones. A factor that would be larger than `factor_limit` is replaced by ten steps of conjugate gradients.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over contacts, 4 over vectors
@@ -53,16 +53,16 @@ pub static SOLVER: Variant = Variant {
     name: "admm",
     source: "carpentier2024",
     summary: "a factorized linear problem and a projection on friction cones in turn; adaptive penalty",
-    budget: Budget { substeps: 1, velocity_iterations: 10, relax_iterations: 0, position_iterations: 0 },
+    budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
             name: "penalty",
             unit: "",
-            default: 0.03,
-            range: [1e-5, 1e3],
+            default: 0.1,
+            range: [1e-4, 1e3],
             meaning: "ρ at the start of a step: weight of agreement against the law",
-            trials: &[0.01, 0.03, 0.3],
+            trials: &[0.03, 0.1, 0.3],
         },
         Parameter {
             name: "adapt_every",
@@ -93,7 +93,7 @@ const BALANCE: f64 = 30.0;
 const TOLERATED: f64 = 5.0;
 const GREATEST_CHANGE: f64 = 30.0;
 /// Bounds of the penalty.
-const PENALTIES: [f64; 2] = [1e-5, 1.0];
+const PENALTIES: [f64; 2] = [1e-4, 1.0];
 /// Steps of conjugate gradients in the place of a factor.
 const LINEAR_STEPS: usize = 10;
 
@@ -191,7 +191,8 @@ impl Solver for Admm {
 }
 
 impl Admm {
-    /// λ = z = what is there, w = −(u + R λ) D/ρ within the polar cone.
+    /// λ = z = what is there, and w what x = λ − D (u + (µ |ut|, 0)) is outside of the cone, by ρ: where a point slides or opens
+    /// that is −u D/ρ; where it holds, what is left of u is no multiplier.
     fn begin(&mut self, system: &mut System<'_>, v: &mut Vectors, rule: Baumgarte) {
         system.lane_surfaces(&mut v.bias);
         update([&mut v.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
@@ -208,18 +209,17 @@ impl Admm {
         update([&mut v.u], [&v.bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
         v.trial.clone_from(&v.u);
         system.soften_lanes(&mut v.trial, &mut v.lambda);
-        update([&mut v.w], [&v.trial, &v.bias, &v.compliance], |_, [u, bias, c]| {
-            let w = scaled(-1.0, product(c, with_slide(u, bias)));
-            // A multiplier is in the polar cone.
-            [difference(w, cone::project_point(w, bias[1]))]
+        // x = λ − D (u + R λ + (µ |ut|, 0))
+        update([&mut v.w, &mut v.target], [&v.z, &v.trial, &v.bias, &v.mass], |_, [z, u, bias, m]| {
+            let x = difference(z, product(m, with_slide(u, bias)));
+            [difference(x, cone::project_point(x, bias[1])), x]
         });
         if system.has_joints() {
-            // What is beyond the bounds of a joint of z + w.
-            update([&mut v.trial], [&v.z, &v.compliance], |[u], [z, c]| [difference(z, product(c, u))]);
-            v.image.clone_from(&v.trial);
+            v.image.clone_from(&v.target);
             system.bound_lanes(&mut v.image);
-            update([&mut v.w], [&v.trial, &v.image], |[w], [all, within]| [sum(w, difference(all, within))]);
+            update([&mut v.w], [&v.target, &v.image], |[w], [x, within]| [sum(w, difference(x, within))]);
         }
+        update([&mut v.w], [], |[w], []| [scaled(compliance, w)]);
         velocities(system.rows(), &mut self.added);
         self.added.iter_mut().zip(&self.free).for_each(|(v, free)| (0..3).for_each(|k| v[k] -= free[k]));
     }
