@@ -59,7 +59,7 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "penalty",
             unit: "",
-            default: 0.1,
+            default: 0.3,
             range: [1e-4, 1e3],
             meaning: "ρ at the start of a step: weight of agreement against the law",
             trials: &[0.03, 0.1, 0.3],
@@ -90,8 +90,10 @@ pub static SOLVER: Variant = Variant {
 /// Ratio of the two residuals that the penalty aims at, and how far off it has to be: the square root of what is missing,
 /// within [`GREATEST_CHANGE`].
 const BALANCE: f64 = 30.0;
-const TOLERATED: f64 = 5.0;
+const TOLERATED: f64 = 10.0;
 const GREATEST_CHANGE: f64 = 30.0;
+/// Residuals that are as small as this beside λ tell nothing of the penalty (1).
+const SMALL: f64 = 1e-5;
 /// Bounds of the penalty.
 const PENALTIES: [f64; 2] = [1e-4, 1.0];
 /// Steps of conjugate gradients in the place of a factor.
@@ -164,7 +166,8 @@ impl Solver for Admm {
                 }
             });
             for k in 1..=budget.velocity_iterations {
-                let adapts = every >= 1.0 && k % every as u32 == 0 && k < budget.velocity_iterations;
+                let adapts =
+                    every >= 1.0 && k % every as u32 == 0 && k + every as u32 <= budget.velocity_iterations;
                 passes.with_system(Phase::Solve, |system| self.iterate(system, &mut v, adapts));
                 passes.count_sweep(2);
                 passes.iteration_done();
@@ -361,7 +364,8 @@ impl Admm {
             })
         };
         let (primal, dual) = (energy(&v.lambda, &v.z), self.penalty.powi(2) * energy(&v.z, &v.image));
-        if primal + dual <= 0.0 {
+        let whole = sum_of_products([&v.z, &v.mass], |[z, m]| [z, quotient(z, m)]);
+        if primal.max(dual) <= SMALL * SMALL * whole {
             return;
         }
         let balance = (primal / dual).sqrt() / BALANCE;
