@@ -1,23 +1,22 @@
 //! The alternating direction method of multipliers: a linear problem and a projection take turns
-//! until they agree.
+//! until they agree. The linear problem is factorized once a step and again where its penalty changes.
 //!
-//! **Source.** `boyd2011`, section 3; `desaxce1998` (friction as one cone, of which µ |ut| is part of the
-//! normal velocity).
+//! **Source.** `carpentier2024` (a cached factor, an adaptive penalty, the law of `desaxce1998`: friction as one cone, of
+//! which µ |ut| is part of the normal velocity); `boyd2011`, section 3 (the method, and residual balancing, 3.4.1).
 //!
-//! **Departures.** Rows of joints are in the same vectors, with their bounds in place of cones. The linear problem is solved by a few steps of conjugate gradients, preconditioned by D, from the last
-//! solution on. ρ is scaled by each point's effective mass, the same along n and t. The multiplier
-//! starts where the contact law puts it, at −u.
+//! **Departures.** The factor is that of the bodies' velocities instead of that of the contacts', which is as large for two
+//! points a contact as for one. ρ is scaled by each point's effective mass, the same along n and t; it is balanced on the
+//! ratio of residuals by its square root, at most every `adapt_every` iterations, while the source multiplies it by fixed
+//! powers of the ratio of extreme eigenvalues. No proximal term: rows that depend on each other need none in the space of the bodies.
+//! The multiplier starts where the contact law puts it: at −u where points slide or open, at zero where they hold. Rows of joints are in the same vectors, with their bounds in
+//! place of cones. A factor that would be larger than `factor_limit` is replaced by ten steps of conjugate gradients.
 //!
-//! **Agreement.** The source at its best: ρ by problem, until both residuals are reached. Here: 20 iterations,
-//! baumgarte 0.3, penalty 0.3, linear_steps 3. Apart from the source's method in `f64` over 10 iterations by less
-//! than 6e-5: `simpulse agree --solvers admm`. Departures, and how far each moves the result: the multiplier starts
-//! at the law's −u (source: 0): 200 %; 3 conjugate-gradient steps (source: linear problem solved): 30 %.
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over contacts, 4 over vectors
+//! and 1 substitution, n b operations for n = 3 rows a body in a band of b; n b²/2 of a factorization, of which a step has 1 to
+//! 4. Sweeps of a step request 63131 B per contact.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times
-//! 3·`linear_steps` + 3 passes over vectors, in lanes. Sweeps of a step request 63131 B per contact.
-//!
-//! **Fails when** ρ suits other scenes: it decides how fast λ and z agree against how fast they move. A
-//! pyramid of 15 boxes takes it 70 iterations to a residual of 10⁻⁴ and 170 to 10⁻⁶.
+//! **Fails when** bands are wide: a pyramid of base m has b = 3 m. Where things slide a small ρ is slow, where
+//! loads are carried down a column a large one is, and the step begins with one for all.
 //!
 //! # The method
 //!
@@ -28,6 +27,13 @@
 //!
 //! with the cone of friction Π and scaled multipliers w; where both agree, u + (µ |ut|, 0) = −ρ D⁻¹ w
 //! is in the polar cone, which is Coulomb's law.
+//!
+//! # The penalty
+//!
+//! λ converges by ρ/(ρ + κ) an iteration for each eigenvalue κ of D^(1/2) K D^(1/2) of what stays in contact: small ρ is fast,
+//! and κ falls with the square of the height of a column. What slides has its cone turned by u, which moves by ρ an
+//! iteration: large ρ is fast. The residuals tell which it is: λ − z is zero in a column, and in a slide it is some hundred
+//! times ρ D⁻¹ Δz.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
@@ -36,15 +42,17 @@ use crate::engine::constraints::kernels::velocity::sweep::Sweep;
 use crate::engine::constraints::records::point_vector::{
     PointEntry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, sum_of_products, update,
 };
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
+use crate::engine::constraints::vectors::blocks::JointBlocks;
+use crate::engine::constraints::vectors::body_matrix::{BodyMatrix, velocities};
+use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, System, numerics::cone};
 use crate::engine::lanes::Lanes;
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
     name: "admm",
-    source: "boyd2011",
-    summary: "a linear problem and a projection on friction cones in turn",
+    source: "carpentier2024",
+    summary: "a factorized linear problem and a projection on friction cones in turn; adaptive penalty",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,
@@ -53,165 +61,336 @@ pub static SOLVER: Variant = Variant {
             unit: "",
             default: 0.3,
             range: [1e-4, 1e3],
-            meaning: "ρ: weight of agreement against the law",
-            trials: &[0.1, 0.3, 1.0],
+            meaning: "ρ at the start of a step: weight of agreement against the law",
+            trials: &[0.03, 0.1, 0.3],
         },
         Parameter {
-            name: "linear_steps",
-            unit: "",
-            default: 3.0,
-            range: [1.0, 100.0],
-            meaning: "conjugate-gradient steps per iteration",
-            trials: &[3.0, 6.0],
+            name: "adapt_every",
+            unit: "iterations",
+            default: 5.0,
+            range: [0.0, 1000.0],
+            meaning: "how often ρ may change; 0: never",
+            trials: &[],
+        },
+        Parameter {
+            name: "factor_limit",
+            unit: "million numbers",
+            default: 16.0,
+            range: [0.0, 1000.0],
+            meaning: "size of a factor above which conjugate gradients take its place",
+            trials: &[],
         },
     ],
-    breaks: &[
-        (Law::Converges, "to the law of `pgs`, but roundings grow in its inner iterations"),
-        (Law::Rest, "20 iterations are too few for tall stacks"),
-    ],
+    breaks: &[(Law::Converges, "to the law of `pgs`, but its multipliers begin at the wrong contacts")],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: || Box::new(Admm::default()),
     ..Variant::BASE
 };
 
-fn step(passes: &mut Passes<'_>) {
-    let (budget, h) = (passes.budget(), passes.h());
-    let [fraction, penalty, linear] = [0, 1, 2].map(|i| passes.parameter(i));
-    let rule = Baumgarte::new(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, h);
-    let law = rule.of_errors();
-    for substep in 0..budget.substeps {
-        passes.integrate_velocities();
-        passes.warm_start();
-        let [mut bias, mut stiffness, mut inverse, mut lambda, mut z, mut w] =
-            [(); 6].map(|_| passes.vector());
-        let [mut u, mut right, mut direction, mut image, mut step] = [(); 5].map(|_| passes.vector());
-        passes.with_system(Phase::Solve, |system| {
-            system.lane_surfaces(&mut bias);
-            update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
-            system.lane_bias(law, &mut bias);
-            system.lane_masses(&mut stiffness);
-            // ρ D⁻¹ and D/(1 + ρ), the same along n and t.
-            update([&mut stiffness, &mut inverse], [], |[mass, _], []| {
-                let mass = [mass[0]; 2];
-                [quotient([Wide::splat(penalty); 2], mass), scaled(1.0 / (1.0 + penalty), mass)]
-            });
-            system.lane_impulses(&mut lambda);
-            z.clone_from(&lambda);
-            velocity(system, &bias, &mut lambda, &mut u);
-            update([&mut w], [&u, &bias, &stiffness], |_, [u, bias, stiffness]| {
-                let w = quotient(scaled(-1.0, with_slide(u, bias)), stiffness);
-                // A multiplier is in the polar cone.
-                [difference(w, cone::project_point(w, bias[1]))]
-            });
-            if system.has_joints() {
-                // What is beyond the bounds of a joint of z − u/S.
-                update([&mut right], [&u, &stiffness, &z], |_, [u, stiffness, z]| {
-                    [difference(z, quotient(u, stiffness))]
-                });
-                step.clone_from(&right);
-                system.bound_lanes(&mut step);
-                update([&mut w], [&right, &step], |[w], [all, within]| [sum(w, difference(all, within))]);
-            }
-        });
-        for _ in 0..budget.velocity_iterations {
+/// Ratio of the two residuals that the penalty aims at, and how far off it has to be: the square root of what is missing,
+/// within [`GREATEST_CHANGE`].
+const BALANCE: f64 = 30.0;
+const TOLERATED: f64 = 10.0;
+const GREATEST_CHANGE: f64 = 30.0;
+/// Residuals that are as small as this beside λ tell nothing of the penalty (1).
+const SMALL: f64 = 1e-5;
+/// Bounds of the penalty.
+const PENALTIES: [f64; 2] = [1e-4, 1.0];
+/// Steps of conjugate gradients in the place of a factor.
+const LINEAR_STEPS: usize = 10;
+
+/// Memory of the method, and the step at work.
+#[derive(Clone, Debug, Default)]
+struct Admm {
+    matrix: BodyMatrix,
+    joints: JointBlocks,
+    /// v without any impulse, and what impulses add to it (m/s, rad/s).
+    free: Vec<[f64; 3]>,
+    added: Vec<[f64; 3]>,
+    change: Vec<[f64; 3]>,
+    penalty: f64,
+    is_factorized: bool,
+}
+
+/// Vectors of a substep.
+struct Vectors {
+    /// b, and µ.
+    bias: PointVector,
+    /// D: the same along n and t; zero along t without friction.
+    mass: PointVector,
+    /// D/ρ
+    compliance: PointVector,
+    lambda: PointVector,
+    z: PointVector,
+    w: PointVector,
+    /// J v + b
+    u: PointVector,
+    /// z − w − (µ |ut|, 0) D/ρ, where λ is at u = 0.
+    target: PointVector,
+    trial: PointVector,
+    image: PointVector,
+    /// Of conjugate gradients.
+    direction: PointVector,
+}
+
+impl Solver for Admm {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [fraction, penalty, every, limit] = [0, 1, 2, 3].map(|i| passes.parameter(i));
+        let rule = Baumgarte::new(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, h);
+        self.penalty = f64::from(penalty);
+        for substep in 0..budget.substeps {
+            passes.integrate_velocities();
+            passes.with_system(Phase::Solve, |system| velocities(system.rows(), &mut self.free));
+            passes.warm_start();
+            let mut v = Vectors {
+                bias: passes.vector(),
+                mass: passes.vector(),
+                compliance: passes.vector(),
+                lambda: passes.vector(),
+                z: passes.vector(),
+                w: passes.vector(),
+                u: passes.vector(),
+                target: passes.vector(),
+                trial: passes.vector(),
+                image: passes.vector(),
+                direction: passes.vector(),
+            };
             passes.with_system(Phase::Solve, |system| {
-                // Residual of the linear problem at λ: velocities are those of λ.
-                velocity(system, &bias, &mut lambda, &mut u);
-                update(
-                    [&mut right],
-                    [&u, &bias, &stiffness, &z, &w, &lambda],
-                    |_, [u, bias, stiffness, z, w, lambda]| {
-                        let target = [0, 1].map(|k| stiffness[k] * (z[k] - w[k] - lambda[k]));
-                        [difference(target, with_slide(u, bias))]
-                    },
-                );
-                conjugate_gradients(
-                    system,
-                    linear as u32,
-                    [&stiffness, &inverse],
-                    [&mut lambda, &mut right, &mut direction, &mut image, &mut step, &mut u],
-                );
-                update([&mut z, &mut w], [&lambda, &bias], |[_, w], [lambda, bias]| {
-                    let both = sum(lambda, w);
-                    let z = cone::project_point(both, bias[1]);
-                    [z, difference(both, z)]
-                });
-                if system.has_joints() {
-                    // Of joints z is λ + w by now, and w zero.
-                    right.clone_from(&z);
-                    system.bound_lanes(&mut z);
-                    update([&mut w], [&right, &z], |[w], [both, z]| [sum(w, difference(both, z))]);
+                self.begin(system, &mut v, rule);
+                if substep == 0 || system.has_joints() {
+                    self.joints =
+                        if system.has_joints() { system.joint_blocks() } else { JointBlocks::default() };
+                    let numbers = self.matrix.begin(system, &self.joints);
+                    self.is_factorized = numbers as f64 <= 1e6 * f64::from(limit) && self.factorize(system);
                 }
-                system.set_lane_impulses(&mut z);
             });
-            passes.count_sweep(2);
-            passes.iteration_done();
+            for k in 1..=budget.velocity_iterations {
+                let adapts =
+                    every >= 1.0 && k % every as u32 == 0 && k + every as u32 <= budget.velocity_iterations;
+                passes.with_system(Phase::Solve, |system| self.iterate(system, &mut v, adapts));
+                passes.count_sweep(2);
+                passes.iteration_done();
+            }
+            passes.with_system(Phase::Solve, |system| {
+                // What is kept is z, which is in the cones, and velocities are those of z.
+                for (row, free) in system.rows().iter_mut().zip(&self.free) {
+                    (0..3).for_each(|k| row.velocity[k] = free[k] as f32);
+                }
+                system.push_lanes(&mut v.z);
+            });
+            passes.solves(&Sweep(rule));
+            let Vectors { bias, mass, compliance, lambda, z, w, u, target, trial, image, direction } = v;
+            passes.give_back([bias, mass, compliance, lambda, z, w]);
+            passes.give_back([u, target, trial, image, direction]);
+            passes.integrate_positions();
+            passes.end_substep(substep);
         }
-        passes.with_system(Phase::Solve, |system| {
-            // What is kept is z, which is in the cones.
-            update([&mut step], [&z, &lambda], |_, [z, lambda]| [difference(z, lambda)]);
-            system.push_lanes(&mut step);
-        });
-        passes.solves(&Sweep(rule));
-        passes.give_back([bias, stiffness, inverse, lambda, z, w]);
-        passes.give_back([u, right, direction, image, step]);
-        passes.integrate_positions();
-        passes.end_substep(substep);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
     }
 }
 
-/// u = J v + b + R λ, b along n alone; R of joints with springs.
-fn velocity(system: &mut System<'_>, bias: &PointVector, lambda: &mut PointVector, to: &mut PointVector) {
-    system.lane_velocities(to);
-    update([to], [bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
-    system.soften_lanes(to, lambda);
+impl Admm {
+    /// λ = z = what is there, and w what x = λ − D (u + (µ |ut|, 0)) is outside of the cone, by ρ: where a point slides or opens
+    /// that is −u D/ρ; where it holds, what is left of u is no multiplier.
+    fn begin(&mut self, system: &mut System<'_>, v: &mut Vectors, rule: Baumgarte) {
+        system.lane_surfaces(&mut v.bias);
+        update([&mut v.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+        system.lane_bias(rule.of_errors(), &mut v.bias);
+        system.lane_masses(&mut v.mass);
+        let compliance = (1.0 / self.penalty) as f32;
+        update([&mut v.mass, &mut v.compliance], [&v.bias], |[m, _], [bias]| {
+            let m = [m[0], Lanes::select_positive(bias[1], m[0], Wide::zero())];
+            [m, scaled(compliance, m)]
+        });
+        system.lane_impulses(&mut v.lambda);
+        v.z.clone_from(&v.lambda);
+        system.lane_velocities(&mut v.u);
+        update([&mut v.u], [&v.bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
+        v.trial.clone_from(&v.u);
+        system.soften_lanes(&mut v.trial, &mut v.lambda);
+        // x = λ − D (u + R λ + (µ |ut|, 0))
+        update([&mut v.w, &mut v.target], [&v.z, &v.trial, &v.bias, &v.mass], |_, [z, u, bias, m]| {
+            let x = difference(z, product(m, with_slide(u, bias)));
+            [difference(x, cone::project_point(x, bias[1])), x]
+        });
+        if system.has_joints() {
+            v.image.clone_from(&v.target);
+            system.bound_lanes(&mut v.image);
+            update([&mut v.w], [&v.target, &v.image], |[w], [x, within]| [sum(w, difference(x, within))]);
+        }
+        update([&mut v.w], [], |[w], []| [scaled(compliance, w)]);
+        velocities(system.rows(), &mut self.added);
+        self.added.iter_mut().zip(&self.free).for_each(|(v, free)| (0..3).for_each(|k| v[k] -= free[k]));
+    }
+
+    fn factorize(&mut self, system: &System<'_>) -> bool {
+        self.matrix.factorize(system, &self.joints, 1.0 / self.penalty)
+    }
+
+    fn iterate(&mut self, system: &mut System<'_>, v: &mut Vectors, adapts: bool) {
+        update([&mut v.target], [&v.z, &v.w, &v.u, &v.bias, &v.compliance], |_, [z, w, u, bias, c]| {
+            let slide = difference(with_slide(u, bias), u);
+            [difference(difference(z, w), product(c, slide))]
+        });
+        if self.is_factorized {
+            self.solve(system, v);
+        } else {
+            self.solve_by_gradients(system, v);
+        }
+        v.image.clone_from(&v.z);
+        update([&mut v.z, &mut v.w], [&v.lambda, &v.bias], |[_, w], [lambda, bias]| {
+            let both = sum(lambda, w);
+            let z = cone::project_point(both, bias[1]);
+            [z, difference(both, z)]
+        });
+        if system.has_joints() {
+            // Of joints z is λ + w by now, and w zero.
+            v.trial.clone_from(&v.z);
+            system.bound_lanes(&mut v.z);
+            update([&mut v.w], [&v.trial, &v.z], |[w], [both, z]| [sum(w, difference(both, z))]);
+        }
+        if adapts {
+            self.adapt(system, v);
+        }
+        system.set_lane_impulses(&mut v.z);
+    }
+
+    /// Velocities of the linear problem, in the space of the bodies: with S = (C⁻¹ + R)⁻¹
+    ///
+    /// ```text
+    /// (M + Jᵀ S J) δ = Jᵀ S (C⁻¹ target − u) − M Δv,    Δv ← Δv + δ,   u ← u + J δ
+    /// ```
+    ///
+    /// u and Δv follow the small δ, so that no rounding of large velocities is divided by ρ.
+    fn solve(&mut self, system: &mut System<'_>, v: &mut Vectors) {
+        // λ = (1 + C R)⁻¹ (target − C u), before and after.
+        let impulses = |system: &mut System<'_>, v: &mut Vectors| {
+            update([&mut v.lambda], [&v.target, &v.u, &v.compliance], |_, [t, u, c]| {
+                [difference(t, product(c, u))]
+            });
+            system.yield_lanes(&mut v.lambda, &mut v.compliance);
+        };
+        impulses(system, v);
+        system.rows().iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
+        system.push_lanes(&mut v.lambda);
+        velocities(system.rows(), &mut self.change);
+        self.change.iter_mut().zip(&self.added).for_each(|(x, added)| (0..3).for_each(|k| x[k] -= added[k]));
+        self.matrix.solve(&mut self.change);
+        for ((row, added), x) in system.rows().iter_mut().zip(&mut self.added).zip(&self.change) {
+            for k in 0..3 {
+                row.velocity[k] = x[k] as f32;
+                added[k] += x[k];
+            }
+        }
+        system.lane_velocities(&mut v.image);
+        update([&mut v.u], [&v.image], |[u], [more]| [sum(u, more)]);
+        impulses(system, v);
+        self.show(system);
+    }
+
+    /// Some steps of conjugate gradients on (K + R + C⁻¹) λ = C⁻¹ target − J v − b, from the last λ on, preconditioned by
+    /// D/(1 + ρ): rows of soft joints are stiffer than contacts by any factor.
+    fn solve_by_gradients(&mut self, system: &mut System<'_>, v: &mut Vectors) {
+        let share = 1.0 / (1.0 + self.penalty as f32);
+        let before = |r: PointEntry, m: PointEntry| scaled(share, product(m, r));
+        let norm =
+            |r: &PointVector, mass: &PointVector| sum_of_products([r, mass], |[r, m]| [r, before(r, m)]);
+        // `trial` is the residual.
+        v.image.clone_from(&v.u);
+        system.soften_lanes(&mut v.image, &mut v.lambda);
+        update(
+            [&mut v.trial, &mut v.direction],
+            [&v.target, &v.lambda, &v.image, &v.compliance, &v.mass],
+            |_, [t, lambda, u, c, m]| {
+                let r = difference(quotient(difference(t, lambda), c), u);
+                [r, before(r, m)]
+            },
+        );
+        let mut square = norm(&v.trial, &v.mass);
+        for _ in 0..LINEAR_STEPS {
+            if square <= 0.0 {
+                break;
+            }
+            // K p is what the impulses p make of J v alone.
+            system.rows().iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
+            system.push_lanes(&mut v.direction);
+            velocities(system.rows(), &mut self.change);
+            system.lane_velocities(&mut v.image);
+            system.soften_lanes(&mut v.image, &mut v.direction);
+            update([&mut v.image], [&v.direction, &v.compliance], |[image], [p, c]| {
+                [sum(image, quotient(p, c))]
+            });
+            let curve = dot(&v.direction, &v.image);
+            if curve <= 0.0 {
+                break;
+            }
+            let length = square / curve;
+            for (added, x) in self.added.iter_mut().zip(&self.change) {
+                (0..3).for_each(|k| added[k] += length * x[k]);
+            }
+            let length = length as f32;
+            update([&mut v.lambda, &mut v.trial], [&v.direction, &v.image], |[lambda, r], [p, image]| {
+                [plus_scaled(lambda, length, p), plus_scaled(r, -length, image)]
+            });
+            let next = norm(&v.trial, &v.mass);
+            let beta = (next / square) as f32;
+            square = next;
+            update([&mut v.direction], [&v.trial, &v.mass], |[p], [r, m]| {
+                [plus_scaled(before(r, m), beta, p)]
+            });
+        }
+        self.show(system);
+        system.lane_velocities(&mut v.u);
+        update([&mut v.u], [&v.bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
+    }
+
+    /// Velocities of the bodies are those of λ.
+    fn show(&self, system: &mut System<'_>) {
+        for ((row, free), added) in system.rows().iter_mut().zip(&self.free).zip(&self.added) {
+            (0..3).for_each(|k| row.velocity[k] = (free[k] + added[k]) as f32);
+        }
+    }
+
+    /// Residual balancing: λ − z and ρ D⁻¹ Δz in units of energy.
+    fn adapt(&mut self, system: &mut System<'_>, v: &mut Vectors) {
+        let energy = |x: &PointVector, y: &PointVector| {
+            sum_of_products([x, y, &v.mass], |[x, y, m]| {
+                let d = difference(x, y);
+                [d, quotient(d, m)]
+            })
+        };
+        let (primal, dual) = (energy(&v.lambda, &v.z), self.penalty.powi(2) * energy(&v.z, &v.image));
+        let whole = sum_of_products([&v.z, &v.mass], |[z, m]| [z, quotient(z, m)]);
+        if primal.max(dual) <= SMALL * SMALL * whole {
+            return;
+        }
+        let balance = (primal / dual).sqrt() / BALANCE;
+        let change = balance.sqrt().clamp(1.0 / GREATEST_CHANGE, GREATEST_CHANGE);
+        let penalty =
+            (self.penalty * change).clamp(PENALTIES[0].min(self.penalty), PENALTIES[1].max(self.penalty));
+        let change = (penalty / self.penalty) as f32;
+        if (1.0 / TOLERATED as f32..=TOLERATED as f32).contains(&change) {
+            return;
+        }
+        self.penalty = penalty;
+        update([&mut v.w, &mut v.compliance], [], |[w, c], []| {
+            [scaled(1.0 / change, w), scaled(1.0 / change, c)]
+        });
+        self.is_factorized = self.is_factorized && self.factorize(system);
+    }
+}
+
+/// Entry by entry.
+fn product(x: PointEntry, y: PointEntry) -> PointEntry {
+    [x[0] * y[0], x[1] * y[1]]
 }
 
 /// u + (µ |ut|, 0), the second entry of `bias` being µ.
 fn with_slide(u: PointEntry, bias: PointEntry) -> PointEntry {
-    [bias[1].mul_add(Lanes::max(u[1], -u[1]), u[0]), u[1]]
-}
-
-/// Steps of conjugate gradients on (K + S) x = r, S diagonal; λ becomes λ + x, and velocities follow.
-fn conjugate_gradients(
-    system: &mut System<'_>,
-    steps: u32,
-    [stiffness, inverse]: [&PointVector; 2],
-    [lambda, residual, direction, image, step, before]: [&mut PointVector; 6],
-) {
-    // Preconditioned: rows of soft joints are stiffer than contacts by any factor.
-    let norm = |r: &PointVector| sum_of_products([r, inverse], |[r, m]| [r, [0, 1].map(|k| m[k] * r[k])]);
-    update([direction], [residual, inverse], |_, [r, m]| [[0, 1].map(|k| m[k] * r[k])]);
-    let mut square = norm(residual);
-    for _ in 0..steps {
-        if square <= 0.0 {
-            break;
-        }
-        // K p is the change of J v under the impulses p.
-        system.lane_velocities(before);
-        system.push_lanes(direction);
-        system.lane_velocities(image);
-        update([image], [before, stiffness, direction], |[after], [before, stiffness, p]| {
-            [[0, 1].map(|k| after[k] - before[k] + stiffness[k] * p[k])]
-        });
-        system.soften_lanes(image, direction);
-        let curve = dot(direction, image);
-        if curve <= 0.0 {
-            // Rounding: take the trial back and stop.
-            update([step], [direction], |_, [p]| [scaled(-1.0, p)]);
-            system.push_lanes(step);
-            break;
-        }
-        let length = (square / curve) as f32;
-        update([step, lambda, residual], [direction, image], |[_, lambda, residual], [p, image]| {
-            [scaled(length - 1.0, p), plus_scaled(lambda, length, p), plus_scaled(residual, -length, image)]
-        });
-        system.push_lanes(step);
-        let next = norm(residual);
-        let beta = (next / square) as f32;
-        square = next;
-        update([direction], [residual, inverse], |[p], [r, m]| {
-            [plus_scaled([0, 1].map(|k| m[k] * r[k]), beta, p)]
-        });
-    }
+    let slide = bias[1].max(Wide::zero()) * Lanes::max(u[1], -u[1]);
+    [u[0] + slide, u[1]]
 }

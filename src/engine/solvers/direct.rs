@@ -410,16 +410,10 @@ impl Problem {
         surfaces: &[Pair],
     ) -> Self {
         let flat = |v: &[Pair]| points.iter().flat_map(|p| v[p.at].map(f64::from)).collect::<Vec<_>>();
-        // J of a point on one of its bodies, along u: ±u and ± r × u.
-        let of = |p: &PointRows, side: usize, axis: usize| {
-            let sign = if side == 0 { -1.0 } else { 1.0 };
-            let [x, y] = p.axes[axis];
-            [x, y, p.arms[axis][side]].map(|j| sign * f64::from(j))
-        };
         let friction = points.iter().map(|p| f64::from(surfaces[p.at][1])).collect();
         let rows = points
             .iter()
-            .flat_map(|p| [0, 1].map(|axis| row(bodies, p.bodies, [of(p, 0, axis), of(p, 1, axis)])));
+            .flat_map(|p| [0, 1].map(|axis| row(bodies, p.bodies, [p.on(0, axis), p.on(1, axis)])));
         let rows = rows.collect();
         let (start, velocity) = (flat(impulses), flat(velocities));
         let (bounds, joints, diagonal, neighbors) = (vec![], vec![], vec![], vec![]);

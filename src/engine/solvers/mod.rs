@@ -41,6 +41,7 @@ pub mod avbd;
 pub mod box2d;
 pub mod direct;
 pub mod jacobi;
+pub mod jolt;
 pub mod local_gs;
 pub mod mass_splitting;
 pub mod nncg;
@@ -50,6 +51,7 @@ pub mod pgs_ngs;
 pub mod pgs_ngs_block;
 pub mod pgs_soft;
 pub mod pgs_substeps;
+pub mod physx;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
@@ -62,10 +64,11 @@ pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
 pub mod tgs_sticky;
+pub mod two_level;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 29] = [
+pub static VARIANTS: [&Variant; 32] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -95,6 +98,9 @@ pub static VARIANTS: [&Variant; 29] = [
     &shim::SOLVER,
     &box2d::SOLVER,
     &rapier::SOLVER,
+    &physx::SOLVER,
+    &jolt::SOLVER,
+    &two_level::SOLVER,
 ];
 
 /// The solver that is used where none is named.

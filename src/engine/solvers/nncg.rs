@@ -28,7 +28,7 @@
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::records::point_vector::{difference, dot, scaled, sum, update};
+use crate::engine::constraints::vectors::conjugate::Conjugate;
 use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
@@ -50,32 +50,16 @@ fn step(passes: &mut Passes<'_>) {
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
-        let [mut last, mut swept, mut direction] = [(); 3].map(|_| passes.vector());
-        passes.with_system(Phase::Solve, |system| system.lane_impulses(&mut last));
-        let mut previous = f64::INFINITY;
-        for k in 0..budget.velocity_iterations {
+        let mut conjugate = Conjugate::new([(); 3].map(|_| passes.vector()));
+        passes.with_system(Phase::Solve, |system| conjugate.begin(system));
+        for k in 1..=budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rule);
             passes.iteration_done();
-            if k + 1 == budget.velocity_iterations {
-                break;
+            if k < budget.velocity_iterations {
+                passes.with_system(Phase::Solve, |system| conjugate.go_on(system));
             }
-            passes.with_system(Phase::Solve, |system| {
-                system.lane_impulses(&mut swept);
-                // From here on `last` is r, then what is added to λ.
-                update([&mut last], [&swept], |[last], [swept]| [difference(swept, last)]);
-                let square = dot(&last, &last);
-                let beta = if square <= previous && square > 0.0 { (square / previous) as f32 } else { 0.0 };
-                previous = square;
-                update([&mut last, &mut direction, &mut swept], [], |[r, p, swept], []| {
-                    let step = scaled(beta, p);
-                    [step, sum(r, step), sum(swept, step)]
-                });
-                system.set_lane_impulses(&mut swept);
-                system.push_lanes(&mut last);
-                std::mem::swap(&mut last, &mut swept);
-            });
         }
-        passes.give_back([last, swept, direction]);
+        passes.give_back(conjugate.vectors());
         passes.integrate_positions();
         passes.end_substep(substep);
     }

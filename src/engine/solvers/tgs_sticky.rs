@@ -22,15 +22,13 @@
 //! **Fails when** stacks are tall: without a warm start each step begins cold, and 0.8 of an
 //! overlap per substep is pushed out as velocity.
 
-mod sweep;
-
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::sticky::Sticky;
 use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::StepParts;
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
+use crate::engine::constraints::step::Drifts;
+use crate::engine::constraints::{ImpactLaw, Passes, Solver};
 use crate::engine::params::{Budget, LINEAR_SLOP, Parameter};
-use sweep::{BookDrift, LoadDrift, Sticky, StickySweep};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -76,40 +74,36 @@ const REACH: f32 = 2.0 * LINEAR_SLOP;
 /// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct TgsSticky {
-    /// How far each point has drifted before the step (m), in the order of the lanes.
-    drifts: PointVector,
+    drifts: Drifts,
 }
 
 impl Solver for TgsSticky {
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h) = (passes.budget(), passes.h());
         let [fraction, stick, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
+        let sticky = Sticky { h, fraction, push_speed, stick, reach: REACH, patch: None };
         passes.forget_impulses();
-        self.load(passes);
+        self.drifts.load(passes);
         for substep in 0..budget.substeps {
             passes.integrate_velocities();
             if substep > 0 {
                 passes.restart_joints();
             }
             for _ in 0..budget.velocity_iterations {
-                self.sweep(passes, Phase::Solve, Sticky { h, fraction, push_speed, stick, reach: REACH });
+                self.drifts.sweep(passes, Phase::Solve, sticky);
                 passes.iteration_done();
             }
             passes.integrate_positions();
             if substep + 1 == budget.substeps {
                 for _ in 0..budget.relax_iterations {
-                    let relax = Sticky { h, fraction: 0.0, push_speed, stick: 0.0, reach: REACH };
-                    self.sweep(passes, Phase::Relax, relax);
+                    self.drifts.sweep(passes, Phase::Relax, Sticky { fraction: 0.0, stick: 0.0, ..sticky });
                 }
             }
             passes.bounce(substep);
         }
         // Impulses add up over the whole step, as nothing is applied twice.
         passes.book_impulses();
-        if passes.rows_per_point() == 2 {
-            let drifts = passes.parts_of(&mut self.drifts);
-            passes.run(Phase::Store, &mut BookDrift { reach: REACH, drifts });
-        }
+        self.drifts.book(passes, REACH);
     }
 
     fn boxed(&self) -> Box<dyn Solver> {
@@ -118,27 +112,5 @@ impl Solver for TgsSticky {
 
     fn held_bytes(&self) -> usize {
         self.drifts.held_bytes()
-    }
-}
-
-impl TgsSticky {
-    /// Brings drifts into the order of the lanes, once a step and before all sweeps.
-    fn load(&mut self, passes: &mut Passes<'_>) {
-        if passes.runs(Phase::Prepare) {
-            self.drifts.clear();
-            if passes.rows_per_point() == 2 {
-                let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
-                self.drifts.reset([lanes, serial], 0);
-                let drifts = passes.parts_of(&mut self.drifts);
-                passes.run(Phase::Prepare, &mut LoadDrift { drifts });
-            }
-        }
-    }
-
-    fn sweep(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky) {
-        let drifts = passes.parts_of(&mut self.drifts);
-        if passes.run(phase, &mut StickySweep { sticky, drifts }) {
-            passes.count_sweep(passes.rows_per_point());
-        }
     }
 }

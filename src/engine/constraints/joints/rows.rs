@@ -480,6 +480,23 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                     }
                 }
             }
+            VectorTask::Yield => {
+                if let RowLaw::Spring { damping, .. } = law {
+                    // (y⁻¹ + R) x' = y⁻¹ x
+                    let (mut k, scale) = (pair.response(&j), one / damping.max(least));
+                    let mut right = [L::zero(); N];
+                    for r in 0..N {
+                        let stiffness = y[at(r)].select_positive(one / y[at(r)], one);
+                        right[r] = stiffness * x[at(r)];
+                        for c in 0..=r {
+                            let more = if r == c { stiffness } else { L::zero() };
+                            k[r][c] = scale.mul_add(k[r][c], more);
+                        }
+                    }
+                    let solved = solve(k, right);
+                    (0..N).for_each(|i| x[at(i)] = solved[i]);
+                }
+            }
             VectorTask::Bound => {
                 let cap = match law {
                     RowLaw::Motor { cap, .. } => Some(cap),

@@ -108,6 +108,8 @@ pub enum VectorTask {
     Bias,
     /// x ← x + R y
     Soften,
+    /// x ← (1 + y R)⁻¹ x, y diagonal
+    Yield,
     /// x becomes the nearest impulses within their bounds.
     Bound,
 }

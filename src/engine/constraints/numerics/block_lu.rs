@@ -35,27 +35,7 @@ const NONE: usize = usize::MAX;
 impl<const B: usize> BlockLu<B> {
     /// Begins a system of zeros of `n` rows in which row i couples with `neighbors(i)`, of which some may be i itself.
     pub fn begin<I: Iterator<Item = usize>>(&mut self, n: usize, neighbors: impl Fn(usize) -> I) {
-        self.order.clear();
-        self.place.clear();
-        self.place.resize(n, NONE);
-        for seed in 0..n {
-            if self.place[seed] != NONE {
-                continue;
-            }
-            // From the row that a search from the seed finds last.
-            let (begun, mut last) = (self.order.len(), seed);
-            for _ in 0..2 {
-                self.order[begun..].iter().for_each(|&row| self.place[row] = NONE);
-                self.order.truncate(begun);
-                self.take(last);
-                let mut at = begun;
-                while let Some(&row) = self.order.get(at) {
-                    at += 1;
-                    neighbors(row).for_each(|other| self.take(other));
-                }
-                last = *self.order.last().expect("the seed");
-            }
-        }
+        by_breadth(n, &neighbors, &mut self.order, &mut self.place);
         self.first.clear();
         self.start.clear();
         let mut length = 0;
@@ -70,13 +50,6 @@ impl<const B: usize> BlockLu<B> {
         {
             values.clear();
             values.resize(length, [[0.0; B]; B]);
-        }
-    }
-
-    fn take(&mut self, row: usize) {
-        if self.place[row] == NONE {
-            self.place[row] = self.order.len();
-            self.order.push(row);
         }
     }
 
@@ -153,6 +126,41 @@ impl<const B: usize> BlockLu<B> {
             }
         }
         self.order.iter().zip(x).for_each(|(&row, x)| b[row] = x);
+    }
+}
+
+/// Orders rows by breadth, each island from the row that a search from its first one finds last: the row that is the i-th, and
+/// the place of each row.
+pub(super) fn by_breadth<I: Iterator<Item = usize>>(
+    n: usize,
+    neighbors: &impl Fn(usize) -> I,
+    order: &mut Vec<usize>,
+    place: &mut Vec<usize>,
+) {
+    order.clear();
+    place.clear();
+    place.resize(n, NONE);
+    for seed in 0..n {
+        if place[seed] != NONE {
+            continue;
+        }
+        let (begun, mut last) = (order.len(), seed);
+        for _ in 0..2 {
+            order.drain(begun..).for_each(|row| place[row] = NONE);
+            let mut next = begun;
+            place[last] = next;
+            order.push(last);
+            while let Some(&row) = order.get(next) {
+                next += 1;
+                for other in neighbors(row) {
+                    if place[other] == NONE {
+                        place[other] = order.len();
+                        order.push(other);
+                    }
+                }
+            }
+            last = *order.last().expect("the seed");
+        }
     }
 }
 

@@ -6,12 +6,14 @@
 #[doc(hidden)]
 pub mod assign;
 mod bodies;
+mod drifts;
 mod impacts;
 mod solver;
 mod sweeps;
 mod vectors;
 mod workspace;
 
+pub(crate) use drifts::Drifts;
 pub(crate) use impacts::Spreading;
 pub use solver::{Collision, CollisionScene, Schedule, Solver};
 pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};

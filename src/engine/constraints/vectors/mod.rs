@@ -1,5 +1,8 @@
 //! A step's problem as vectors: impulses λ, velocities v and the Jacobian J.
 
 pub mod blocks;
+pub mod body_matrix;
+pub mod conjugate;
+pub mod levels;
 pub(crate) mod passes;
 pub mod system;

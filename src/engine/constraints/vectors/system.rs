@@ -150,6 +150,11 @@ impl<'a> System<'a> {
         self.over_others(VectorTask::Soften, Softness::RIGID, x, Some(y));
     }
 
+    /// x ← (1 + Y R)⁻¹ x of rows of joints, Y being diagonal with the entries of `y`, in lanes; contacts stay as they are.
+    pub fn yield_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
+        self.over_others(VectorTask::Yield, Softness::RIGID, x, Some(y));
+    }
+
     /// Impulses of joints become the nearest ones within their bounds, in lanes; contacts stay as they are.
     pub fn bound_lanes(&mut self, x: &mut PointVector) {
         self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
@@ -341,6 +346,15 @@ pub struct PointRows {
     pub axes: [[f32; 2]; 2],
     /// `[r_a × u, r_b × u]` for u = n and t (m).
     pub arms: [Pair; 2],
+}
+
+impl PointRows {
+    /// J of its row along n (`axis` 0) or t on body a or b: `[u, r × u]` with the sign of its side.
+    pub fn on(&self, side: usize, axis: usize) -> [f64; 3] {
+        let sign = if side == 0 { -1.0 } else { 1.0 };
+        let [x, y] = self.axes[axis];
+        [x, y, self.arms[axis][side]].map(|j| sign * f64::from(j))
+    }
 }
 
 /// Bytes of a point's geometry and its two bodies.

@@ -4,5 +4,6 @@ pub mod block;
 pub mod jacobi;
 pub mod masses;
 pub mod rules;
+pub(crate) mod sticky;
 pub mod sweep;
 pub mod warm_start;

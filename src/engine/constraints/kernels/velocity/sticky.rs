@@ -19,6 +19,12 @@
 //! without gathering.
 //!
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
+//!
+//! # Patches
+//!
+//! With [`Sticky::patch`] friction is that of PhysX (`nvidia2026physx`): a contact that slides at one of its points
+//! lets go of both, but only for the next step; until then the rows aim at the places of the last. A flag per point says so, which
+//! takes the normal entry of the vector. A gap keeps its rate for the whole step where the step began with one.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
@@ -47,6 +53,17 @@ pub(crate) struct Sticky {
     pub stick: f32,
     /// Points farther apart than this (m) do not stick.
     pub reach: f32,
+    /// See the [module](self).
+    pub patch: Option<Patch>,
+}
+
+/// What a patch has besides.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    /// Factor on the increments of friction rows (1).
+    pub ease: f32,
+    /// Separations count as this at least (m).
+    pub shallowest: f32,
 }
 
 /// One sweep.
@@ -135,6 +152,13 @@ fn drift_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
     tangential
 }
 
+/// Where it says of point `p` of a batch that its contact slides.
+#[inline(always)]
+fn flag_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
+    let [normal, _] = places::<L>(segment.first_slot + batch * L::WIDTH, p);
+    normal
+}
+
 /// Separations and drifts within the step of a batch's points.
 #[inline(always)]
 fn motion<L: Lanes, N: KernelFeatures, O: Opposite>(
@@ -164,7 +188,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
     batches: &mut Batches,
     segment: &Segment,
     drifts: &mut [Block],
-    Sticky { h, fraction, push_speed, stick, reach }: Sticky,
+    Sticky { h, fraction, push_speed, stick, reach, patch }: Sticky,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let [inv_h, rate, stick] = [1.0, fraction, stick].map(|x| L::splat(x / h));
@@ -185,9 +209,14 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
         let motion = motion::<L, N, O>(record, &layout, &a, &b);
         let (mut sum, mut total, mut points) = ([zero; 2], zero, zero);
         for p in 0..N::POINTS {
-            let separation = motion[p][0];
+            let mut separation = motion[p][0];
+            let mut gap = separation;
+            if let Some(Patch { shallowest, .. }) = patch {
+                separation = separation.max(L::splat(shallowest));
+                gap = record[layout.at(p, layout.separation)];
+            }
             let push = (separation * rate).max(deepest);
-            let bias = separation.select_positive(separation * inv_h, push);
+            let bias = gap.select_positive(separation * inv_h, push);
             let mass = record[layout.at(p, layout.normal_mass)];
             let arm = arms::<L, N, O>(record, &layout, p, 0);
             let vn = with_arms::<L, N, O>(along_n, w, arm);
@@ -204,12 +233,16 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
         }
         if N::FRICTION {
             let bound = record[layout.friction] * total / points.max(L::splat(1.0));
+            let mut slides = zero;
             for p in 0..N::POINTS {
                 let [separation, drift] = motion[p];
                 let before = drift_at::<L>(segment, batch, p);
                 let drifted = drifts[before] + drift;
                 let is_near = |yes: L, no: L| (reach - separation).select_positive(yes, no);
-                let mass = record[layout.at(p, layout.tangent_mass)];
+                let mut mass = record[layout.at(p, layout.tangent_mass)];
+                if let Some(Patch { ease, .. }) = patch {
+                    mass = mass * L::splat(ease);
+                }
                 let arm = arms::<L, N, O>(record, &layout, p, 1);
                 let vt = with_arms::<L, N, O>(along_t, w, arm) + is_near(drifted * stick, zero);
                 let at = layout.at(p, layout.tangent_impulse);
@@ -217,13 +250,22 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let wanted = mass.neg_mul_add(vt, old);
                 let new = wanted.min(bound).max(-bound);
                 record[at] = new;
-                // A point that slides begins to stick again where it is now.
                 let over = wanted.max(-wanted) - bound;
-                drifts[before] = over.select_positive(-drift, drifted - drift);
+                if patch.is_some() {
+                    slides = slides.max(over);
+                } else {
+                    // A point that slides begins to stick again where it is now.
+                    drifts[before] = over.select_positive(-drift, drifted - drift);
+                }
                 let delta = new - old;
                 sum[1] = sum[1] + delta;
                 along_t = mass_sum.mul_add(delta, along_t);
                 spin::<L, N, O>(&mut w, inertia, arm, delta);
+            }
+            if patch.is_some() {
+                for p in 0..N::POINTS {
+                    drifts[flag_at::<L>(segment, batch, p)] = slides.select_positive(L::splat(1.0), zero);
+                }
             }
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
@@ -254,6 +296,8 @@ fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
         let motion = motion::<L, N, O>(record, &layout, &a, &b);
         for (p, [separation, drift]) in motion.into_iter().enumerate().take(N::POINTS) {
             let drifted = drifts[drift_at::<L>(segment, batch, p)] + drift;
+            let slides = drifts[flag_at::<L>(segment, batch, p)];
+            let drifted = slides.select_positive(L::zero(), drifted);
             let mut near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
             // Empty lanes name the contact of the first one, and so write what it does.
             let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut near));

@@ -1,0 +1,191 @@
+//! Symmetric systems whose entries are near the diagonal, once their rows are in the right order, as in [`super::block_lu`].
+//! Their factor has in row i no entry before the first one of the matrix there, and half the work and the memory of L and U.
+
+use super::block_lu::by_breadth;
+
+/// A system and its factors; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub struct Envelope {
+    /// The row of A that is the i-th, and the other way round.
+    order: Vec<usize>,
+    place: Vec<usize>,
+    /// f_i, and where row i begins in `lower`.
+    first: Vec<usize>,
+    start: Vec<usize>,
+    lower: Vec<f64>,
+    diagonal: Vec<f64>,
+    solution: Vec<f64>,
+}
+
+impl Envelope {
+    /// Begins a system of zeros of `n` blocks of B rows each, in which block i couples with the blocks `neighbors(i)`; some may be
+    /// i itself.
+    pub fn begin<const B: usize, I: Iterator<Item = usize>>(
+        &mut self,
+        n: usize,
+        neighbors: impl Fn(usize) -> I,
+    ) {
+        by_breadth(n, &neighbors, &mut self.order, &mut self.place);
+        self.first.clear();
+        self.start.clear();
+        let mut length = 0;
+        for (i, &block) in self.order.iter().enumerate() {
+            let first = neighbors(block).map(|other| self.place[other]).min().unwrap_or(i).min(i);
+            for row in B * i..B * (i + 1) {
+                self.first.push(B * first);
+                self.start.push(length);
+                length += row - B * first;
+            }
+        }
+        if B > 1 {
+            // Rows of a block stay together.
+            self.order.resize(B * n, 0);
+            self.place.resize(B * n, 0);
+            for i in (0..B * n).rev() {
+                self.order[i] = B * self.order[i / B] + i % B;
+            }
+            for (i, &row) in self.order.iter().enumerate() {
+                self.place[row] = i;
+            }
+        }
+        self.lower.clear();
+        self.lower.resize(length, 0.0);
+        self.diagonal.clear();
+        self.diagonal.resize(B * n, 0.0);
+    }
+
+    /// Entries of the lower half, without the diagonal.
+    pub fn entries(&self) -> usize {
+        self.lower.len()
+    }
+
+    /// Zeros of the same pattern.
+    pub fn clear(&mut self) {
+        for values in [&mut self.lower, &mut self.diagonal] {
+            values.fill(0.0);
+        }
+    }
+
+    /// Adds to a block of a symmetric A, and to its mirror image; of a block on the diagonal the lower half counts.
+    ///
+    /// # Panics
+    /// If the two do not couple.
+    pub fn add_block<const B: usize>(&mut self, row: usize, column: usize, values: [[f64; B]; B]) {
+        let [i, j] = [row, column].map(|block| self.place[B * block]);
+        for r in 0..B {
+            if i == j {
+                let at = self.start[i + r] + i - self.first[i];
+                (0..r).for_each(|c| self.lower[at + c] += values[r][c]);
+                self.diagonal[i + r] += values[r][r];
+            } else {
+                let (low, high) = (i.min(j), i.max(j));
+                let at = self.start[high + r] + low - self.first[high];
+                (0..B).for_each(|c| self.lower[at + c] += if i > j { values[r][c] } else { values[c][r] });
+            }
+        }
+    }
+
+    /// Cholesky's factor of a symmetric A, L Lᵀ with rows as long as those of A:
+    ///
+    /// ```text
+    /// L_ij = (A_ij − Σ_{k=f..j} L_ik L_jk)/L_jj,   L_ii = √(A_ii − Σ_k L_ik²)
+    /// ```
+    ///
+    /// False if a square is below `least`.
+    pub fn factorize(&mut self, least: f64) -> bool {
+        for i in 0..self.diagonal.len() {
+            let (before, own) = self.lower.split_at_mut(self.start[i]);
+            let first = self.first[i];
+            for j in first..i {
+                let from = first.max(self.first[j]);
+                let other = &before[self.start[j] + from - self.first[j]..self.start[j] + j - self.first[j]];
+                let below = dot(&own[from - first..j - first], other);
+                // Diagonals are kept as reciprocals.
+                own[j - first] = (own[j - first] - below) * self.diagonal[j];
+            }
+            let square = self.diagonal[i] - dot(&own[..i - first], &own[..i - first]);
+            if square < least || !square.is_finite() {
+                return false;
+            }
+            self.diagonal[i] = 1.0 / square.sqrt();
+        }
+        true
+    }
+
+    /// x of L Lᵀ x = b after [`Self::factorize`], in the place of b.
+    pub fn substitute(&mut self, b: &mut [f64]) {
+        self.solution.clear();
+        self.solution.extend(self.order.iter().map(|&row| b[row]));
+        for i in 0..self.diagonal.len() {
+            let (start, first) = (self.start[i], self.first[i]);
+            let below = dot(&self.lower[start..start + i - first], &self.solution[first..i]);
+            self.solution[i] = (self.solution[i] - below) * self.diagonal[i];
+        }
+        for i in (0..self.diagonal.len()).rev() {
+            let (start, first) = (self.start[i], self.first[i]);
+            let x = self.solution[i] * self.diagonal[i];
+            self.solution[i] = x;
+            for (to, l) in self.solution[first..i].iter_mut().zip(&self.lower[start..]) {
+                *to -= l * x;
+            }
+        }
+        for (&row, &x) in self.order.iter().zip(&self.solution) {
+            b[row] = x;
+        }
+    }
+}
+
+/// x·y, in four parts.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (x4, y4) = (x.chunks_exact(4), y.chunks_exact(4));
+    let rest = x4.remainder().iter().zip(y4.remainder()).map(|(x, y)| x * y).sum::<f64>();
+    for (x, y) in x4.zip(y4) {
+        (0..4).for_each(|k| sums[k] += x[k] * y[k]);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symmetric_systems_of_blocks_are_solved_again_and_again() {
+        // Blocks in a loop with a tail, and one alone; A = Σ j jᵀ + 1 over rows j of pairs of blocks.
+        let edges = [(4usize, 0usize), (0, 2), (2, 4), (4, 1)];
+        let (n, mut system) = (6, Envelope::default());
+        for round in 0..2 {
+            let neighbors = |i: usize| {
+                edges.iter().filter(move |e| e.0 == i || e.1 == i).flat_map(|e| [e.0, e.1]).chain([i])
+            };
+            system.begin::<3, _>(n, neighbors);
+            let mut matrix = vec![vec![0.0; 3 * n]; 3 * n];
+            (0..3 * n).for_each(|i| matrix[i][i] = 1.0);
+            let unit = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
+            (0..n).for_each(|block| system.add_block::<3>(block, block, unit));
+            for (k, &(a, b)) in edges.iter().enumerate() {
+                let j = |side: usize, c: usize| (0.3 + k as f64 - 0.7 * side as f64) * (1.0 + c as f64);
+                let blocks = [a, b];
+                for (s, t) in [(0, 0), (1, 1), (0, 1)] {
+                    let product = std::array::from_fn(|r| std::array::from_fn(|c| j(s, r) * j(t, c)));
+                    system.add_block::<3>(blocks[s], blocks[t], product);
+                }
+                for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
+                    matrix[3 * blocks[r / 3] + r % 3][3 * blocks[c / 3] + c % 3] +=
+                        j(r / 3, r % 3) * j(c / 3, c % 3);
+                }
+            }
+            assert!(system.factorize(0.5));
+            for shift in 0..2 {
+                let expected: Vec<f64> = (0..3 * n).map(|i| 1.0 - 0.3 * (i + shift + round) as f64).collect();
+                let mut b: Vec<f64> =
+                    matrix.iter().map(|row| row.iter().zip(&expected).map(|(a, x)| a * x).sum()).collect();
+                system.substitute(&mut b);
+                assert!(b.iter().zip(&expected).all(|(x, y)| (x - y).abs() < 1e-10), "{b:?}");
+            }
+        }
+        system.clear();
+        assert!(!system.factorize(0.5));
+    }
+}

@@ -1,0 +1,96 @@
+//! The velocity sweep: the friction row of a contact, then its normal rows. See the [solver](super).
+
+use crate::engine::constraints::kernels::frame::{
+    BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, separation, spin, to_frame, turn,
+    with_arms,
+};
+use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rigid};
+use crate::engine::constraints::records::batches::{Batches, Segment};
+use crate::engine::constraints::records::features::{
+    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+};
+use crate::engine::lanes::{BodyRow, Lanes};
+
+/// One sweep; normal rows follow the rule.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContactFriction(pub Rigid);
+
+impl Pass for ContactFriction {
+    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
+        PerLane::of_sweep(layout, true, opposite)
+    }
+
+    #[inline(never)]
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        over_segments!(sweep, L, F; on.rows, on.batches, self.0);
+    }
+}
+
+#[inline(always)]
+fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
+    rows: &mut [BodyRow],
+    batches: &mut Batches,
+    segment: &Segment,
+    rule: Rigid,
+) {
+    let layout = const { Layout::of::<N, O>() };
+    let zero = L::zero();
+    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
+        let n = [record[0], record[1]];
+        let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
+        let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
+        let [mut along_n, along_t] = to_frame::<L, O>([a[VX], a[VY]], [b[VX], b[VY]], n);
+        let mut w = [a[W], b[W]];
+        let mut sum = [zero; 2];
+        if N::FRICTION {
+            let (mut arm, mut load, mut old, mut points) = ([zero; 2], zero, zero, zero);
+            let mut is_point = [zero; 2];
+            for p in 0..N::POINTS {
+                is_point[p] = record[layout.at(p, layout.tangent_mass)].select_positive(L::splat(1.0), zero);
+                let of = arms::<L, N, O>(record, &layout, p, 1);
+                arm = [0, 1].map(|side| is_point[p].mul_add(of[side], arm[side]));
+                load = load + record[layout.at(p, layout.normal_impulse)];
+                old = old + record[layout.at(p, layout.tangent_impulse)];
+                points = points + is_point[p];
+            }
+            let share = L::splat(1.0) / points.max(L::splat(1.0));
+            arm = arm.map(|arm| arm * share);
+            let mut k = (inertia[1] * arm[1]).mul_add(arm[1], mass_sum);
+            if O::HAS_ROW {
+                k = (inertia[0] * arm[0]).mul_add(arm[0], k);
+            }
+            // Lanes without a contact have bodies without mass.
+            let mass = k.select_positive(L::splat(1.0) / k, zero);
+            let bound = record[layout.friction] * load;
+            let vt = with_arms::<L, N, O>(along_t, w, arm);
+            let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
+            for p in 0..N::POINTS {
+                record[layout.at(p, layout.tangent_impulse)] = new * share * is_point[p];
+            }
+            let delta = new - old;
+            sum[1] = delta;
+            spin::<L, N, O>(&mut w, inertia, arm, delta);
+        }
+        let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n)[0];
+        let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+        for p in 0..N::POINTS {
+            let gap = separation::<L, N, O>(record, p, moved, [sine_a, sine_b], [versine_a, versine_b]);
+            let mass = record[layout.at(p, layout.normal_mass)];
+            let arm = arms::<L, N, O>(record, &layout, p, 0);
+            let vn = with_arms::<L, N, O>(along_n, w, arm);
+            let at = layout.at(p, layout.normal_impulse);
+            let old = record[at];
+            let new = rule.normal_impulse(!segment.pushes_a(), vn, gap, mass, old);
+            record[at] = new;
+            let delta = new - old;
+            sum[0] = sum[0] + delta;
+            along_n = mass_sum.mul_add(delta, along_n);
+            spin::<L, N, O>(&mut w, inertia, arm, delta);
+        }
+        apply::<L, O>(&mut a, &mut b, n, sum, w);
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
+    });
+}

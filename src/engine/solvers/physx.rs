@@ -1,0 +1,123 @@
+//! PhysX's TGS: substeps of one biased sweep each, over impulses that add up from zero in every step; friction belongs to
+//! the contact and holds the places where it began to stick.
+//!
+//! **Source.** `nvidia2026physx`: `DyTGSDynamics.cpp` (schedule, bias 2/√n), `DyTGSContactPrep.cpp` (rows), at their
+//! defaults: 4 position iterations, which are the substeps, 1 velocity iteration, no limit on depenetration, gravity for the
+//! whole step at its beginning, strong friction, friction within 4 cm.
+//!
+//! **Departures.** A patch is a contact: its anchors are its points as they are matched from step to step, where the source grows
+//! two anchors in a patch and keeps them while it lasts. Impulses of joints, whose rows are those of this crate, begin anew in each
+//! substep. Contacts are swept in the order of this crate, color by color, which in the source is that of its islands and partitions.
+//! Sleeping, stabilization, compliant and torsional contacts are left out.
+//!
+//! **Cost.** Per step n + n body passes for n substeps, `velocity_iterations` sweeps a substep and `relax_iterations` at the
+//! end; 1 pass that brings drifts into the order of the lanes and 1 that books them. No warm start. Sweeps of a step request 0 B per
+//! contact.
+//!
+//! **Fails when** stacks are tall: impulses begin at zero in each step, and gravity of a whole step meets one sweep.
+//!
+//! # The rows
+//!
+//! ```text
+//! normal    λ ← max(0, λ − m (v + s c)),   c = 1/h where the step began apart, β/h else,   β = min(0.8, 2/√n)
+//! friction  λ ← clamp(λ − β m (v + d β/h), ±µ Σ λn/points)
+//! ```
+//!
+//! s is the separation now, below zero left alone in velocity iterations, and d the way from the anchor.
+
+use super::{Law, Uses, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::rules::Soft;
+use crate::engine::constraints::kernels::velocity::sticky::{Patch, Sticky};
+use crate::engine::constraints::kernels::velocity::sweep::Sweep;
+use crate::engine::constraints::records::kept::KeptSize;
+use crate::engine::constraints::step::Drifts;
+use crate::engine::constraints::{Passes, Solver};
+use crate::engine::params::{Budget, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "physx",
+    source: "nvidia2026physx",
+    summary: "substeps; impulses add up from zero in each step; friction holds places, contact by contact",
+    budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
+    uses: Uses { velocity: true, relax: true, position: false },
+    iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
+    parameters: &[
+        Parameter {
+            name: "baumgarte",
+            unit: "",
+            default: 0.8,
+            range: [0.0, 1.0],
+            meaning: "largest share of an overlap that is removed per substep; 2/√n of n substeps at most",
+            trials: &[],
+        },
+        Parameter::push_speed(1e3),
+    ],
+    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
+    breaks: &[
+        (Law::Cone, "a point may take its share of the whole contact's load"),
+        (Law::Converges, "friction holds positions, which is another law"),
+        (Law::Rest, "no warm start"),
+    ],
+    make: || Box::new(PhysX::default()),
+    ..Variant::BASE
+};
+
+/// Points that are farther apart (m) have no anchors: `frictionOffsetThreshold`.
+const REACH: f32 = 0.04;
+
+/// State from step to step.
+#[derive(Clone, Debug, Default)]
+struct PhysX {
+    drifts: Drifts,
+}
+
+impl Solver for PhysX {
+    fn step(&mut self, passes: &mut Passes<'_>) {
+        let (budget, h) = (passes.budget(), passes.h());
+        let [baumgarte, push_speed] = [0, 1].map(|i| passes.parameter(i));
+        let fraction = baumgarte.min(2.0 / (budget.substeps as f32).sqrt());
+        let sticky = Sticky {
+            h,
+            fraction,
+            push_speed,
+            stick: fraction,
+            reach: REACH,
+            patch: Some(Patch { ease: fraction, shallowest: f32::MIN }),
+        };
+        let velocity = Sticky { patch: Some(Patch { ease: fraction, shallowest: 0.0 }), ..sticky };
+        let law = Sweep(Soft::baumgarte(fraction, push_speed, h));
+        passes.forget_impulses();
+        self.drifts.load(passes);
+        // The forces of the whole step.
+        (0..budget.substeps).for_each(|_| passes.integrate_velocities());
+        for substep in 0..budget.substeps {
+            if substep > 0 {
+                passes.restart_joints();
+            }
+            for _ in 0..budget.velocity_iterations {
+                self.drifts.sweep_by(passes, Phase::Solve, sticky, &law);
+                passes.iteration_done();
+            }
+            passes.integrate_positions();
+            if substep + 1 == budget.substeps {
+                for _ in 0..budget.relax_iterations {
+                    self.drifts.sweep_by(passes, Phase::Relax, velocity, &Sweep(Soft::without_springs(h)));
+                }
+            }
+            passes.bounce(substep);
+        }
+        // Impulses add up over the whole step, as nothing is applied twice.
+        passes.book_impulses();
+        self.drifts.book(passes, REACH);
+    }
+
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.drifts.held_bytes()
+    }
+}
