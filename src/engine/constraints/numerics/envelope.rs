@@ -33,34 +33,7 @@ const NONE: usize = usize::MAX;
 impl Envelope {
     /// Begins a system of zeros in which row i couples with `neighbors(i)`, of which some may be i itself.
     pub fn begin<I: Iterator<Item = usize>>(&mut self, n: usize, neighbors: impl Fn(usize) -> I) {
-        self.order.clear();
-        self.place.clear();
-        self.place.resize(n, NONE);
-        for seed in 0..n {
-            let mut next = self.order.len();
-            if self.place[seed] != NONE {
-                continue;
-            }
-            // From the row that a search from the seed finds last.
-            let mut last = seed;
-            for pass in 0..2 {
-                let begun = next;
-                self.order[begun..].iter().for_each(|&row| self.place[row] = NONE);
-                self.order.truncate(begun);
-                self.take(last);
-                let mut at = begun;
-                while let Some(&row) = self.order.get(at) {
-                    at += 1;
-                    for other in neighbors(row) {
-                        self.take(other);
-                    }
-                }
-                if pass == 0 {
-                    last = *self.order.last().expect("the seed");
-                }
-                next = begun;
-            }
-        }
+        by_breadth(n, &neighbors, [&mut self.order, &mut self.place]);
         self.first.clear();
         self.start.clear();
         let mut length = 0;
@@ -76,13 +49,6 @@ impl Envelope {
         }
         self.diagonal.clear();
         self.diagonal.resize(n, 0.0);
-    }
-
-    fn take(&mut self, row: usize) {
-        if self.place[row] == NONE {
-            self.place[row] = self.order.len();
-            self.order.push(row);
-        }
     }
 
     /// Adds to an entry of A.
@@ -151,8 +117,47 @@ impl Envelope {
     }
 }
 
+/// Orders rows by breadth, island by island, each from the row that a search from its first one finds last; `order` is that,
+/// `place` its inverse.
+pub fn by_breadth<I: Iterator<Item = usize>>(
+    n: usize,
+    neighbors: &impl Fn(usize) -> I,
+    [order, place]: [&mut Vec<usize>; 2],
+) {
+    let take = |row: usize, order: &mut Vec<usize>, place: &mut [usize]| {
+        if place[row] == NONE {
+            place[row] = order.len();
+            order.push(row);
+        }
+    };
+    order.clear();
+    place.clear();
+    place.resize(n, NONE);
+    for seed in 0..n {
+        if place[seed] != NONE {
+            continue;
+        }
+        let (begun, mut first) = (order.len(), seed);
+        for pass in 0..2 {
+            order[begun..].iter().for_each(|&row| place[row] = NONE);
+            order.truncate(begun);
+            take(first, order, place);
+            let mut at = begun;
+            while let Some(&row) = order.get(at) {
+                at += 1;
+                for other in neighbors(row) {
+                    take(other, order, place);
+                }
+            }
+            if pass == 0 {
+                first = *order.last().expect("the seed");
+            }
+        }
+    }
+}
+
 /// x·y, in four parts.
-fn dot(x: &[f64], y: &[f64]) -> f64 {
+pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (x4, y4) = (x.chunks_exact(4), y.chunks_exact(4));
     let rest = x4.remainder().iter().zip(y4.remainder()).map(|(x, y)| x * y).sum::<f64>();

@@ -1,5 +1,6 @@
 //! Pure mathematics: no body, no contact.
 
+pub mod blocks;
 pub mod cone;
 pub mod coulomb_lcp;
 pub mod envelope;

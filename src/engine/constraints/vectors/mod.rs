@@ -2,4 +2,5 @@
 
 pub mod blocks;
 pub(crate) mod passes;
+pub mod spectral;
 pub mod system;
