@@ -113,11 +113,11 @@ fn solve(
 
 /// λn ≥ 0; a negative µ marks what is no contact, and stays as it is.
 fn pushing([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
-    [(-friction).select_positive(normal, normal.max(Wide::zero())), tangent]
+    [(-friction).select_positive(normal, Lanes::max(normal, Wide::zero())), tangent]
 }
 
 /// |λt| ≤ µ λn.
 fn within_friction([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
     let bound = friction * normal;
-    [normal, (-friction).select_positive(tangent, tangent.min(bound).max(-bound))]
+    [normal, (-friction).select_positive(tangent, Lanes::max(Lanes::min(tangent, bound), -bound))]
 }

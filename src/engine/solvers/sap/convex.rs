@@ -575,3 +575,123 @@ impl Convex {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::bodies::{BodyDef, ShapeDef};
+    use crate::engine::clock::Phase;
+    use crate::engine::constraints::{Passes, Schedule};
+    use crate::engine::params::{LINEAR_SLOP, MAX_PUSH_SPEED};
+    use crate::engine::solvers::Variant;
+    use crate::engine::world::{Settings, World};
+    use std::cell::RefCell;
+
+    thread_local! {
+        static HISTORY: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+        static MOST_WORK: RefCell<f64> = const { RefCell::new(f64::INFINITY) };
+    }
+
+    static WATCHED: Variant = Variant { name: "watched", make: || Schedule::boxed(step), ..Variant::BASE };
+
+    fn step(passes: &mut Passes<'_>) {
+        let rule = Baumgarte::new(0.3, LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+        passes.integrate_velocities();
+        let (h, most) = (passes.h(), MOST_WORK.with_borrow(|most| *most));
+        passes.with_system(Phase::Solve, |system| {
+            let mut problem = Convex::new(system, &rule, 1e-4, h, most);
+            problem.begin(system.rows());
+            HISTORY.with_borrow_mut(|history| {
+                history.clear();
+                history.push(problem.residual);
+                while problem.step() {
+                    history.push(problem.residual);
+                    assert!(history.len() < 40, "{history:?}");
+                }
+            });
+            problem.write(system);
+        });
+        passes.integrate_positions();
+        passes.end_substep(0);
+    }
+
+    /// A pyramid of boxes, thrown onto the ground with a slant, without warm starting.
+    fn thrown_pyramid(base: u32) -> Vec<f64> {
+        let mut world = World::new(Settings::new(&WATCHED));
+        world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0).unwrap())).unwrap();
+        for row in 0..base {
+            for i in 0..base - row {
+                let x = 1.1 * (f64::from(i) + 0.5 * f64::from(row));
+                let cube = ShapeDef::rectangle(0.5, 0.5).unwrap();
+                let body = BodyDef::dynamic([x, f64::from(row) + 0.5]).with(cube).with_velocity([1.0, -2.0]);
+                world.add_body(&body).unwrap();
+            }
+        }
+        world.step().unwrap();
+        HISTORY.with_borrow(Clone::clone)
+    }
+
+    /// `todorov2014`: to machine precision in a few iterations, whatever the size.
+    #[test]
+    fn newton_s_method_ends_at_rounding_after_a_few_steps() {
+        for base in [5, 10, 20] {
+            let history = thrown_pyramid(base);
+            println!("pyramid of {base}: {history:.1e?}");
+            assert!(history.len() <= 14 && *history.last().unwrap() < 1e-9, "{base}: {history:?}");
+        }
+    }
+
+    #[test]
+    fn conjugate_gradients_come_to_the_same() {
+        MOST_WORK.set(0.0);
+        let history = thrown_pyramid(5);
+        println!("{history:.1e?}");
+        assert!(*history.last().unwrap() < 1e-9, "{history:?}");
+    }
+
+    /// The impulse is the gradient of a convex function: monotone, and its derivative is the one that is stated.
+    #[test]
+    fn impulses_are_monotone_and_have_the_stated_derivative() {
+        let softness = [[2.0, 0.3, 0.0], [0.3, 1.0, 0.1], [0.0, 0.1, 1.5]];
+        let diagonal = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]];
+        let bounds = [
+            (ImpulseBound::Cone(0.6), 2, diagonal),
+            (ImpulseBound::Cone(0.0), 2, diagonal),
+            (ImpulseBound::Free, 3, softness),
+            (ImpulseBound::NotNegative, 1, [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]]),
+            (ImpulseBound::Norm(0.7), 3, softness),
+        ];
+        for (bound, size, softness) in bounds {
+            let zero = [[0.0; 3]; 3];
+            let block = ConvexBlock {
+                bodies: [FIXED; 2],
+                size,
+                jacobian: [zero; 2],
+                target: [0.0; 3],
+                softness,
+                inverse: inverse(&softness, size),
+                bound,
+                error: [0.0; 3],
+                impulse: [0.0; 3],
+                stiffness: zero,
+            };
+            let errors: Vec<[f64; 3]> = (0..60)
+                .map(|i| [0, 1, 2].map(|k| if k < size { (1.7 * f64::from(i * (k as i32 + 2))).sin() } else { 0.0 }))
+                .collect();
+            for e in &errors {
+                let (impulse, stiffness) = block.at(*e);
+                for other in &errors {
+                    let (d, change) = ([0, 1, 2].map(|k| other[k] - e[k]), block.at(*other).0);
+                    let change = [0, 1, 2].map(|k| change[k] - impulse[k]);
+                    assert!(dot(d, change) >= -1e-12, "{bound:?} {e:?} {other:?}");
+                    let near = [0, 1, 2].map(|k| e[k] + 1e-7 * d[k]);
+                    let (moved, linear) = (block.at(near).0, times(&stiffness, d));
+                    for k in 0..size {
+                        let slope = (moved[k] - impulse[k]) / 1e-7;
+                        assert!((slope - linear[k]).abs() < 1e-4, "{bound:?} {e:?}: {slope} {}", linear[k]);
+                    }
+                }
+            }
+        }
+    }
+}
