@@ -5,8 +5,8 @@
 //! (Drake's SAP solver). `todorov2014` (MuJoCo) has the same problem with elliptic cones. `anitescu2006` (the relaxation).
 //!
 //! **Departures.** A contact gives way by `softness` times its effective inverse mass, along n and t alike; SAP takes 0.025 along n
-//! and 0.001 along t where a contact is to be nearly rigid, MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`]. The first velocities
-//! are those of the last impulses, not those of the last step, so that momentum is kept before Newton's method has ended. Factors
+//! and 0.001 along t where a contact is to be nearly rigid, MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`], but
+//! without a slop, within which soft contacts would sink from step to step. The first velocities are those of the last impulses, not those of the last step, so that momentum is kept before Newton's method has ended. Factors
 //! are within an envelope (`numerics/blocks.rs`), which has no fill ordering of its own. Where one would take more than `factor_work`, steps come from conjugate
 //! gradients with blocks on the diagonal, as MuJoCo's second solver does. Rows of joints give way by 10⁻⁸, those of springs as their law has it; motors and capped
 //! springs have the nearest impulse within their bound, in the norm of what they give way.
@@ -28,7 +28,7 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
 use convex::Convex;
 
 /// See the [module](self).
@@ -36,16 +36,16 @@ pub static SOLVER: Variant = Variant {
     name: "sap",
     source: "castro2022",
     summary: "Newton's method on the convex relaxation in velocities, sparse factors: lifts off while sliding",
-    budget: Budget { substeps: 1, velocity_iterations: 10, relax_iterations: 0, position_iterations: 0 },
+    budget: Budget { substeps: 1, velocity_iterations: 100, relax_iterations: 0, position_iterations: 0 },
     parameters: &[
         Parameter::BAUMGARTE,
         Parameter {
             name: "softness",
             unit: "",
-            default: 1e-4,
+            default: 1e-5,
             range: [1e-9, 1e3],
             meaning: "what contacts give way, over their effective inverse mass",
-            trials: &[1e-5, 1e-3, 2.5e-2],
+            trials: &[1e-6, 1e-4, 1e-3],
         },
         Parameter {
             name: "factor_work",
@@ -67,7 +67,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let rule = Baumgarte::new(passes.parameter(0), 0.0, MAX_PUSH_SPEED, h);
     let [softness, millions] = [1, 2].map(|i| f64::from(passes.parameter(i)));
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

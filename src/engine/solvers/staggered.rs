@@ -60,9 +60,6 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Change of impulses, relative to them, at which a projection is solved: a few roundings.
-const STILL: f64 = 1e-7;
-
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
     let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
@@ -100,8 +97,7 @@ fn solve(
         let mut count = 0;
         while count < inner {
             count += 1;
-            let change = descent.advance(system, problem, project);
-            if change <= STILL * STILL * descent.square(problem) {
+            if !descent.advance(system, problem, project) {
                 break;
             }
         }

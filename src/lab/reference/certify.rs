@@ -10,7 +10,7 @@
 //! tells whether a distance is meaningful.
 
 use super::interior::interior_point;
-use super::newton::newton;
+use super::newton::{newton, newton_after};
 use super::nncg::nncg;
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
@@ -199,7 +199,7 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
         Method::Nncg => nncg(problem, Target::Rigid, &cold, stop(5_000)).impulses,
         Method::Pgs => pgs(problem, Target::Rigid, &cold, SweepDirection::Symmetric, stop(5_000)).impulses,
         Method::InteriorPoint => {
-            newton(problem, Target::Rigid, &interior_point(problem)?, stop(60)).impulses
+            newton_after(problem, Target::Rigid, &interior_point(problem)?, 0, stop(60)).impulses
         }
     };
     let natural_map = certify(problem, &impulses);

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::lab::reference::certify::{CERTIFIED, certify};
     use crate::lab::reference::gallery::*;
-    use crate::lab::reference::newton::newton;
+    use crate::lab::reference::newton::newton_after;
     use crate::lab::reference::sweeps::Stop;
 
     #[test]
@@ -168,7 +168,7 @@ mod tests {
             let residual = certify(&p, &near);
             assert!(residual < 1e-4, "{}: {residual:e}", p.name);
             let stop = Stop { tolerance: 0.01 * CERTIFIED, iterations: 60 };
-            let found = certify(&p, &newton(&p, Target::Rigid, &near, stop).impulses);
+            let found = certify(&p, &newton_after(&p, Target::Rigid, &near, 0, stop).impulses);
             assert!(found <= CERTIFIED, "{}: {found:e}", p.name);
         }
     }

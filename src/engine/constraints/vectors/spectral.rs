@@ -92,8 +92,10 @@ const TRIALS: usize = 4;
 const SHORTER: [f64; 2] = [0.1, 0.9];
 /// γ: share of the decrease that the slope promises.
 const DECREASE: f64 = 1e-4;
-/// Greatest α (1).
-const LONGEST: f64 = 1e13;
+/// Greatest α (1): beyond it what rounding leaves of g becomes impulses.
+const LONGEST: f64 = 1e4;
+/// |d| over |λ| at which nothing is left to do: a few roundings.
+const STILL: f64 = 1e-7;
 
 /// A descent on its way.
 #[derive(Debug)]
@@ -164,13 +166,13 @@ impl Descent {
     }
 
     /// One iteration. `project(λ, µ)` is the nearest allowed point to λ, µ below zero where no contact is; joints have their
-    /// own bounds. Returns |d|²_{D⁻¹} (J).
+    /// own bounds. False if nothing is left to do.
     pub fn advance(
         &mut self,
         system: &mut System<'_>,
         problem: &ImpulseProblem,
         project: impl Fn(PointEntry, Wide) -> PointEntry,
-    ) -> f64 {
+    ) -> bool {
         let Descent { now, gradient, next, next_gradient, direction, axes, .. } = self;
         let length = Wide::splat(self.length as f32);
         update(
@@ -187,6 +189,11 @@ impl Descent {
             update([direction], [next, now], |_, [next, now]| [difference(next, now)]);
         }
         let way = sum_of_products([direction, &problem.mass], |[d, mass]| [d, quotient(d, mass)]);
+        // Rounding of g grows with α.
+        let still = (STILL * self.length.max(1.0)).powi(2);
+        if way <= still * sum_of_products([now, &problem.mass], |[now, mass]| [now, quotient(now, mass)]) {
+            return false;
+        }
         system.push_lanes(direction);
         problem.gradient_along(system, *axes, next, next_gradient);
         let slope = dot(direction, gradient);
@@ -224,7 +231,7 @@ impl Descent {
         self.iterations += 1;
         // |Δλ|² = s² |d|², Δλ·Δg = s² d·(K + R) d.
         self.length = if curve <= 0.0 {
-            LONGEST
+            1.0
         } else if self.iterations.is_multiple_of(2) {
             way / curve
         } else {
@@ -241,12 +248,7 @@ impl Descent {
             self.least = self.value;
             self.best.clone_from(&self.now);
         }
-        way
-    }
-
-    /// |λ|²_{D⁻¹} (J).
-    pub fn square(&self, problem: &ImpulseProblem) -> f64 {
-        sum_of_products([&self.now, &problem.mass], |[now, mass]| [now, quotient(now, mass)])
+        true
     }
 
     /// Goes back to the least f, from which velocities are at most √(2 (f − f*)) off in the mass norm, and makes it the
