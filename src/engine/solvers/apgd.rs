@@ -31,11 +31,12 @@
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::records::point_vector::{
     Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
 };
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Schedule, System, numerics::cone};
+use crate::engine::constraints::vectors::spectral::ImpulseProblem;
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
 /// See the [module](self).
@@ -62,20 +63,16 @@ const DOUBLINGS: usize = 20;
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
-    let law = rule.of_errors();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
-        let [mut bias, mut mass, mut now, mut next, mut y] = [(); 5].map(|_| passes.vector());
+        let [bias, mass, mut now, mut next, mut y] = [(); 5].map(|_| passes.vector());
+        let mut problem = ImpulseProblem { bias, mass };
         let [mut g_now, mut g_next, mut g_y, mut step] = [(); 4].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| {
-            system.lane_surfaces(&mut bias);
-            update([&mut bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
-            system.lane_bias(law, &mut bias);
-            system.lane_masses(&mut mass);
-            update([&mut mass], [], |[m], []| [[m[0], m[0]]]);
+            problem.begin(system, &rule, true);
             system.lane_impulses(&mut now);
-            gradient(system, &bias, &mut now, &mut g_now);
+            problem.gradient(system, &mut now, &mut g_now);
             y.clone_from(&now);
             g_y.clone_from(&g_now);
         });
@@ -86,7 +83,7 @@ fn step(passes: &mut Passes<'_>) {
                     let shorter = Wide::splat(1.0 / steepness as f32);
                     update(
                         [&mut next, &mut step],
-                        [&y, &g_y, &mass, &bias, &now],
+                        [&y, &g_y, &problem.mass, &problem.bias, &now],
                         |_, [y, g, mass, bias, now]| {
                             let point = [0, 1].map(|k| y[k] - shorter * mass[k] * g[k]);
                             let next = cone::project_point(point, bias[1]);
@@ -98,11 +95,11 @@ fn step(passes: &mut Passes<'_>) {
                         update([&mut step], [&next, &now], |_, [next, now]| [difference(next, now)]);
                     }
                     system.push_lanes(&mut step);
-                    gradient(system, &bias, &mut next, &mut g_next);
+                    problem.gradient(system, &mut next, &mut g_next);
                     let curve = sum_of_products([&next, &y, &g_next, &g_y], |[next, y, g_next, g_y]| {
                         [difference(next, y), difference(g_next, g_y)]
                     });
-                    let length = sum_of_products([&next, &y, &mass], |[next, y, mass]| {
+                    let length = sum_of_products([&next, &y, &problem.mass], |[next, y, mass]| {
                         let d = difference(next, y);
                         [d, quotient(d, mass)]
                     });
@@ -140,16 +137,9 @@ fn step(passes: &mut Passes<'_>) {
             passes.count_sweep(2);
             passes.iteration_done();
         }
-        passes.give_back([bias, mass, now, next, y]);
+        passes.give_back([problem.bias, problem.mass, now, next, y]);
         passes.give_back([g_now, g_next, g_y, step]);
         passes.integrate_positions();
         passes.end_substep(substep);
     }
-}
-
-/// J v + b + R λ, b along n alone; R of joints with springs.
-fn gradient(system: &mut System<'_>, bias: &PointVector, lambda: &mut PointVector, to: &mut PointVector) {
-    system.lane_velocities(to);
-    update([to], [bias], |[g], [b]| [[g[0] + b[0], g[1]]]);
-    system.soften_lanes(to, lambda);
 }

@@ -38,6 +38,7 @@ pub mod admm;
 pub mod anderson;
 pub mod apgd;
 pub mod avbd;
+pub mod barzilai_borwein;
 pub mod box2d;
 pub mod direct;
 pub mod jacobi;
@@ -55,11 +56,13 @@ pub mod physx;
 pub mod projection;
 pub mod random_order;
 pub mod rapier;
+pub mod sap;
 pub mod shim;
 pub mod shock;
 pub mod soft_step;
 pub mod sor;
 pub mod split_impulse;
+pub mod staggered;
 pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
@@ -83,8 +86,11 @@ pub static VARIANTS: [&Variant; 32] = [
     &nncg::SOLVER,
     &anderson::SOLVER,
     &apgd::SOLVER,
+    &barzilai_borwein::SOLVER,
+    &staggered::SOLVER,
     &admm::SOLVER,
     &direct::SOLVER,
+    &sap::SOLVER,
     &shock::SOLVER,
     &split_impulse::SOLVER,
     &jacobi::SOLVER,

@@ -12,6 +12,8 @@
 //! in n b² products of blocks for n rows of b blocks. The pattern of A is symmetric, its values need not be. Pivots stay on
 //! the diagonal: whoever asks checks what he gets.
 
+use super::envelope::by_breadth;
+
 type Block<const B: usize> = [[f64; B]; B];
 
 /// A system and its factors; keeps its memory.
@@ -29,13 +31,10 @@ pub struct BlockLu<const B: usize> {
     diagonal: Vec<Block<B>>,
 }
 
-/// Not yet ordered.
-const NONE: usize = usize::MAX;
-
 impl<const B: usize> BlockLu<B> {
     /// Begins a system of zeros of `n` rows in which row i couples with `neighbors(i)`, of which some may be i itself.
     pub fn begin<I: Iterator<Item = usize>>(&mut self, n: usize, neighbors: impl Fn(usize) -> I) {
-        by_breadth(n, &neighbors, &mut self.order, &mut self.place);
+        by_breadth(n, &neighbors, [&mut self.order, &mut self.place]);
         self.first.clear();
         self.start.clear();
         let mut length = 0;
@@ -126,41 +125,6 @@ impl<const B: usize> BlockLu<B> {
             }
         }
         self.order.iter().zip(x).for_each(|(&row, x)| b[row] = x);
-    }
-}
-
-/// Orders rows by breadth, each island from the row that a search from its first one finds last: the row that is the i-th, and
-/// the place of each row.
-pub(super) fn by_breadth<I: Iterator<Item = usize>>(
-    n: usize,
-    neighbors: &impl Fn(usize) -> I,
-    order: &mut Vec<usize>,
-    place: &mut Vec<usize>,
-) {
-    order.clear();
-    place.clear();
-    place.resize(n, NONE);
-    for seed in 0..n {
-        if place[seed] != NONE {
-            continue;
-        }
-        let (begun, mut last) = (order.len(), seed);
-        for _ in 0..2 {
-            order.drain(begun..).for_each(|row| place[row] = NONE);
-            let mut next = begun;
-            place[last] = next;
-            order.push(last);
-            while let Some(&row) = order.get(next) {
-                next += 1;
-                for other in neighbors(row) {
-                    if place[other] == NONE {
-                        place[other] = order.len();
-                        order.push(other);
-                    }
-                }
-            }
-            last = *order.last().expect("the seed");
-        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Symmetric systems whose entries are near the diagonal, once their rows are in the right order, as in [`super::block_lu`].
 //! Their factor has in row i no entry before the first one of the matrix there, and half the work and the memory of L and U.
 
-use super::block_lu::by_breadth;
+/// Not yet ordered.
+const NONE: usize = usize::MAX;
 
 /// A system and its factors; keeps its memory.
 #[derive(Clone, Debug, Default)]
@@ -9,7 +10,7 @@ pub struct Envelope {
     /// The row of A that is the i-th, and the other way round.
     order: Vec<usize>,
     place: Vec<usize>,
-    /// f_i, and where row i begins in `lower`.
+    /// First entry of row i, and where the row begins in `lower`.
     first: Vec<usize>,
     start: Vec<usize>,
     lower: Vec<f64>,
@@ -25,7 +26,7 @@ impl Envelope {
         n: usize,
         neighbors: impl Fn(usize) -> I,
     ) {
-        by_breadth(n, &neighbors, &mut self.order, &mut self.place);
+        by_breadth(n, &neighbors, [&mut self.order, &mut self.place]);
         self.first.clear();
         self.start.clear();
         let mut length = 0;
@@ -57,6 +58,12 @@ impl Envelope {
     /// Entries of the lower half, without the diagonal.
     pub fn entries(&self) -> usize {
         self.lower.len()
+    }
+
+    /// Multiplications of a factorization.
+    pub fn work(&self) -> f64 {
+        let rows = self.first.iter().enumerate();
+        rows.map(|(i, first)| 0.5 * (i - first).pow(2) as f64).sum()
     }
 
     /// Zeros of the same pattern.
@@ -131,6 +138,45 @@ impl Envelope {
         }
         for (&row, &x) in self.order.iter().zip(&self.solution) {
             b[row] = x;
+        }
+    }
+}
+
+/// Orders rows by breadth, island by island, each from the row that a search from its first one finds last; `order` is that,
+/// `place` its inverse.
+pub fn by_breadth<I: Iterator<Item = usize>>(
+    n: usize,
+    neighbors: &impl Fn(usize) -> I,
+    [order, place]: [&mut Vec<usize>; 2],
+) {
+    let take = |row: usize, order: &mut Vec<usize>, place: &mut [usize]| {
+        if place[row] == NONE {
+            place[row] = order.len();
+            order.push(row);
+        }
+    };
+    order.clear();
+    place.clear();
+    place.resize(n, NONE);
+    for seed in 0..n {
+        if place[seed] != NONE {
+            continue;
+        }
+        let (begun, mut first) = (order.len(), seed);
+        for pass in 0..2 {
+            order[begun..].iter().for_each(|&row| place[row] = NONE);
+            order.truncate(begun);
+            take(first, order, place);
+            let mut at = begun;
+            while let Some(&row) = order.get(at) {
+                at += 1;
+                for other in neighbors(row) {
+                    take(other, order, place);
+                }
+            }
+            if pass == 0 {
+                first = *order.last().expect("the seed");
+            }
         }
     }
 }

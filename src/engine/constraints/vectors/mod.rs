@@ -5,4 +5,5 @@ pub mod body_matrix;
 pub mod conjugate;
 pub mod levels;
 pub(crate) mod passes;
+pub mod spectral;
 pub mod system;

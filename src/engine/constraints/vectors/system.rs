@@ -328,6 +328,11 @@ impl<'a> System<'a> {
         Points { rows: self.rows, contacts: self.contacts, features: self.features }
     }
 
+    /// Books bytes read and written.
+    pub fn book(&mut self, bytes: [f64; 2]) {
+        self.clock.book_bytes(bytes);
+    }
+
     /// Books bytes read and written of each contact point.
     fn book_points(&mut self, bytes: [f64; 2]) {
         let points = self.len() as f64;

@@ -1,0 +1,264 @@
+//! The step's problem as a quadratic program in impulses, and its descent by spectral projected gradients.
+//!
+//! ```text
+//! f(λ) = ½ λᵀ (K + R) λ + λᵀ (J v* + b),   g = J v(λ) + b + R λ
+//! ```
+//!
+//! with v(λ) = v* + M⁻¹ Jᵀ λ, which the bodies' rows hold. In each iteration, with D the effective masses,
+//!
+//! ```text
+//! d = Π(λ − α D g) − λ
+//! λ ← λ + s d,   the first s of 1, s₁, … with  f(λ + s d) ≤ max of the last 10 f + γ s g·d
+//! α ← |Δλ|²_{D⁻¹}/(Δλ·Δg)   or   Δλ·Δg/|Δg|²_D   in turn
+//! ```
+//!
+//! The first α is 1/(second difference of f along Δλ), the second the same of the inverse; they are longer than steps of descent
+//! allow, and f need not fall in every one of them (`barzilai1988`, `birgin2000`). f is quadratic, so that s costs two sums and no pass:
+//!
+//! ```text
+//! f(λ + s d) = f(λ) + s g·d + ½ s² d·(K + R) d
+//! ```
+
+use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::engine::constraints::records::point_vector::{
+    PointEntry, PointVector, Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
+};
+use crate::engine::constraints::vectors::system::System;
+use crate::engine::lanes::Lanes;
+
+/// b, with µ of each point in its second entries, and D.
+#[derive(Debug)]
+pub struct ImpulseProblem {
+    /// b (m/s or rad/s) and µ; below zero where no point is.
+    pub bias: PointVector,
+    /// D (kg)
+    pub mass: PointVector,
+}
+
+/// The impulses of contacts that change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axes {
+    /// Both.
+    Both,
+    /// Those along n.
+    Normal,
+    /// Those along t.
+    Tangent,
+}
+
+impl ImpulseProblem {
+    /// Overlap is pushed apart by `rule`. `alike`: D is the same along n and t, so that cones stay cones.
+    pub fn begin(&mut self, system: &mut System<'_>, rule: &Baumgarte, alike: bool) {
+        system.lane_surfaces(&mut self.bias);
+        update([&mut self.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+        system.lane_bias(rule.of_errors(), &mut self.bias);
+        system.lane_masses(&mut self.mass);
+        if alike {
+            update([&mut self.mass], [], |[m], []| [[m[0], m[0]]]);
+        }
+    }
+
+    /// g = J v + b + R λ, b along n alone.
+    pub fn gradient(&self, system: &mut System<'_>, lambda: &mut PointVector, to: &mut PointVector) {
+        system.lane_velocities(to);
+        update([to], [&self.bias], |[g], [b]| [[g[0] + b[0], g[1]]]);
+        system.soften_lanes(to, lambda);
+    }
+
+    /// The same, zero along what does not change.
+    fn gradient_along(
+        &self,
+        system: &mut System<'_>,
+        axes: Axes,
+        lambda: &mut PointVector,
+        to: &mut PointVector,
+    ) {
+        self.gradient(system, lambda, to);
+        let keeps = match axes {
+            Axes::Both => return,
+            Axes::Normal => [1.0, 0.0].map(Wide::splat),
+            Axes::Tangent => [0.0, 1.0].map(Wide::splat),
+        };
+        // Rows of joints, where µ is below zero, always change.
+        update([to], [&self.bias], |[g], [b]| [[0, 1].map(|k| (-b[1]).select_positive(g[k], keeps[k] * g[k]))]);
+    }
+}
+
+/// Values of f that the next one is compared with.
+const REMEMBERED: usize = 10;
+/// Trials of s in one iteration.
+const TRIALS: usize = 4;
+/// Least and greatest s in parts of the last one.
+const SHORTER: [f64; 2] = [0.1, 0.9];
+/// γ: share of the decrease that the slope promises.
+const DECREASE: f64 = 1e-4;
+/// Greatest α (1): beyond it what rounding leaves of g becomes impulses.
+const LONGEST: f64 = 1e4;
+/// |d| over |λ| at which nothing is left to do: a few roundings.
+const STILL: f64 = 1e-7;
+
+/// A descent on its way.
+#[derive(Debug)]
+pub struct Descent {
+    /// λ
+    pub now: PointVector,
+    gradient: PointVector,
+    next: PointVector,
+    next_gradient: PointVector,
+    direction: PointVector,
+    best: PointVector,
+    /// f since the beginning (J), and the least of it.
+    values: [f64; REMEMBERED],
+    value: f64,
+    least: f64,
+    /// α (1)
+    length: f64,
+    iterations: usize,
+    axes: Axes,
+}
+
+impl Descent {
+    /// A descent that works in these vectors.
+    pub fn new([now, gradient, next, next_gradient, direction, best]: [PointVector; 6]) -> Self {
+        let values = [f64::NEG_INFINITY; REMEMBERED];
+        Descent {
+            now,
+            gradient,
+            next,
+            next_gradient,
+            direction,
+            best,
+            values,
+            value: 0.0,
+            least: 0.0,
+            length: 1.0,
+            iterations: 0,
+            axes: Axes::Both,
+        }
+    }
+
+    /// Its vectors, to be given back.
+    pub fn vectors(self) -> [PointVector; 6] {
+        [self.now, self.gradient, self.next, self.next_gradient, self.direction, self.best]
+    }
+
+    /// From the impulses of the records, which velocities follow, and the nearest ones that `project` allows.
+    pub fn begin(
+        &mut self,
+        system: &mut System<'_>,
+        problem: &ImpulseProblem,
+        axes: Axes,
+        project: impl Fn(PointEntry, Wide) -> PointEntry,
+    ) {
+        self.axes = axes;
+        system.lane_impulses(&mut self.now);
+        update([&mut self.next, &mut self.direction], [&self.now, &problem.bias], |_, [now, bias]| {
+            let next = project(now, bias[1]);
+            [next, difference(next, now)]
+        });
+        system.push_lanes(&mut self.direction);
+        std::mem::swap(&mut self.now, &mut self.next);
+        problem.gradient_along(system, axes, &mut self.now, &mut self.gradient);
+        self.best.clone_from(&self.now);
+        (self.value, self.least, self.length, self.iterations) = (0.0, 0.0, 1.0, 1);
+        self.values = [f64::NEG_INFINITY; REMEMBERED];
+        self.values[0] = 0.0;
+    }
+
+    /// One iteration. `project(λ, µ)` is the nearest allowed point to λ, µ below zero where no contact is; joints have their
+    /// own bounds. False if nothing is left to do.
+    pub fn advance(
+        &mut self,
+        system: &mut System<'_>,
+        problem: &ImpulseProblem,
+        project: impl Fn(PointEntry, Wide) -> PointEntry,
+    ) -> bool {
+        let Descent { now, gradient, next, next_gradient, direction, axes, .. } = self;
+        let length = Wide::splat(self.length as f32);
+        update(
+            [next, direction],
+            [now, gradient, &problem.mass, &problem.bias],
+            |_, [now, gradient, mass, bias]| {
+                let point = [0, 1].map(|k| now[k] - length * mass[k] * gradient[k]);
+                let next = project(point, bias[1]);
+                [next, difference(next, now)]
+            },
+        );
+        if system.has_joints() {
+            system.bound_lanes(next);
+            update([direction], [next, now], |_, [next, now]| [difference(next, now)]);
+        }
+        let way = sum_of_products([direction, &problem.mass], |[d, mass]| [d, quotient(d, mass)]);
+        // Rounding of g grows with α.
+        let still = (STILL * self.length.max(1.0)).powi(2);
+        if way <= still * sum_of_products([now, &problem.mass], |[now, mass]| [now, quotient(now, mass)]) {
+            return false;
+        }
+        system.push_lanes(direction);
+        problem.gradient_along(system, *axes, next, next_gradient);
+        let slope = dot(direction, gradient);
+        let curve = sum_of_products([direction, next_gradient, gradient], |[d, next, now]| {
+            [d, difference(next, now)]
+        });
+        // Along d: the value at s, and the first s that is low enough.
+        let along = |s: f64| self.value + s * slope + 0.5 * s * s * curve;
+        let highest = self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut s = 1.0;
+        for _ in 1..TRIALS {
+            if along(s) <= highest + DECREASE * s * slope {
+                break;
+            }
+            s = (-slope / curve).clamp(SHORTER[0] * s, SHORTER[1] * s);
+        }
+        if s < 1.0 {
+            let part = s as f32;
+            update(
+                [next, next_gradient, direction],
+                [now, gradient],
+                |[next, next_gradient, d], [now, gradient]| {
+                    let change = difference(next_gradient, gradient);
+                    [
+                        plus_scaled(now, part, difference(next, now)),
+                        plus_scaled(gradient, part, change),
+                        scaled(part - 1.0, d),
+                    ]
+                },
+            );
+            system.push_lanes(direction);
+        }
+        self.value = along(s);
+        self.values[self.iterations % REMEMBERED] = self.value;
+        self.iterations += 1;
+        // |Δλ|² = s² |d|², Δλ·Δg = s² d·(K + R) d.
+        self.length = if curve <= 0.0 {
+            1.0
+        } else if self.iterations.is_multiple_of(2) {
+            way / curve
+        } else {
+            let square = sum_of_products([next_gradient, gradient, &problem.mass], |[next, now, mass]| {
+                let change = difference(next, now);
+                [change, [0, 1].map(|k| mass[k] * change[k])]
+            });
+            if square > 0.0 { s * s * curve / square } else { LONGEST }
+        };
+        self.length = self.length.min(LONGEST);
+        std::mem::swap(&mut self.now, &mut self.next);
+        std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        if self.value < self.least {
+            self.least = self.value;
+            self.best.clone_from(&self.now);
+        }
+        true
+    }
+
+    /// Goes back to the least f, from which velocities are at most √(2 (f − f*)) off in the mass norm, and makes it the
+    /// impulses of the records.
+    pub fn end(&mut self, system: &mut System<'_>) {
+        if self.value > self.least {
+            update([&mut self.direction], [&self.best, &self.now], |_, [best, now]| [difference(best, now)]);
+            system.push_lanes(&mut self.direction);
+            self.now.clone_from(&self.best);
+        }
+        system.set_lane_impulses(&mut self.now);
+    }
+}

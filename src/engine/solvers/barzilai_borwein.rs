@@ -1,0 +1,71 @@
+//! Projected gradients on the convex relaxation of friction, with step lengths from the last change of the gradient:
+//! they follow the curvature of the problem without a bound on it, and the objective need not fall in every step.
+//!
+//! **Source.** `heyn2013`, section 4.2 (P-SPG-FB), as in Chrono's `ChSolverBB`; `barzilai1988` (step lengths), `birgin2000` (line
+//! search); `anitescu2006` (the relaxation).
+//!
+//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone stays one. The
+//! first step has the length of one of Jacobi's method, not 10⁻⁴ of it. The result is the iterate of least objective, which
+//! bounds the error of velocities; Chrono takes the one of the smallest projected gradient, another projection per iteration. Rows
+//! of joints are in the same vectors, each scaled by its own mass and projected on its bounds.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
+//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 1 B per contact.
+//!
+//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. And when
+//! iterations are few: the first ten are no better than Jacobi's.
+//!
+//! # The method
+//!
+//! See [`spectral`](crate::engine::constraints::vectors::spectral), with Π the nearest point of the cones.
+
+use super::{Law, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::vectors::spectral::{Axes, Descent, ImpulseProblem};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "barzilai_borwein",
+    source: "heyn2013",
+    summary: "projected gradients of spectral length on the convex relaxation: lifts off while sliding",
+    budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
+    parameters: &[Parameter::BAUMGARTE],
+    breaks: &[
+        (Law::Converges, "to the convex relaxation, which is another law"),
+        (Law::Rest, "gradients spread a load more slowly than sweeps"),
+    ],
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        let mut problem = ImpulseProblem { bias: passes.vector(), mass: passes.vector() };
+        let mut descent = Descent::new([(); 6].map(|_| passes.vector()));
+        passes.with_system(Phase::Solve, |system| {
+            problem.begin(system, &rule, true);
+            descent.begin(system, &problem, Axes::Both, cone::project_point);
+        });
+        for _ in 0..budget.velocity_iterations {
+            passes.with_system(Phase::Solve, |system| {
+                descent.advance(system, &problem, cone::project_point);
+                system.set_lane_impulses(&mut descent.now);
+            });
+            passes.count_sweep(2);
+            passes.iteration_done();
+        }
+        passes.with_system(Phase::Solve, |system| descent.end(system));
+        passes.give_back(descent.vectors());
+        passes.give_back([problem.bias, problem.mass]);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,89 @@
+//! Newton's method on a convex problem in the velocities of bodies, to machine precision: contacts and joints give
+//! way a little, friction is relaxed to a cone, and each step factorizes one sparse matrix, three rows per body.
+//!
+//! **Source.** `castro2022`, sections III to V: unconstrained formulation, analytical inverse dynamics of a contact, exact line search
+//! (Drake's SAP solver). `todorov2014` (MuJoCo) has the same problem with elliptic cones. `anitescu2006` (the relaxation).
+//!
+//! **Departures.** A contact gives way by `softness` times its effective inverse mass, along n and t alike; SAP takes 0.025 along n
+//! and 0.001 along t where a contact is to be nearly rigid, MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`], but
+//! without a slop, within which soft contacts would sink from step to step. The first velocities are those of the last impulses, not those of the last step, so that momentum is kept before Newton's method has ended. Factors
+//! are within an envelope (`numerics/blocks.rs`), which has no fill ordering of its own. Where one would take more than `factor_work`, steps come from conjugate
+//! gradients with blocks on the diagonal, as MuJoCo's second solver does. Rows of joints give way by 10⁻⁸, those of springs as their law has it; motors and capped
+//! springs have the nearest impulse within their bound, in the norm of what they give way.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
+//! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two. Sweeps of a
+//! step request 1 B per contact.
+//!
+//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. When bands are wide. When
+//! iterations end early: impulses are velocities over `softness`, and have nothing to say before velocities do.
+//!
+//! # The method
+//!
+//! See `sap/convex.rs`.
+
+mod convex;
+
+use super::{Law, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
+use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
+use convex::Convex;
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "sap",
+    source: "castro2022",
+    summary: "Newton's method on the convex relaxation in velocities, sparse factors: lifts off while sliding",
+    budget: Budget { substeps: 1, velocity_iterations: 100, relax_iterations: 0, position_iterations: 0 },
+    parameters: &[
+        Parameter::BAUMGARTE,
+        Parameter {
+            name: "softness",
+            unit: "",
+            default: 1e-5,
+            range: [1e-9, 1e3],
+            meaning: "what contacts give way, over their effective inverse mass",
+            trials: &[1e-6, 1e-4, 1e-3],
+        },
+        Parameter {
+            name: "factor_work",
+            unit: "10⁶",
+            default: 30.0,
+            range: [0.0, 1e9],
+            meaning: "multiplications of a factorization, beyond which conjugate gradients take its place",
+            trials: &[],
+        },
+    ],
+    breaks: &[
+        (Law::Converges, "to the convex relaxation with soft contacts, which is another law"),
+        (Law::NoAllocation, "matrices are as large as the scene"),
+    ],
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let (budget, h) = (passes.budget(), passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), 0.0, MAX_PUSH_SPEED, h);
+    let [softness, millions] = [1, 2].map(|i| f64::from(passes.parameter(i)));
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        let mut problem = passes.with_system(Phase::Solve, |system| {
+            Convex::new(system, &rule, softness, h, 1e6 * millions)
+        });
+        passes.warm_start();
+        passes.with_system(Phase::Solve, |system| problem.begin(system.rows()));
+        for _ in 0..budget.velocity_iterations {
+            if passes.with_system(Phase::Solve, |_| problem.step()) {
+                passes.count_sweep(2);
+            }
+            passes.with_system(Phase::Solve, |system| problem.write(system));
+            passes.iteration_done();
+        }
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}

@@ -1,0 +1,119 @@
+//! Staggered projections: loads without friction and friction without loads are solved in turn, each as a convex problem
+//! and each well, until both agree. What they agree on obeys Coulomb's law, not a relaxation of it.
+//!
+//! **Source.** `kaufman2008`, sections 4 and 7.
+//!
+//! **Departures.** Each of the two quadratic programs is solved in lanes by spectral projected gradients ([`spectral`]),
+//! `inner` iterations or until nothing changes; the source has a dense active-set method. In the plane a cone of friction is an interval, and
+//! needs no facets. Overlap is pushed apart as in [`super::pgs`]. Rows of joints are in both programs, with their bounds.
+//!
+//! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
+//! over vectors in lanes. Sweeps of a step request 1 B per contact.
+//!
+//! **Fails when** loads and friction need each other (arches, cards that lean, rods that jam): rounds then go back and forth.
+//! And when `inner` is too small for the height of a pile.
+//!
+//! # The method
+//!
+//! ```text
+//! λn ← argmin f(λn, λt) over λn ≥ 0,   λt ← argmin f(λn, λt) over |λt| ≤ µ λn
+//! f(λ) = ½ λᵀ (K + R) λ + λᵀ (J v* + b)
+//! ```
+//!
+//! At a fixed point λn is complementary to un, and λt dissipates most.
+//!
+//! [`spectral`]: crate::engine::constraints::vectors::spectral
+
+use super::{Law, Variant};
+use crate::engine::clock::Phase;
+use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
+use crate::engine::constraints::kernels::velocity::sweep::Sweep;
+use crate::engine::constraints::records::point_vector::{PointEntry, Wide};
+use crate::engine::constraints::vectors::spectral::{Axes, Descent, ImpulseProblem};
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
+use crate::engine::lanes::Lanes;
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+
+/// See the [module](self).
+pub static SOLVER: Variant = Variant {
+    name: "staggered",
+    source: "kaufman2008",
+    summary: "loads and friction solved in turn, each as a convex problem",
+    budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
+    parameters: &[
+        Parameter::BAUMGARTE,
+        Parameter {
+            name: "inner",
+            unit: "",
+            default: 10.0,
+            range: [1.0, 10000.0],
+            meaning: "iterations of each of the two projections in a round",
+            trials: &[5.0, 20.0],
+        },
+    ],
+    breaks: &[
+        (Law::Converges, "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations"),
+        (Law::Rest, "gradients spread a load more slowly than sweeps"),
+    ],
+    impacts: ImpactLaw::None,
+    make: || Schedule::boxed(step),
+    ..Variant::BASE
+};
+
+fn step(passes: &mut Passes<'_>) {
+    let budget = passes.budget();
+    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let inner = passes.parameter(1) as usize;
+    for substep in 0..budget.substeps {
+        passes.integrate_velocities();
+        passes.warm_start();
+        let mut problem = ImpulseProblem { bias: passes.vector(), mass: passes.vector() };
+        let mut descent = Descent::new([(); 6].map(|_| passes.vector()));
+        passes.with_system(Phase::Solve, |system| problem.begin(system, &rule, false));
+        for _ in 0..budget.velocity_iterations {
+            solve(passes, &problem, &mut descent, inner, Axes::Normal, pushing);
+            solve(passes, &problem, &mut descent, inner, Axes::Tangent, within_friction);
+            passes.iteration_done();
+        }
+        passes.solves(&Sweep(rule));
+        passes.give_back(descent.vectors());
+        passes.give_back([problem.bias, problem.mass]);
+        passes.integrate_positions();
+        passes.end_substep(substep);
+    }
+}
+
+/// One of the two projections.
+fn solve(
+    passes: &mut Passes<'_>,
+    problem: &ImpulseProblem,
+    descent: &mut Descent,
+    inner: usize,
+    axes: Axes,
+    project: impl Fn(PointEntry, Wide) -> PointEntry + Copy,
+) {
+    let count = passes.with_system(Phase::Solve, |system| {
+        descent.begin(system, problem, axes, project);
+        let mut count = 0;
+        while count < inner {
+            count += 1;
+            if !descent.advance(system, problem, project) {
+                break;
+            }
+        }
+        descent.end(system);
+        count
+    });
+    (0..count).for_each(|_| passes.count_sweep(1));
+}
+
+/// λn ≥ 0; a negative µ marks what is no contact, and stays as it is.
+fn pushing([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
+    [(-friction).select_positive(normal, Lanes::max(normal, Wide::zero())), tangent]
+}
+
+/// |λt| ≤ µ λn.
+fn within_friction([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
+    let bound = friction * normal;
+    [normal, (-friction).select_positive(tangent, Lanes::max(Lanes::min(tangent, bound), -bound))]
+}
