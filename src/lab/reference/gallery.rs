@@ -20,7 +20,7 @@ struct Builder {
 
 impl Builder {
     fn new(name: String, h: f64) -> Self {
-        let problem = ContactProblem { name, h, bodies: Vec::new(), contacts: Vec::new() };
+        let problem = ContactProblem { name, h, bodies: vec![], contacts: vec![], joints: vec![] };
         Builder { problem, centers: Vec::new(), gravity: [0.0, -GRAVITY] }
     }
 

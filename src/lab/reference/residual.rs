@@ -18,6 +18,7 @@
 //!
 //! With ρ = 1/G_ii it is an impulse: how much one exact sweep over this row alone would change it.
 
+use super::joints::joint_residuals;
 use super::problem::{ContactProblem, DPair, Velocity};
 
 /// The right-hand side b of un = Jn v + b that a residual is measured against.
@@ -29,16 +30,17 @@ pub enum Target<'a> {
     /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step,
     /// overlapping ones may not deepen.
     Rigid,
-    /// The solver's own law: one row for every contact of the problem.
+    /// The solver's own law: one row for every contact of the problem, then one for every row of its joints.
     Own(&'a [OwnRow]),
 }
 
-/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn.
+/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. Of a rigid row or a limit of a joint:
+/// J v + bias + compliance K λ; motors and springs have the law of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnRow {
     /// m/s; negative pushes apart.
     pub bias: f64,
-    /// 1/kg, ≥ 0: velocity that the contact yields per impulse.
+    /// 1/kg, ≥ 0: velocity that the contact yields per impulse; of a row of a joint in its K (1).
     pub compliance: f64,
 }
 
@@ -148,7 +150,7 @@ pub(super) fn clamp(x: f64, radius: f64) -> f64 {
     }
 }
 
-/// Largest |natural map| over all contacts and both directions (N·s); NaN if anything is.
+/// Largest |natural map| over all contacts and both directions, and all rows of joints (N·s); NaN if anything is.
 pub fn natural_map(
     problem: &ContactProblem,
     target: Target,
@@ -156,7 +158,8 @@ pub fn natural_map(
     impulses: &[DPair],
 ) -> f64 {
     let residuals = contact_residuals(problem, target, velocities, impulses);
-    let parts: Vec<f64> = residuals.iter().flat_map(|r| [r.normal, r.tangent]).collect();
+    let mut parts: Vec<f64> = residuals.iter().flat_map(|r| [r.normal, r.tangent]).collect();
+    parts.extend(joint_residuals(problem, target, velocities, impulses));
     Summary::of(&parts).max
 }
 

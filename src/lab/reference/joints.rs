@@ -1,0 +1,529 @@
+//! Joints of a problem: rows in blocks, the law of a block, and how far impulses are from it.
+//!
+//! # Rows
+//!
+//! A row has the error C (m or rad) and the Jacobian J of its rate, as `engine::constraints::joints::rows` states them:
+//!
+//! ```text
+//! J v = d·(v_b − v_a) + s_b ω_b − s_a ω_a
+//! ```
+//!
+//! Rows of a block are solved together, K = J M⁻¹ Jᵀ. Vectors of impulses have the pairs (λn, λt) of contacts first,
+//! then a pair (λ, 0) for every row.
+//!
+//! # Laws
+//!
+//! Over a step of h, with v⁺ at its end:
+//!
+//! ```text
+//! rigid    J v⁺ = 0                             an error that is there stays, as overlap does
+//! limit    0 ≤ λ ⊥ J v⁺ + max(C, 0)/h ≥ 0       may close within the step, and no more
+//! motor    λ = Π(λ − ρ (J v⁺ − u)),  |λ| ≤ F h
+//! spring   λ = Π(−K⁻¹ (S C + D J v⁺)),  |λ| ≤ F h where it is bounded
+//! ```
+//!
+//! Π is the projection on the bounds: the nearest impulse whose norm over the block is within the cap. For a single row all of
+//! them are J v + b + R λ = 0 on the box [lo, hi], with b = max(C, 0)/h, −u or (S/D) C, and R = K/D of springs.
+//!
+//! # Residual
+//!
+//! Every law is the fixed point of a line,
+//!
+//! ```text
+//! λ = Π(y),   y = α λ − K⁻¹ (c + q J v⁺)
+//!
+//! rigid, limit   α = q = 1/(1 + σ)   c = b/(1 + σ)      σ K: softness of a solver's own law; 0 of the rigid law
+//! motor          α = q = 1           c = −u
+//! spring         α = q = D/(1 + D)   c = S C/(1 + D)
+//! ```
+//!
+//! which is the exact solution of the block alone. The residual r = λ − Π(y) is therefore the natural map with ρ = 1/(K + R)
+//! of the block: what one exact sweep over it would change, as for contacts. For the spring: its fixed point inside the bounds
+//! is (1 − α) λ = −K⁻¹ (c + q J v), the law times 1/(1 + D); on the bound y = (D λ + f)/(1 + D) with f = −K⁻¹(S C + D J v)
+//! points along λ and is no shorter exactly if f does and is not, so λ = Π(f).
+//!
+//! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of mass that has
+//! the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2: so N·s for all rows.
+
+use super::problem::{ContactProblem, DPair, Velocity};
+use super::residual::{OwnRow, Target, positive};
+use crate::engine::constraints::numerics::matrix::solve_in_place;
+use serde::{Deserialize, Serialize};
+
+/// Rows of the largest block.
+pub const ROWS: usize = 3;
+/// Numbers of the rows of a block; those of absent rows are zero.
+pub type RowVector = [f64; ROWS];
+/// A spring that is damped less than this (1) pushes as its error says, whatever its velocity is.
+pub(super) const UNDAMPED: f64 = 1e-12;
+
+/// A joint of a problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemJoint {
+    /// Body a; none if that side is static.
+    pub body_a: Option<u32>,
+    /// Body b; none if that side is static.
+    pub body_b: Option<u32>,
+    /// Lengths of the arms from the centers of mass of a and b to the anchors (m).
+    pub reach: DPair,
+    /// Its blocks, in the order in which they are solved.
+    pub blocks: Vec<ProblemBlock>,
+}
+
+/// Rows of a joint that are solved together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemBlock {
+    /// The law of all of them.
+    pub law: BlockLaw,
+    /// One to three rows.
+    pub rows: Vec<ProblemRow>,
+}
+
+/// The law of a block; see the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum BlockLaw {
+    /// C = 0.
+    Rigid,
+    /// C ≥ 0, of one row.
+    Limit,
+    /// J v = u.
+    Motor {
+        /// u (m/s or rad/s)
+        speed: f64,
+        /// F h (N·s or N·m·s)
+        cap: f64,
+    },
+    /// A spring.
+    Spring {
+        /// S (1/s)
+        stiffness: f64,
+        /// D (1)
+        damping: f64,
+        /// F h (N·s or N·m·s), if it is bounded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cap: Option<f64>,
+    },
+}
+
+impl BlockLaw {
+    /// Greatest norm of its impulses, where there is one.
+    pub fn cap(&self) -> Option<f64> {
+        match *self {
+            BlockLaw::Motor { cap, .. } => Some(cap),
+            BlockLaw::Spring { cap, .. } => cap,
+            BlockLaw::Rigid | BlockLaw::Limit => None,
+        }
+    }
+}
+
+/// A row of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemRow {
+    /// d: a unit vector, or zero for an angle.
+    pub axis: [f64; 2],
+    /// s_a: r_a × d (m), or 1 for an angle.
+    pub arm_a: f64,
+    /// s_b: the same of b.
+    pub arm_b: f64,
+    /// C at the start of the step (m or rad).
+    pub error: f64,
+    /// Impulse that a warm-started solver begins with (N·s or N·m·s).
+    pub warm_impulse: f64,
+}
+
+impl ProblemRow {
+    /// Whether it is a row of an angle.
+    pub fn is_angular(&self) -> bool {
+        self.axis == [0.0; 2]
+    }
+}
+
+impl ProblemJoint {
+    /// Rows of all its blocks.
+    pub fn rows(&self) -> impl Iterator<Item = &ProblemRow> {
+        self.blocks.iter().flat_map(|block| &block.rows)
+    }
+
+    /// A revolute joint whose anchors meet: `r` from the centers of mass to the point (m).
+    pub fn revolute(bodies: [Option<u32>; 2], r: [[f64; 2]; 2]) -> Self {
+        let arm = |k: usize, d: [f64; 2]| bodies[k].map_or(0.0, |_| r[k][0] * d[1] - r[k][1] * d[0]);
+        let row = |axis| ProblemRow { axis, arm_a: arm(0, axis), arm_b: arm(1, axis), error: 0.0, warm_impulse: 0.0 };
+        let [body_a, body_b] = bodies;
+        let rows = vec![row([1.0, 0.0]), row([0.0, 1.0])];
+        let reach = [0, 1].map(|k| bodies[k].map_or(0.0, |_| r[k][0].hypot(r[k][1])));
+        ProblemJoint { body_a, body_b, reach, blocks: vec![ProblemBlock { law: BlockLaw::Rigid, rows }] }
+    }
+
+    /// The same with one more row, of the angle, under `law`, which is solved first.
+    pub fn with_angle(mut self, law: BlockLaw, error: f64) -> Self {
+        let row = ProblemRow { axis: [0.0; 2], arm_a: 1.0, arm_b: 1.0, error, warm_impulse: 0.0 };
+        self.blocks.insert(0, ProblemBlock { law, rows: vec![row] });
+        self
+    }
+}
+
+/// Bounds of the impulses of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Bound {
+    None,
+    /// λ ≥ 0
+    Positive,
+    /// Greatest norm.
+    Cap(f64),
+}
+
+impl Bound {
+    /// Whether impulses are off the bound, so that they answer to velocities.
+    pub fn is_inside(self, y: RowVector) -> bool {
+        match self {
+            Bound::None => true,
+            Bound::Positive => y[0] > 0.0,
+            Bound::Cap(cap) => y.iter().map(|y| y * y).sum::<f64>().sqrt() < cap,
+        }
+    }
+
+    /// Π; NaN stays NaN.
+    pub fn project(self, mut y: RowVector) -> RowVector {
+        match self {
+            Bound::None => {}
+            Bound::Positive => y[0] = positive(y[0]),
+            Bound::Cap(cap) => {
+                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+                if norm > cap {
+                    y = y.map(|y| y * (cap / norm));
+                }
+            }
+        }
+        y
+    }
+}
+
+/// A block with everything that does not change with impulses.
+#[derive(Clone, Debug)]
+pub(super) struct BlockLine {
+    /// Place of its first row in vectors of impulses.
+    pub first: usize,
+    pub size: usize,
+    /// Bodies that are not static, with their part of J, sign included.
+    pub sides: Vec<(usize, [Velocity; ROWS])>,
+    /// K
+    pub response: [RowVector; ROWS],
+    /// K⁻¹
+    pub inverse: [RowVector; ROWS],
+    /// P of [`Self::solution`], K⁻¹ at first.
+    pub step: [RowVector; ROWS],
+    /// α = q
+    pub alpha: f64,
+    pub offset: RowVector,
+    pub bound: Bound,
+    /// Impulses to N·s (1, or 1/m of angular rows).
+    pub scale: RowVector,
+}
+
+fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
+    matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+}
+
+fn dot(a: &Velocity, b: &Velocity) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl BlockLine {
+    fn new(problem: &ContactProblem, target: Target, joint: &ProblemJoint, block: &ProblemBlock, first: usize) -> Self {
+        let sides = sides(joint, block);
+        let response = response(problem, &sides);
+        let mut own = [OwnRow::default(); ROWS];
+        for (i, own) in own.iter_mut().enumerate().take(block.rows.len()) {
+            *own = match target {
+                Target::Own(rows) => rows[first + i],
+                Target::Rigid => OwnRow { bias: block.rows[i].rigid_bias(block.law, problem.h), compliance: 0.0 },
+            };
+        }
+        let mut offset = [0.0; ROWS];
+        let alpha = match block.law {
+            BlockLaw::Rigid | BlockLaw::Limit => 1.0 / (1.0 + own[0].compliance),
+            BlockLaw::Motor { .. } => 1.0,
+            BlockLaw::Spring { damping, .. } => damping / (1.0 + damping),
+        };
+        for (i, offset) in offset.iter_mut().enumerate().take(block.rows.len()) {
+            *offset = match block.law {
+                BlockLaw::Rigid | BlockLaw::Limit => alpha * own[i].bias,
+                BlockLaw::Motor { speed, .. } => -speed,
+                BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * block.rows[i].error,
+            };
+        }
+        let bound = match (block.law, block.law.cap()) {
+            (BlockLaw::Limit, _) => Bound::Positive,
+            (_, Some(cap)) => Bound::Cap(cap),
+            (_, None) => Bound::None,
+        };
+        let through: f64 = sides.iter().map(|&(body, _)| problem.bodies[body].inv_mass).sum();
+        let mut scale = [1.0; ROWS];
+        for (i, row) in block.rows.iter().enumerate() {
+            if row.is_angular() && through > 0.0 {
+                scale[i] = (response[i][i] / through).sqrt();
+            }
+        }
+        let size = block.rows.len();
+        let inverse = inverted(response, size).unwrap_or_default();
+        BlockLine { first, size, sides, response, inverse, step: inverse, alpha, offset, bound, scale }
+    }
+
+    /// J v (m/s or rad/s).
+    pub fn velocity(&self, velocities: &[Velocity]) -> RowVector {
+        let mut u = [0.0; ROWS];
+        for (body, rows) in &self.sides {
+            for (u, row) in u.iter_mut().zip(rows) {
+                *u += dot(row, &velocities[*body]);
+            }
+        }
+        u
+    }
+
+    /// Adds M⁻¹ Jᵀ `impulse` to the velocities.
+    pub fn apply(&self, problem: &ContactProblem, impulse: RowVector, velocities: &mut [Velocity]) {
+        apply(problem, &self.sides, impulse, velocities);
+    }
+
+    /// Its impulses in a vector.
+    pub fn read(&self, impulses: &[DPair]) -> RowVector {
+        let mut own = [0.0; ROWS];
+        own.iter_mut().zip(&impulses[self.first..][..self.size]).for_each(|(own, pair)| *own = pair[0]);
+        own
+    }
+
+    /// Puts its impulses into a vector.
+    pub fn write(&self, own: RowVector, impulses: &mut [DPair]) {
+        impulses[self.first..][..self.size].iter_mut().zip(own).for_each(|(pair, own)| pair[0] = own);
+    }
+
+    /// K⁻¹ x
+    fn solved(&self, x: RowVector) -> RowVector {
+        product(&self.inverse, x)
+    }
+
+    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
+    /// with impulses `l`.
+    pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
+        let soft = product(&self.response, l);
+        let x = product(&self.step, [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]));
+        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+    }
+
+    /// Takes J M⁻¹ Jᵀ with each side's part times `share` of its body for the response to its own impulses: P = (α D + (1 − α) K)⁻¹.
+    pub fn split(&mut self, problem: &ContactProblem, share: &[f64]) {
+        let mut d = [[0.0; ROWS]; ROWS];
+        for side in &self.sides {
+            let k = response(problem, std::slice::from_ref(side));
+            (0..ROWS).for_each(|r| (0..ROWS).for_each(|c| d[r][c] += share[side.0] * k[r][c]));
+        }
+        for (d, k) in d.iter_mut().flatten().zip(self.response.iter().flatten()) {
+            *d = self.alpha * *d + (1.0 - self.alpha) * k;
+        }
+        self.step = inverted(d, self.size).unwrap_or_default();
+    }
+
+    /// Impulses of a spring whose force does not depend on the velocity.
+    pub fn fixed(&self) -> Option<RowVector> {
+        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
+    }
+
+    /// b of J v + b + R λ = 0 (m/s or rad/s).
+    pub fn bias(&self) -> RowVector {
+        self.offset.map(|c| c / self.alpha)
+    }
+
+    /// R = `softness` K (1).
+    pub fn softness(&self) -> f64 {
+        (1.0 - self.alpha) / self.alpha
+    }
+}
+
+/// Bodies that are not static, with their part of J, sign included.
+fn sides(joint: &ProblemJoint, block: &ProblemBlock) -> Vec<(usize, [Velocity; ROWS])> {
+    let side = |body: Option<u32>, sign: f64, arm: fn(&ProblemRow) -> f64| {
+        let mut rows = [[0.0; 3]; ROWS];
+        for (to, row) in rows.iter_mut().zip(&block.rows) {
+            *to = [row.axis[0], row.axis[1], arm(row)].map(|x| sign * x);
+        }
+        body.map(|body| (body as usize, rows))
+    };
+    let both = [side(joint.body_a, -1.0, |row| row.arm_a), side(joint.body_b, 1.0, |row| row.arm_b)];
+    both.into_iter().flatten().collect()
+}
+
+/// K
+fn response(problem: &ContactProblem, sides: &[(usize, [Velocity; ROWS])]) -> [RowVector; ROWS] {
+    let mut k = [[0.0; ROWS]; ROWS];
+    for (body, rows) in sides {
+        let b = &problem.bodies[*body];
+        for (r, k) in k.iter_mut().enumerate() {
+            for (c, k) in k.iter_mut().enumerate() {
+                let along = rows[r][0] * rows[c][0] + rows[r][1] * rows[c][1];
+                *k += b.inv_mass * along + b.inv_inertia * rows[r][2] * rows[c][2];
+            }
+        }
+    }
+    k
+}
+
+fn apply(
+    problem: &ContactProblem,
+    sides: &[(usize, [Velocity; ROWS])],
+    impulse: RowVector,
+    velocities: &mut [Velocity],
+) {
+    for (body, rows) in sides {
+        let b = &problem.bodies[*body];
+        let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+        for (row, impulse) in rows.iter().zip(impulse) {
+            for k in 0..3 {
+                velocities[*body][k] += inverse[k] * (row[k] * impulse);
+            }
+        }
+    }
+}
+
+/// The inverse of K, the diagonal of which is scaled to 1 first; none if it has none to 9 digits.
+pub(super) fn inverted(k: [RowVector; ROWS], size: usize) -> Option<[RowVector; ROWS]> {
+    let mut inverse = [[0.0; ROWS]; ROWS];
+    let scale = [0, 1, 2].map(|i| if i < size { 1.0 / k[i][i].sqrt() } else { 1.0 });
+    for column in 0..size {
+        let mut a = [0.0; ROWS * ROWS];
+        let (a, x) = (&mut a[..size * size], &mut [0.0; ROWS][..size]);
+        for r in 0..size {
+            for c in 0..size {
+                a[r * size + c] = scale[r] * k[r][c] * scale[c];
+            }
+        }
+        x[column] = 1.0;
+        if a.iter().any(|a| !a.is_finite()) || !solve_in_place(a, x, 1e-9) {
+            return None;
+        }
+        for (row, x) in x.iter().enumerate() {
+            inverse[row][column] = scale[row] * x * scale[column];
+        }
+    }
+    Some(inverse)
+}
+
+impl ProblemRow {
+    /// b of the rigid law (m/s or rad/s).
+    pub fn rigid_bias(&self, law: BlockLaw, h: f64) -> f64 {
+        match law {
+            BlockLaw::Limit => self.error.max(0.0) / h,
+            _ => 0.0,
+        }
+    }
+}
+
+impl ContactProblem {
+    /// Every block with its joint and the place of its first row in vectors of impulses.
+    pub fn blocks(&self) -> impl Iterator<Item = (usize, &ProblemJoint, &ProblemBlock)> {
+        let mut next = self.contacts.len();
+        let blocks = self.joints.iter().flat_map(|joint| joint.blocks.iter().map(move |block| (joint, block)));
+        blocks.map(move |(joint, block)| {
+            let first = next;
+            next += block.rows.len();
+            (first, joint, block)
+        })
+    }
+
+    /// Rows of joints.
+    pub fn joint_rows(&self) -> usize {
+        self.joints.iter().map(|joint| joint.rows().count()).sum()
+    }
+
+    /// Length of vectors of impulses: a pair for every contact, then one for every row of joints.
+    pub fn unknowns(&self) -> usize {
+        self.contacts.len() + self.joint_rows()
+    }
+
+    /// Impulses of a cold start.
+    pub fn no_impulses(&self) -> Vec<DPair> {
+        vec![[0.0; 2]; self.unknowns()]
+    }
+
+    /// Impulses of a warm start.
+    pub fn warm_impulses(&self) -> Vec<DPair> {
+        let joints = self.joints.iter().flat_map(ProblemJoint::rows).map(|row| [row.warm_impulse, 0.0]);
+        self.contacts.iter().map(|c| c.warm_impulse).chain(joints).collect()
+    }
+
+    /// Replaces the impulses of a warm start.
+    ///
+    /// # Panics
+    /// If there are not [`Self::unknowns`] of them.
+    pub fn set_warm_impulses(&mut self, impulses: &[DPair]) {
+        assert_eq!(impulses.len(), self.unknowns(), "a pair for every contact and every row");
+        let (of_contacts, of_rows) = impulses.split_at(self.contacts.len());
+        self.contacts.iter_mut().zip(of_contacts).for_each(|(c, &impulse)| c.warm_impulse = impulse);
+        let rows = self.joints.iter_mut().flat_map(|joint| &mut joint.blocks).flat_map(|block| &mut block.rows);
+        rows.zip(of_rows).for_each(|(row, impulse)| row.warm_impulse = impulse[0]);
+    }
+
+    /// The blocks under a law.
+    pub(super) fn lines(&self, target: Target) -> Vec<BlockLine> {
+        self.blocks().map(|(first, joint, block)| BlockLine::new(self, target, joint, block, first)).collect()
+    }
+
+    /// Adds M⁻¹ Jᵀ λ of all joints to the velocities.
+    pub(super) fn push_joints(&self, impulses: &[DPair], velocities: &mut [Velocity]) {
+        for (first, joint, block) in self.blocks() {
+            let mut own = [0.0; ROWS];
+            own.iter_mut().zip(&impulses[first..][..block.rows.len()]).for_each(|(own, pair)| *own = pair[0]);
+            apply(self, &sides(joint, block), own, velocities);
+        }
+    }
+
+    /// Adds Jᵀ λ of all joints (N·s, N·s, N·m·s).
+    pub(super) fn sum_joint_impulses(&self, impulses: &[DPair], sums: &mut [Velocity]) {
+        for (first, joint, block) in self.blocks() {
+            for (body, rows) in sides(joint, block) {
+                for (row, pair) in rows.iter().zip(&impulses[first..][..block.rows.len()]) {
+                    (0..3).for_each(|k| sums[body][k] += row[k] * pair[0]);
+                }
+            }
+        }
+    }
+
+    /// K of a block; see the [module](self).
+    pub(super) fn block_response(&self, joint: &ProblemJoint, block: &ProblemBlock) -> [RowVector; ROWS] {
+        response(self, &sides(joint, block))
+    }
+
+    /// Whether all impulses of joints are bounded row by row: then a problem without friction is convex.
+    pub(super) fn has_boxes_alone(&self) -> bool {
+        self.blocks().all(|(_, _, block)| block.rows.len() == 1 || block.law.cap().is_none())
+    }
+}
+
+/// Residual of every row of joints (N·s), in their order; see the [module](self).
+///
+/// `velocities` need not follow from `impulses`.
+pub fn joint_residuals(
+    problem: &ContactProblem,
+    target: Target,
+    velocities: &[Velocity],
+    impulses: &[DPair],
+) -> Vec<f64> {
+    let mut residuals = Vec::with_capacity(problem.joint_rows());
+    for line in problem.lines(target) {
+        let own = line.read(impulses);
+        let exact = line.solution(line.velocity(velocities), own);
+        residuals.extend((0..line.size).map(|i| line.scale[i] * (own[i] - exact[i])));
+    }
+    residuals
+}
+
+/// Sizes of all impulses (N·s), those of angular rows as in [`joint_residuals`].
+pub(super) fn impulse_sizes(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
+    let contacts = impulses[..problem.contacts.len()].iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
+    let lines = problem.lines(Target::Rigid);
+    let rows = lines.iter().flat_map(|line| (0..line.size).map(|i| line.scale[i] * impulses[line.first + i][0]));
+    rows.fold(contacts, |m, l| m.max(l.abs()))
+}
