@@ -59,7 +59,10 @@ pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, O
     advance(&mut world, step, &bar)?;
     let problem = capture(&mut world, format!("{name}, step {step}"));
     if problem.unknowns() == 0 {
-        return Err(Error::invalid("--step", format!("step {step} of '{name}' has no contacts and no joints")));
+        return Err(Error::invalid(
+            "--step",
+            format!("step {step} of '{name}' has no contacts and no joints"),
+        ));
     }
     bar.show(0, 1, format!("looking for a reference of {}", sizes(&problem)));
     Ok(match reference(&problem) {

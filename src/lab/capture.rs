@@ -23,11 +23,11 @@
 //! own after them (see [`crate::engine::constraints::impacts::restitution`]). So `rebound` is zero.
 
 use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
+use crate::engine::constraints::records::rows::RowBlock;
 use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::world::World;
 use crate::lab::reference::{
-    BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemBody, ProblemContact, ProblemJoint, ProblemRow, Velocity,
+    ContactProblem, DPair, ProblemBlock, ProblemBody, ProblemContact, ProblemJoint, ProblemRow, Velocity,
 };
 use glam::Vec2;
 
@@ -89,7 +89,7 @@ fn joints(world: &World, index: &[Option<u32>]) -> Vec<ProblemJoint> {
             joints.push((number, ProblemJoint { body_a, body_b, reach, blocks: Vec::new() }));
         }
         if let Some((_, joint)) = joints.last_mut() {
-            joint.blocks.push(ProblemBlock { law: block_law(&block.law), rows });
+            joint.blocks.push(ProblemBlock { law: block.law.into(), rows });
         }
     }
     joints.into_iter().map(|(_, joint)| joint).collect()
@@ -103,18 +103,6 @@ fn joint_row(block: &RowBlock, i: usize) -> ProblemRow {
         arm_b: f64::from(j.arms[1]),
         error: f64::from(block.errors[i]),
         warm_impulse: f64::from(block.impulses[i]),
-    }
-}
-
-/// The law of a block of the engine.
-pub(crate) fn block_law(law: &RowLaw<f32>) -> BlockLaw {
-    match *law {
-        RowLaw::Rigid => BlockLaw::Rigid,
-        RowLaw::Limit => BlockLaw::Limit,
-        RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
-        RowLaw::Spring { stiffness, damping, cap } => {
-            BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap: cap.map(f64::from) }
-        }
     }
 }
 

@@ -498,7 +498,8 @@ fn the_order_of_contacts_is_that_of_bodies_in_block_descent() {
 
 #[test]
 fn bad_input_is_refused_with_its_value() {
-    let empty = ContactProblem { name: "void".into(), h: 0.01, bodies: vec![], contacts: vec![], joints: vec![] };
+    let empty =
+        ContactProblem { name: "void".into(), h: 0.01, bodies: vec![], contacts: vec![], joints: vec![] };
     let refusal =
         |problem: &ContactProblem| converge(problem, None, &options(&["pgs"])).unwrap_err().to_string();
     assert!(refusal(&empty).contains("'void' has none"));

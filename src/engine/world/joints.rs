@@ -212,10 +212,8 @@ impl World {
                 kind.collect(i, on, &mut last);
                 kind.collect_booked(i, on, &mut step);
                 let joint = names.get(i).copied().flatten();
-                solved.extend(last.iter().zip(&step).map(|(&block, step): (&RowBlock, &RowBlock)| SolvedBlock {
-                    joint,
-                    block,
-                    step_impulses: step.impulses,
+                solved.extend(last.iter().zip(&step).map(|(&block, step): (&RowBlock, &RowBlock)| {
+                    SolvedBlock { joint, block, step_impulses: step.impulses }
                 }));
             }
         }

@@ -9,6 +9,7 @@ use crate::lab::error::Error;
 use crate::lab::reference::{ContactProblem, ProblemContact};
 use glam::Vec2;
 
+/// Those of the problem, and one for the static sides of joints, which have a body on either side.
 pub(super) fn bodies(problem: &ContactProblem) -> Bodies {
     let mut bodies = Bodies::default();
     for b in &problem.bodies {
@@ -30,6 +31,10 @@ pub(super) fn bodies(problem: &ContactProblem) -> Bodies {
         // Zero inverses become infinite masses, and those zero inverses again.
         let mass = MassProperties { mass: 1.0 / b.inv_mass, inertia: 1.0 / b.inv_inertia, center: [0.0; 2] };
         bodies.push(&def, &mass);
+    }
+    if !problem.joints.is_empty() {
+        let none = MassProperties { mass: 0.0, inertia: 0.0, center: [0.0; 2] };
+        bodies.push(&BodyDef::fixed([0.0; 2]), &none);
     }
     bodies
 }
@@ -93,7 +98,8 @@ pub(super) fn features(problem: &ContactProblem, contacts: &[Contact]) -> Featur
     let two_points = contacts.iter().any(|c| c.manifold.count > 1);
     let turned = |c: &ProblemContact| c.sides().any(|(_, [normal, _])| normal[2] != 0.0);
     let spins = problem.bodies.iter().any(|b| b.free_velocity[2] != 0.0);
-    let rotation = friction || two_points || spins || problem.contacts.iter().any(turned);
+    let joined = !problem.joints.is_empty();
+    let rotation = friction || two_points || spins || joined || problem.contacts.iter().any(turned);
     Features { rotation, friction, two_points, ..Features::NONE }
 }
 

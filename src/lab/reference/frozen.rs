@@ -126,7 +126,8 @@ impl Frozen {
         }
         let frozen: Frozen = serde_json::from_str(payload).map_err(|e| refuse(format!("payload: {e}")))?;
         if header.version != frozen.version() {
-            let message = format!("version is {}, but that of its problem is {}", header.version, frozen.version());
+            let message =
+                format!("version is {}, but that of its problem is {}", header.version, frozen.version());
             return Err(refuse(message));
         }
         frozen.validate().map_err(|e| refuse(e.to_string()))?;

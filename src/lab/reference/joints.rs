@@ -48,6 +48,7 @@
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{OwnRow, Target, positive};
 use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::records::rows::RowLaw;
 use serde::{Deserialize, Serialize};
 
 /// Rows of the largest block.
@@ -108,6 +109,20 @@ pub enum BlockLaw {
     },
 }
 
+impl From<RowLaw<f32>> for BlockLaw {
+    fn from(law: RowLaw<f32>) -> Self {
+        match law {
+            RowLaw::Rigid => BlockLaw::Rigid,
+            RowLaw::Limit => BlockLaw::Limit,
+            RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
+            RowLaw::Spring { stiffness, damping, cap } => {
+                let cap = cap.map(f64::from);
+                BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap }
+            }
+        }
+    }
+}
+
 impl BlockLaw {
     /// Greatest norm of its impulses, where there is one.
     pub fn cap(&self) -> Option<f64> {
@@ -151,7 +166,13 @@ impl ProblemJoint {
     /// A revolute joint whose anchors meet: `r` from the centers of mass to the point (m).
     pub fn revolute(bodies: [Option<u32>; 2], r: [[f64; 2]; 2]) -> Self {
         let arm = |k: usize, d: [f64; 2]| bodies[k].map_or(0.0, |_| r[k][0] * d[1] - r[k][1] * d[0]);
-        let row = |axis| ProblemRow { axis, arm_a: arm(0, axis), arm_b: arm(1, axis), error: 0.0, warm_impulse: 0.0 };
+        let row = |axis| ProblemRow {
+            axis,
+            arm_a: arm(0, axis),
+            arm_b: arm(1, axis),
+            error: 0.0,
+            warm_impulse: 0.0,
+        };
         let [body_a, body_b] = bodies;
         let rows = vec![row([1.0, 0.0]), row([0.0, 1.0])];
         let reach = [0, 1].map(|k| bodies[k].map_or(0.0, |_| r[k][0].hypot(r[k][1])));
@@ -202,75 +223,132 @@ impl Bound {
     }
 }
 
-/// A block with everything that does not change with impulses.
+/// The law of a block as a line in the velocity; see the [module](self).
 #[derive(Clone, Debug)]
-pub(super) struct BlockLine {
-    /// Place of its first row in vectors of impulses.
-    pub first: usize,
+pub struct LawLine {
+    /// Rows.
     pub size: usize,
-    /// Bodies that are not static, with their part of J, sign included.
-    pub sides: Vec<(usize, [Velocity; ROWS])>,
     /// K
-    pub response: [RowVector; ROWS],
+    pub(super) response: [RowVector; ROWS],
     /// K⁻¹
-    pub inverse: [RowVector; ROWS],
+    inverse: [RowVector; ROWS],
     /// P of [`Self::solution`], K⁻¹ at first.
-    pub step: [RowVector; ROWS],
+    step: [RowVector; ROWS],
     /// α = q
-    pub alpha: f64,
-    pub offset: RowVector,
-    pub bound: Bound,
-    /// Impulses to N·s (1, or 1/m of angular rows).
-    pub scale: RowVector,
+    alpha: f64,
+    offset: RowVector,
+    pub(super) bound: Bound,
 }
 
-fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
-    matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
-}
-
-fn dot(a: &Velocity, b: &Velocity) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-impl BlockLine {
-    fn new(problem: &ContactProblem, target: Target, joint: &ProblemJoint, block: &ProblemBlock, first: usize) -> Self {
-        let sides = sides(joint, block);
-        let response = response(problem, &sides);
-        let mut own = [OwnRow::default(); ROWS];
-        for (i, own) in own.iter_mut().enumerate().take(block.rows.len()) {
-            *own = match target {
-                Target::Own(rows) => rows[first + i],
-                Target::Rigid => OwnRow { bias: block.rows[i].rigid_bias(block.law, problem.h), compliance: 0.0 },
-            };
-        }
-        let mut offset = [0.0; ROWS];
-        let alpha = match block.law {
+impl LawLine {
+    /// The line of `law` for `size` rows with these errors, in a block of response K. `own`: right-hand sides of rigid rows and
+    /// limits.
+    pub fn new(
+        law: BlockLaw,
+        size: usize,
+        errors: RowVector,
+        own: [OwnRow; ROWS],
+        response: [RowVector; ROWS],
+    ) -> Self {
+        let alpha = match law {
             BlockLaw::Rigid | BlockLaw::Limit => 1.0 / (1.0 + own[0].compliance),
             BlockLaw::Motor { .. } => 1.0,
             BlockLaw::Spring { damping, .. } => damping / (1.0 + damping),
         };
-        for (i, offset) in offset.iter_mut().enumerate().take(block.rows.len()) {
-            *offset = match block.law {
+        let mut offset = [0.0; ROWS];
+        for (i, offset) in offset.iter_mut().enumerate().take(size) {
+            *offset = match law {
                 BlockLaw::Rigid | BlockLaw::Limit => alpha * own[i].bias,
                 BlockLaw::Motor { speed, .. } => -speed,
-                BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * block.rows[i].error,
+                BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * errors[i],
             };
         }
-        let bound = match (block.law, block.law.cap()) {
+        let bound = match (law, law.cap()) {
             (BlockLaw::Limit, _) => Bound::Positive,
             (_, Some(cap)) => Bound::Cap(cap),
             (_, None) => Bound::None,
         };
-        let through: f64 = sides.iter().map(|&(body, _)| problem.bodies[body].inv_mass).sum();
-        let mut scale = [1.0; ROWS];
-        for (i, row) in block.rows.iter().enumerate() {
-            if row.is_angular() && through > 0.0 {
-                scale[i] = (response[i][i] / through).sqrt();
-            }
-        }
-        let size = block.rows.len();
         let inverse = inverted(response, size).unwrap_or_default();
-        BlockLine { first, size, sides, response, inverse, step: inverse, alpha, offset, bound, scale }
+        LawLine { size, response, inverse, step: inverse, alpha, offset, bound }
+    }
+
+    /// K⁻¹ x
+    fn solved(&self, x: RowVector) -> RowVector {
+        product(&self.inverse, x)
+    }
+
+    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
+    /// with impulses `l`.
+    pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
+        let soft = product(&self.response, l);
+        let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
+        let x = product(&self.step, f);
+        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+    }
+
+    /// Impulses of a spring whose force does not depend on the velocity.
+    pub(super) fn fixed(&self) -> Option<RowVector> {
+        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
+    }
+
+    /// b of J v + b + R λ = 0 (m/s or rad/s).
+    pub(super) fn bias(&self) -> RowVector {
+        self.offset.map(|c| c / self.alpha)
+    }
+
+    /// R = `softness` K (1).
+    pub(super) fn softness(&self) -> f64 {
+        (1.0 - self.alpha) / self.alpha
+    }
+}
+
+/// A block with everything that does not change with impulses.
+#[derive(Clone, Debug)]
+pub(super) struct BlockLine {
+    line: LawLine,
+    /// Place of its first row in vectors of impulses.
+    pub first: usize,
+    /// Bodies that are not static, with their part of J, sign included.
+    pub sides: Vec<(usize, [Velocity; ROWS])>,
+    /// Impulses to N·s (1, or 1/m of angular rows).
+    pub scale: RowVector,
+}
+
+impl std::ops::Deref for BlockLine {
+    type Target = LawLine;
+
+    fn deref(&self) -> &LawLine {
+        &self.line
+    }
+}
+
+/// What an impulse of a row counts in N·s, by the sum of both inverse masses (1/kg): 1, or √(K m) of an angle (1/m).
+pub fn row_scale(is_angular: bool, response: f64, inv_mass: f64) -> f64 {
+    if is_angular && inv_mass > 0.0 { (response / inv_mass).sqrt() } else { 1.0 }
+}
+
+impl BlockLine {
+    fn new(
+        problem: &ContactProblem,
+        target: Target,
+        joint: &ProblemJoint,
+        block: &ProblemBlock,
+        first: usize,
+    ) -> Self {
+        let sides = sides(joint, block);
+        let response = response(problem, &sides);
+        let (mut own, mut errors, mut scale) = ([OwnRow::default(); ROWS], [0.0; ROWS], [1.0; ROWS]);
+        let through: f64 = sides.iter().map(|&(body, _)| problem.bodies[body].inv_mass).sum();
+        for (i, row) in block.rows.iter().enumerate() {
+            own[i] = match target {
+                Target::Own(rows) => rows[first + i],
+                Target::Rigid => OwnRow { bias: row.rigid_bias(block.law, problem.h), compliance: 0.0 },
+            };
+            errors[i] = row.error;
+            scale[i] = row_scale(row.is_angular(), response[i][i], through);
+        }
+        let line = LawLine::new(block.law, block.rows.len(), errors, own, response);
+        BlockLine { line, first, sides, scale }
     }
 
     /// J v (m/s or rad/s).
@@ -301,19 +379,6 @@ impl BlockLine {
         impulses[self.first..][..self.size].iter_mut().zip(own).for_each(|(pair, own)| pair[0] = own);
     }
 
-    /// K⁻¹ x
-    fn solved(&self, x: RowVector) -> RowVector {
-        product(&self.inverse, x)
-    }
-
-    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
-    /// with impulses `l`.
-    pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
-        let soft = product(&self.response, l);
-        let x = product(&self.step, [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]));
-        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
-    }
-
     /// Takes J M⁻¹ Jᵀ with each side's part times `share` of its body for the response to its own impulses: P = (α D + (1 − α) K)⁻¹.
     pub fn split(&mut self, problem: &ContactProblem, share: &[f64]) {
         let mut d = [[0.0; ROWS]; ROWS];
@@ -324,23 +389,16 @@ impl BlockLine {
         for (d, k) in d.iter_mut().flatten().zip(self.response.iter().flatten()) {
             *d = self.alpha * *d + (1.0 - self.alpha) * k;
         }
-        self.step = inverted(d, self.size).unwrap_or_default();
+        self.line.step = inverted(d, self.size).unwrap_or_default();
     }
+}
 
-    /// Impulses of a spring whose force does not depend on the velocity.
-    pub fn fixed(&self) -> Option<RowVector> {
-        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
-    }
+fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
+    matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+}
 
-    /// b of J v + b + R λ = 0 (m/s or rad/s).
-    pub fn bias(&self) -> RowVector {
-        self.offset.map(|c| c / self.alpha)
-    }
-
-    /// R = `softness` K (1).
-    pub fn softness(&self) -> f64 {
-        (1.0 - self.alpha) / self.alpha
-    }
+fn dot(a: &Velocity, b: &Velocity) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Bodies that are not static, with their part of J, sign included.
@@ -425,7 +483,8 @@ impl ContactProblem {
     /// Every block with its joint and the place of its first row in vectors of impulses.
     pub fn blocks(&self) -> impl Iterator<Item = (usize, &ProblemJoint, &ProblemBlock)> {
         let mut next = self.contacts.len();
-        let blocks = self.joints.iter().flat_map(|joint| joint.blocks.iter().map(move |block| (joint, block)));
+        let blocks =
+            self.joints.iter().flat_map(|joint| joint.blocks.iter().map(move |block| (joint, block)));
         blocks.map(move |(joint, block)| {
             let first = next;
             next += block.rows.len();
@@ -462,8 +521,16 @@ impl ContactProblem {
         assert_eq!(impulses.len(), self.unknowns(), "a pair for every contact and every row");
         let (of_contacts, of_rows) = impulses.split_at(self.contacts.len());
         self.contacts.iter_mut().zip(of_contacts).for_each(|(c, &impulse)| c.warm_impulse = impulse);
-        let rows = self.joints.iter_mut().flat_map(|joint| &mut joint.blocks).flat_map(|block| &mut block.rows);
+        let rows =
+            self.joints.iter_mut().flat_map(|joint| &mut joint.blocks).flat_map(|block| &mut block.rows);
         rows.zip(of_rows).for_each(|(row, impulse)| row.warm_impulse = impulse[0]);
+    }
+
+    /// The rigid law of every row of joints.
+    pub fn rigid_rows(&self) -> impl Iterator<Item = OwnRow> {
+        self.blocks().flat_map(|(_, _, block)| {
+            block.rows.iter().map(|row| OwnRow { bias: row.rigid_bias(block.law, self.h), compliance: 0.0 })
+        })
     }
 
     /// The blocks under a law.
@@ -524,6 +591,7 @@ pub fn joint_residuals(
 pub(super) fn impulse_sizes(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
     let contacts = impulses[..problem.contacts.len()].iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
     let lines = problem.lines(Target::Rigid);
-    let rows = lines.iter().flat_map(|line| (0..line.size).map(|i| line.scale[i] * impulses[line.first + i][0]));
+    let rows =
+        lines.iter().flat_map(|line| (0..line.size).map(|i| line.scale[i] * impulses[line.first + i][0]));
     rows.fold(contacts, |m, l| m.max(l.abs()))
 }

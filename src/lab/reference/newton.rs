@@ -109,7 +109,14 @@ struct Proximal<'a> {
 impl<'a> Proximal<'a> {
     fn new(problem: &'a ContactProblem, target: Target, shift: f64, center: &'a [DPair]) -> Self {
         let law = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-        Proximal { problem, law, diagonal: problem.delassus_diagonal(), lines: problem.lines(target), shift, center }
+        Proximal {
+            problem,
+            law,
+            diagonal: problem.delassus_diagonal(),
+            lines: problem.lines(target),
+            shift,
+            center,
+        }
     }
 
     /// Impulses that solve this problem well enough, or none.
@@ -271,7 +278,11 @@ impl<'a> Proximal<'a> {
                 entries.push((u, u, self.shift));
                 for c in 0..line.size {
                     let column = index[line.first + c][0];
-                    entries.push((column, u, line.softness() * line.response[r][c] * scale[u] * scale[column]));
+                    entries.push((
+                        column,
+                        u,
+                        line.softness() * line.response[r][c] * scale[u] * scale[column],
+                    ));
                 }
                 continue;
             }

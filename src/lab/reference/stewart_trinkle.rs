@@ -141,7 +141,8 @@ impl<'a> Eliminated<'a> {
         };
         let mut cells = Matrix::from_fn(n, n + 1, |row, column| {
             let Some(other) = sides.get(column) else { return 0.0 };
-            let common = sides[row].iter().flat_map(|a| other.iter().filter(move |b| a.0 == b.0).map(move |b| (a, b)));
+            let common =
+                sides[row].iter().flat_map(|a| other.iter().filter(move |b| a.0 == b.0).map(move |b| (a, b)));
             common.map(|(a, b)| (0..3).map(|k| inverse(a.0)[k] * a.1[k] * b.1[k]).sum::<f64>()).sum()
         });
         let velocities = problem.velocities(&start);

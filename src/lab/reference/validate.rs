@@ -98,7 +98,9 @@ impl ContactProblem {
         }
         block.law.cap().map_or(Ok(()), |cap| not_negative("cap", cap))?;
         let inverse = inverted(self.block_response(joint, block), rows);
-        require(inverse.is_some(), place, || "its rows do not answer to impulses, or depend on each other".to_string())
+        require(inverse.is_some(), place, || {
+            "its rows do not answer to impulses, or depend on each other".to_string()
+        })
     }
 }
 
