@@ -360,6 +360,13 @@ impl BlockLine {
         apply(problem, &self.sides, impulse, velocities);
     }
 
+    /// λ − Π(y) of every row (N·s); see the [module](self).
+    pub fn residuals(&self, velocities: &[Velocity], impulses: &[DPair]) -> RowVector {
+        let own = self.read(impulses);
+        let exact = self.solution(self.velocity(velocities), own);
+        [0, 1, 2].map(|i| self.scale[i] * (own[i] - exact[i]))
+    }
+
     /// Its impulses in a vector.
     pub fn read(&self, impulses: &[DPair]) -> RowVector {
         let mut own = [0.0; ROWS];
@@ -562,25 +569,7 @@ impl ContactProblem {
     }
 }
 
-/// Residual of every row of joints (N·s), in their order; see the [module](self).
-///
-/// `velocities` need not follow from `impulses`.
-pub fn joint_residuals(
-    problem: &ContactProblem,
-    target: Target,
-    velocities: &[Velocity],
-    impulses: &[DPair],
-) -> Vec<f64> {
-    let mut residuals = Vec::with_capacity(problem.joint_rows());
-    for line in problem.lines(target) {
-        let own = line.read(impulses);
-        let exact = line.solution(line.velocity(velocities), own);
-        residuals.extend((0..line.size).map(|i| line.scale[i] * (own[i] - exact[i])));
-    }
-    residuals
-}
-
-/// Sizes of all impulses (N·s), those of angular rows as in [`joint_residuals`].
+/// Sizes of all impulses (N·s), those of angular rows as in residuals.
 pub(super) fn impulse_sizes(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
     let contacts = impulses[..problem.contacts.len()].iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
     let lines = problem.lines(Target::Rigid);
@@ -596,7 +585,7 @@ mod tests {
     use crate::lab::reference::gallery::{GRAVITY, hanging_chain, machine, pendulum_rod};
     use crate::lab::reference::newton::newton;
     use crate::lab::reference::nncg::nncg;
-    use crate::lab::reference::residual::natural_map;
+    use crate::lab::reference::residual::{joint_residuals, natural_map};
     use crate::lab::reference::stewart_trinkle::stewart_trinkle;
     use crate::lab::reference::sweeps::{Splitting, Stop, SweepDirection, jacobi, pgs};
 
@@ -686,8 +675,11 @@ mod tests {
     #[test]
     fn a_cap_bounds_the_norm_of_a_block() {
         let mut p = pendulum_rod(0.0);
-        p.bodies[0] = super::super::ProblemBody { inv_inertia: 0.0, free_velocity: [3.0, 4.0, 0.0], ..p.bodies[0] };
-        let solve = |p: &ContactProblem| pgs(p, Target::Rigid, &p.no_impulses(), SweepDirection::Forward, STOP).impulses;
+        p.bodies[0] =
+            super::super::ProblemBody { inv_inertia: 0.0, free_velocity: [3.0, 4.0, 0.0], ..p.bodies[0] };
+        let solve = |p: &ContactProblem| {
+            pgs(p, Target::Rigid, &p.no_impulses(), SweepDirection::Forward, STOP).impulses
+        };
         p.joints[0].blocks[0].law = BlockLaw::Motor { speed: 0.0, cap: 2.5 };
         p.validate().unwrap();
         let l = solve(&p);
@@ -724,7 +716,11 @@ mod tests {
         // Pushing without need.
         let mut l = p.no_impulses();
         l[4][0] = 0.5;
-        close("limit", joint_residuals(&p, Target::Rigid, &v, &l)[3], (12.0_f64).sqrt() * (1e-4 / p.h / 12.0));
+        close(
+            "limit",
+            joint_residuals(&p, Target::Rigid, &v, &l)[3],
+            (12.0_f64).sqrt() * (1e-4 / p.h / 12.0),
+        );
         l[4][0] = -0.5;
         close("pull", joint_residuals(&p, Target::Rigid, &v, &l)[3], -0.5 * (12.0_f64).sqrt());
     }
@@ -754,7 +750,10 @@ mod tests {
             (|p| p.joints[0].body_b = None, "joints[0]: both sides"),
             (|p| p.joints[1].blocks.clear(), "joints[1]: has 0 blocks"),
             (|p| p.joints[1].blocks[0].rows.clear(), "joints[1].blocks[0]: has 0 rows"),
-            (|p| p.joints[1].blocks[1].rows[0].axis = [2.0, 0.0], "joints[1].blocks[1]: the axis has length 2"),
+            (
+                |p| p.joints[1].blocks[1].rows[0].axis = [2.0, 0.0],
+                "joints[1].blocks[1]: the axis has length 2",
+            ),
             (|p| p.joints[1].blocks[1].law = BlockLaw::Limit, "joints[1].blocks[1]: a limit has 2 rows"),
             (|p| p.joints[0].blocks[0].rows[0].error = f64::NAN, "joints[0].blocks[0]: NaN"),
             (

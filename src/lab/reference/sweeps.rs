@@ -18,7 +18,7 @@
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{OwnRow, Target, clamp, natural_map, positive};
+use super::residual::{Measure, OwnRow, Target, clamp, positive};
 
 /// When an iteration ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,13 +157,13 @@ pub(super) fn iterate(
     stop: Stop,
     mut step: impl FnMut(&mut Vec<DPair>, &mut Vec<Velocity>),
 ) -> IterativeRun {
-    let unit = problem.impulse_unit();
+    let (unit, measure) = (problem.impulse_unit(), Measure::new(problem, target));
     let mut impulses = start.to_vec();
     let mut history = Vec::new();
     loop {
         // Afresh from the impulses, so that rounding of millions of updates does not add up.
         let mut velocities = problem.velocities(&impulses);
-        let residual = natural_map(problem, target, &velocities, &impulses) / unit;
+        let residual = measure.natural_map(&velocities, &impulses) / unit;
         history.push(residual);
         let status = if residual <= stop.tolerance {
             Status::Converged
