@@ -235,3 +235,113 @@ impl Given {
         given
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Errors, Observation};
+    use crate::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
+    use crate::engine::joints::Joint;
+    use crate::engine::solvers::find;
+    use crate::engine::world::{Settings, World};
+
+    const DT: f64 = 1.0 / 60.0;
+
+    /// The world, without gravity, and a disc of 1 kg and ½ kg·m².
+    fn disc(solver: &str, substeps: u32) -> (World, BodyHandle, BodyHandle) {
+        let variant = find(solver).unwrap();
+        let mut settings = Settings { record_impulses: true, gravity: [0.0; 2], ..Settings::new(variant) };
+        settings.budget.substeps = substeps;
+        let mut world = World::new(settings);
+        let ground = world.add_body(&BodyDef::fixed([0.0, 0.0])).unwrap();
+        let shape = ShapeDef::circle(1.0).unwrap().with_density(std::f64::consts::FRAC_1_PI);
+        let disc = world.add_body(&BodyDef::dynamic([0.0, 0.0]).with(shape)).unwrap();
+        (world, ground, disc)
+    }
+
+    fn observed(world: &mut World, steps: u32) -> Errors {
+        let mut observation = Observation::new(world);
+        for _ in 0..steps {
+            world.step().unwrap();
+            observation.observe(world);
+        }
+        observation.errors()
+    }
+
+    fn close(found: Option<f64>, expected: f64) {
+        let found = found.unwrap();
+        assert!((found - expected).abs() < 1e-4 * expected.abs() + 1e-6, "{found} is not {expected}");
+    }
+
+    /// 0.5 N·m on ½ kg·m²: 1 rad/s² up to 0.1 rad/s, reached in the sixth step.
+    #[test]
+    fn a_motor_works_at_its_cap_and_then_holds_its_speed() {
+        for (solver, substeps) in [("pgs", 1), ("soft_step", 4)] {
+            let (mut world, ground, disc) = disc(solver, substeps);
+            world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).motor(0.1, 0.5)).unwrap();
+            let errors = observed(&mut world, 3);
+            close(errors.joint_motor_load_max, 1.0);
+            close(errors.joint_motor_miss_max, 0.0);
+            close(errors.joint_law_max, 0.0);
+            // τ Δθ with n substeps of h: θ = a h² n (n + 1)/2, in units of the kinetic energy a² (n h)² I/2: (n + 1)/n.
+            let n = f64::from(3 * substeps);
+            close(errors.joint_motor_work, (n + 1.0) / n);
+            close(errors.joint_work, (n + 1.0) / n);
+            assert_eq!((errors.joint_spring_work, errors.joint_limit_work), (Some(0.0), Some(0.0)));
+            let errors = observed(&mut world, 9);
+            close(errors.joint_motor_miss_max, 0.0);
+            close(errors.joint_law_max, 0.0);
+            assert!((f64::from(world.bodies.angular_velocity[disc.index()]) - 0.1).abs() < 1e-6);
+        }
+    }
+
+    /// A motor that is not solved misses its speed by all of it, with nearly all of its cap left.
+    #[test]
+    fn what_is_not_solved_is_seen() {
+        let (mut world, ground, disc) = disc("pgs", 1);
+        world.settings.budget.velocity_iterations = 0;
+        world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).motor(0.1, 0.5)).unwrap();
+        let errors = observed(&mut world, 1);
+        close(errors.joint_motor_miss_max, 0.1);
+        close(errors.joint_motor_load_max, 0.0);
+        assert_eq!(errors.joint_motor_work, Some(0.0));
+        // Under weight: the hinge of 1 kg lacks g dt, and the angle 0.5 N·m dt, which counts as √(2/1 m⁻²) of it.
+        world.settings.gravity = [0.0, -10.0];
+        world.bodies.velocity_y[disc.index()] = 0.0;
+        let errors = observed(&mut world, 1);
+        close(errors.joint_law_max, 1.0);
+        let motor = 0.5 * 2.0_f64.sqrt() / 10.0;
+        close(errors.joint_law_rms, ((1.0 + motor * motor) / 3.0).sqrt());
+    }
+
+    /// A disc that turns at 3 rad/s meets a limit: all of its energy is gone, ½ I ω².
+    #[test]
+    fn a_limit_takes_the_energy_of_what_hits_it() {
+        let (mut world, ground, disc) = disc("pgs", 1);
+        world.bodies.angular_velocity[disc.index()] = 3.0;
+        world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).limits(-1.0, 0.12)).unwrap();
+        let errors = observed(&mut world, 12);
+        assert!(world.bodies.angular_velocity[disc.index()].abs() < 1e-4);
+        close(errors.joint_excess_max, 0.0);
+        assert!((errors.joint_limit_work.unwrap() + 1.0).abs() < 1e-3, "{errors:?}");
+        assert!((errors.energy_change + 1.0).abs() < 1e-3, "{errors:?}");
+        // It closes 0.02 of 0.05 rad in the third step.
+        close(errors.joint_law_max, 0.0);
+    }
+
+    /// A spring of the angle gives back what it has taken; its law holds in every substep.
+    #[test]
+    fn a_spring_keeps_its_law_and_gives_what_it_took() {
+        for (solver, substeps) in [("pgs", 1), ("soft_step", 4), ("shim", 14)] {
+            let (mut world, ground, disc) = disc(solver, substeps);
+            world.bodies.angular_velocity[disc.index()] = 1.0;
+            world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).spring(1.0, 0.0)).unwrap();
+            // A quarter of a period: from all of the energy to none, and half a period more to all again.
+            let quarter = observed(&mut world, 15);
+            assert!((quarter.joint_spring_work.unwrap() + 1.0).abs() < 0.1, "{solver}: {quarter:?}");
+            let law = quarter.joint_law_max.unwrap();
+            assert!(law < 0.02, "{solver}: {law}");
+            let w = f64::from(world.bodies.angular_velocity[disc.index()]);
+            assert!(w.abs() < 0.2 && DT > 0.0, "{solver}: {w}");
+        }
+    }
+}
