@@ -102,6 +102,10 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--every", "0", "--state", "s.csv"], &["every", "0"]),
         (&["run", "stack:2", "--every", "5"], &["every", "--state"]),
         (&["run", "stack:2", "--state", "a.csv", "--contacts", "a.csv"], &["same file"]),
+        (
+            &["run", "stack:2", "--joints", "a.csv", "--record", "a.csv"],
+            &["--record", "same file as --joints"],
+        ),
         (&["run", "missing.json"], &["missing.json"]),
         (&["run", "stack:2", "--state", "no/such/folder/s.csv"], &["no/such/folder/s.csv"]),
         (&["run", "stack:2", "--statte", "s.csv"], &["--statte"]),
@@ -334,6 +338,7 @@ fn every_csv_header_is_documented() {
     run(&["converge", "stack:3", "--step", "20", "--solvers", "pgs", "--repeats", "0", "--out", "o"]);
     run(&["growth", "--contacts", "1e2,3e2", "--settle", "2", "--repeats", "1", "--out", "o"]);
     run(&["run", "stack:2", "--steps", "3", "--state", "o/state.csv", "--contacts", "o/contacts.csv"]);
+    run(&["run", "four_bar", "--steps", "3", "--joints", "o/joints.csv"]);
     let files = entries(&folder.path().join("o"));
     let written: Vec<&String> = files.iter().filter(|name| name.ends_with(".csv")).collect();
     assert_eq!(written.len(), columns::SHEETS.len(), "{written:?}");
@@ -407,6 +412,81 @@ fn shells_complete_options_and_their_values() {
             assert!(script.contains(word), "{shell}: {word}");
         }
     }
+}
+
+/// A disc of 1 kg hinged to the world at its center, with a motor that is too weak for its speed; another that hangs on a slack
+/// spring; and two bodies that do not collide.
+const MACHINE: &str = r#"{"name":"machine","bodies":[
+    {"type":"static","position":[0,0],"shapes":[{"circle":{"radius":0.1}}]},
+    {"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":1},"density":0.3183098861837907}]},
+    {"type":"dynamic","position":[9,0],"shapes":[{"circle":{"radius":1},"density":0.3183098861837907}]}],
+    "joints":[
+    {"revolute":{"a":0,"b":1,"motor":{"speed":50,"max":0.25},"limits":[-1,99],"break_load":[9,9]}},
+    {"distance":{"a":0,"b":2,"anchor_a":[9,0],"length":0,"spring":{"hertz":0,"damping_ratio":0},"break_load":[9,9]}},
+    {"filter":{"a":1,"b":2}}]}"#;
+
+#[test]
+fn a_run_writes_what_its_joints_bear() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("machine.json"), MACHINE).unwrap();
+    let args = [
+        "run",
+        "machine.json",
+        "--solver",
+        "pgs",
+        "--steps",
+        "8",
+        "--joints",
+        "j.csv",
+        "--every",
+        "4",
+        "--all",
+    ];
+    let output = simpulse(folder.path(), &args);
+    assert!(output.status.success(), "{}", errors(&output));
+    for line in
+        ["joint gap, rms", "joint law residual, rms", "impulse of a motor / its cap, max         1.00"]
+    {
+        assert!(text(&output.stdout).contains(line), "{line}: {}", text(&output.stdout));
+    }
+    let sheet = std::fs::read_to_string(folder.path().join("j.csv")).unwrap();
+    let lines: Vec<Vec<&str>> = sheet.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(lines[0], columns::JOINTS.names());
+    let line = |step: &str, joint: &str| lines.iter().find(|l| l[0] == step && l[1] == joint).unwrap();
+    let at = |line: &[&str], name: &str| -> Option<f64> {
+        let cell = line[columns::JOINTS.names().iter().position(|n| *n == name).unwrap()];
+        (!cell.is_empty()).then(|| cell.parse().unwrap())
+    };
+    assert_eq!(lines.len(), 1 + 2 * 3);
+    let hinge = line("8", "0");
+    assert_eq!(hinge[2..5], ["revolute", "0", "1"]);
+    let close = |name: &str, expected: f64| {
+        let found = at(hinge, name).unwrap();
+        assert!((found - expected).abs() < 1e-4 * expected.abs() + 1e-6, "{name}: {found} is not {expected}");
+    };
+    let dt = 1.0 / 60.0;
+    // 1 kg under 10 m/s², above its break load; the motor gives all it has, and turns the disc of ½ kg·m².
+    close("rigid_1", 0.0);
+    close("rigid_2", 10.0 * dt);
+    close("motor", 0.25 * dt);
+    close("lower", 0.0);
+    close("upper", 0.0);
+    close("force", 10.0);
+    close("torque", 0.25);
+    close("angle", 0.25 / 0.5 * dt * dt * 36.0);
+    close("gap", 0.0);
+    for none in ["rigid_angle", "spring_1", "spring_2", "spring_angle"] {
+        assert_eq!(at(hinge, none), None, "{none}");
+    }
+    assert_eq!(hinge.last(), Some(&"true"));
+    // A spring without stiffness bears nothing, and its anchors part by the way of the fall.
+    let spring = line("4", "1");
+    assert_eq!(
+        (at(spring, "spring_1"), at(spring, "force"), spring.last()),
+        (Some(0.0), Some(0.0), Some(&"false"))
+    );
+    assert!((at(spring, "translation").unwrap() - 10.0 * dt * dt * 10.0).abs() < 1e-5, "{spring:?}");
+    assert_eq!(line("4", "2")[2..5], ["filter", "1", "2"]);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::values::{self, SettingArgs, scene_help};
 use crate::engine::world::World;
 use crate::lab::capture::capture;
 use crate::lab::error::Error;
+use crate::lab::reference::ContactProblem;
 use crate::lab::reference::certify::reference;
 use crate::lab::reference::frozen::Frozen;
 use crate::lab::study::open_scene;
@@ -14,10 +15,11 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Freeze the contact problem of one step of a scene
+/// Freeze the contact problem of one step of a scene, joints included
 ///
 /// Runs the scene up to the given step and writes the contact problem that this step is about to solve: masses,
-/// velocities, Jacobians, gaps, friction and warm-start impulses. What the simulation stores in f32 is kept to the
+/// velocities, Jacobians, gaps, friction and warm-start impulses; and the rows of joints with their errors, springs, motors and
+/// bounds. What the simulation stores in f32 is kept to the
 /// last bit. If a reference solution can be found and certified, it is written too; otherwise the problem is written
 /// without one.
 ///
@@ -50,20 +52,32 @@ pub struct CaptureArgs {
 /// The problem of step `step` of a scene, with its reference if there is one, and if not, why.
 ///
 /// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
-/// the step, a step without contacts.
+/// the step, a step without contacts and joints.
 pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, Option<String>), Error> {
     let mut world = open_scene(name, None, None, None)?.scene.build(setting.settings()?)?;
     let bar = Bar::new();
     advance(&mut world, step, &bar)?;
     let problem = capture(&mut world, format!("{name}, step {step}"));
-    if problem.contacts.is_empty() {
-        return Err(Error::invalid("--step", format!("step {step} of '{name}' has no contacts")));
+    if problem.unknowns() == 0 {
+        return Err(Error::invalid(
+            "--step",
+            format!("step {step} of '{name}' has no contacts and no joints"),
+        ));
     }
-    bar.show(0, 1, format!("looking for a reference of {} contact points", problem.contacts.len()));
+    bar.show(0, 1, format!("looking for a reference of {}", sizes(&problem)));
     Ok(match reference(&problem) {
         Ok(reference) => (Frozen { problem, reference: Some(reference) }, None),
         Err(why) => (Frozen { problem, reference: None }, Some(why.to_string())),
     })
+}
+
+/// Contact points, and rows of joints if there are any.
+fn sizes(problem: &ContactProblem) -> String {
+    let points = format!("{} contact points", problem.contacts.len());
+    match problem.joint_rows() {
+        0 => points,
+        rows => format!("{points}, {rows} rows of {} joints", problem.joints.len()),
+    }
 }
 
 /// Runs the steps before `step`.
@@ -89,16 +103,18 @@ pub fn run(args: &CaptureArgs) -> Result<ExitCode, Error> {
             "problem": problem.name,
             "bodies": problem.bodies.len(),
             "contact_points": problem.contacts.len(),
+            "joints": problem.joints.len(),
+            "joint_rows": problem.joint_rows(),
             "file": args.out.display().to_string(),
             "certificate": certificate,
             "no_reference_because": why_not,
         }));
     }
     let mut text = format!(
-        "{}: {} bodies, {} contact points, written to {}\n",
+        "{}: {} bodies, {}, written to {}\n",
         problem.name,
         problem.bodies.len(),
-        problem.contacts.len(),
+        sizes(problem),
         args.out.display()
     );
     text += &match (reference, why_not) {

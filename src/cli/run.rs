@@ -4,8 +4,9 @@ use super::output::{note, print_beside, print_json, value};
 use super::progress::Bar;
 use super::times::Times;
 use super::values::{self, SettingArgs, scene_help};
+use crate::engine::constraints::records::rows::RowLaw;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::world::{Order, Settings, World};
+use crate::engine::world::{Order, Settings, SolvedBlock, World};
 use crate::lab::error::Error;
 use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files::{Pending, same_file};
@@ -23,6 +24,7 @@ use crate::lab::study::cost::sweeps;
 use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -37,7 +39,8 @@ use std::process::ExitCode;
 Examples:
   simpulse run stack:20
   simpulse run arch --solver pgs --velocity-iterations 32 --all
-  simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60")]
+  simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60
+  simpulse run crane --joints joints.csv --every 1")]
 pub struct RunArgs {
     /// Scene
     #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
@@ -67,6 +70,9 @@ pub struct RunArgs {
     /// Write a CSV of contact points with their impulses (N·s over the step)
     #[arg(long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
+    /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
+    #[arg(long, value_name = "FILE.csv")]
+    pub joints: Option<PathBuf>,
     /// Write a recording for `simpulse replay`
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -107,20 +113,22 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
-    if args.every.is_some() && args.state.is_none() && args.contacts.is_none() && args.record.is_none() {
-        return Err(Error::invalid("every", "needs --state, --contacts or --record"));
+    let files = [
+        ("--state", &args.state),
+        ("--contacts", &args.contacts),
+        ("--joints", &args.joints),
+        ("--record", &args.record),
+    ];
+    let files: Vec<(&str, &Path)> =
+        files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?))).collect();
+    if args.every.is_some() && files.is_empty() {
+        return Err(Error::invalid("every", "needs --state, --contacts, --joints or --record"));
     }
-    let sheets = [&args.state, &args.contacts].into_iter().flatten();
-    if let Some(record) = args.record.iter().find(|record| sheets.clone().any(|s| same_file(s, record))) {
-        let message =
-            format!("'{}' is the same file as --state or --contacts; give another name", record.display());
-        return Err(Error::invalid("--record", message));
-    }
-    if let (Some(state), Some(contacts)) = (&args.state, &args.contacts)
-        && same_file(state, contacts)
-    {
-        let message = format!("'{}' is the same file as --state; give another name", contacts.display());
-        return Err(Error::invalid("--contacts", message));
+    for (i, (name, file)) in files.iter().enumerate() {
+        if let Some((other, _)) = files[..i].iter().find(|(_, other)| same_file(file, other)) {
+            let message = format!("'{}' is the same file as {other}; give another name", file.display());
+            return Err(Error::invalid(*name, message));
+        }
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
@@ -129,6 +137,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
     let mut contacts =
         args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
+    let mut joints = args.joints.as_deref().map(|path| CsvFile::new(path, &columns::JOINTS)).transpose()?;
 
     let every = args.every.unwrap_or(1);
     let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
@@ -180,6 +189,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         if due && let Some(sheet) = &mut contacts {
             write_contacts(sheet, &world, &starts)?;
         }
+        if due && let Some(sheet) = &mut joints {
+            write_joints(sheet, &world)?;
+        }
     }
     drop(bar);
     // Metrics evict the caches, so times come from separate runs; equal bits show that they are the same run.
@@ -196,7 +208,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         file.commit()?;
         written += &format!("wrote {}\n", path.display());
     }
-    for sheet in [state, contacts].into_iter().flatten() {
+    for sheet in [state, contacts, joints].into_iter().flatten() {
         written += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;
     }
@@ -205,8 +217,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let mut text = head(&world, scene);
     text += &if args.all { everything(&world, &found) } else { found.figures() };
-    let files = [&args.state, &args.contacts, &args.record].into_iter().flatten();
-    print_beside(files.map(PathBuf::as_path), &(text + &written))
+    print_beside(files.into_iter().map(|(_, file)| file), &(text + &written))
 }
 
 /// Estimate of the run: one pass for errors, others for times.
@@ -469,6 +480,38 @@ fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> 
             let geometry = (at.x, at.y, normal.x, normal.y, point.separation);
             sheet.row((names, geometry, impulse))?;
         }
+    }
+    Ok(())
+}
+
+/// Places of impulses in a line: along lines and of the angle, rigid and of springs; then motor and limits.
+const ROWS_OF_LINE: usize = 9;
+
+/// A line per joint.
+fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
+    let mut lines: BTreeMap<usize, [Option<f32>; ROWS_OF_LINE]> = BTreeMap::new();
+    for SolvedBlock { joint, block, step_impulses } in world.solved_blocks() {
+        let Some(joint) = joint else { continue };
+        let impulses = lines.entry(joint.index()).or_default();
+        for (j, impulse) in block.jacobians.iter().zip(step_impulses).take(block.size) {
+            let is_angular = usize::from(j.axis == [0.0; 2]);
+            let mut place = match block.law {
+                RowLaw::Rigid => 2 * is_angular,
+                RowLaw::Spring { .. } => 3 + 2 * is_angular,
+                RowLaw::Motor { .. } => 6,
+                RowLaw::Limit => 7,
+            };
+            // The second row along a line, the upper limit.
+            place += usize::from(impulses[place].is_some());
+            impulses[place] = Some(impulse);
+        }
+    }
+    for (handle, joint) in world.joints() {
+        let state = world.joint_state(handle)?;
+        let impulses = lines.get(&handle.index()).copied().unwrap_or_default();
+        let names = (world.step_index, handle.index(), joint.kind.name(), joint.a.index(), joint.b.index());
+        let errors = (state.gap, state.lean, state.angle, state.translation, state.excess);
+        sheet.row((names, errors, impulses, state.load, state.breaks))?;
     }
     Ok(())
 }

@@ -12,6 +12,9 @@
 //! So the problem differs from the one in the solver's registers by the rounding of `f32`, and a
 //! solver's residual on it has a floor of that size.
 //!
+//! Joints are the rows that the step would solve, to the bit: the engine states them, and what it states is converted. Springs
+//! have the coefficients of the whole step. A row that no body answers to is left out, since its impulse moves nothing.
+//!
 //! The problem is that of the whole step, as if it were not cut into substeps. Impulses kept from
 //! a run with k substeps are those of its last substep, of length dt/k; a warm start of the whole
 //! step begins with k times as much.
@@ -20,9 +23,12 @@
 //! own after them (see [`crate::engine::constraints::impacts::restitution`]). So `rebound` is zero.
 
 use crate::engine::bodies::BodyKind;
+use crate::engine::constraints::records::rows::RowBlock;
 use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::world::World;
-use crate::lab::reference::{ContactProblem, DPair, ProblemBody, ProblemContact, Velocity};
+use crate::lab::reference::{
+    ContactProblem, DPair, ProblemBlock, ProblemBody, ProblemContact, ProblemJoint, ProblemRow, Velocity,
+};
 use glam::Vec2;
 
 /// The problem of the coming step, under this name. Solve it with [`reference`](crate::lab::reference::certify::reference).
@@ -40,7 +46,7 @@ use glam::Vec2;
 /// ```
 ///
 /// Finds the contacts of the step, but moves nothing. Static bodies are left out; bodies keep
-/// their order, contacts are sorted by shape pair. Where nothing in the scene can turn a body,
+/// their order, contacts are sorted by shape pair, joints by type as the step solves them. Where nothing in the scene can turn a body,
 /// inertias are infinite, as they are in the step.
 pub fn capture(world: &mut World, name: impl Into<String>) -> ContactProblem {
     world.find_contacts();
@@ -65,7 +71,39 @@ pub fn capture(world: &mut World, name: impl Into<String>) -> ContactProblem {
             });
         }
     }
-    ContactProblem { name: name.into(), h: f64::from(world.settings.dt), bodies, contacts }
+    let joints = joints(world, &index);
+    ContactProblem { name: name.into(), h: f64::from(world.settings.dt), bodies, contacts, joints }
+}
+
+fn joints(world: &World, index: &[Option<u32>]) -> Vec<ProblemJoint> {
+    let mut joints: Vec<(usize, ProblemJoint)> = Vec::new();
+    for (number, block) in world.coming_blocks(world.settings.dt) {
+        let rows: Vec<ProblemRow> =
+            (0..block.size).filter(|&i| block.response[i][i] > 0.0).map(|i| joint_row(&block, i)).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        if joints.last().is_none_or(|last| last.0 != number) {
+            let [body_a, body_b] = block.bodies.map(|body| index[body as usize]);
+            let reach = block.reach.map(f64::from);
+            joints.push((number, ProblemJoint { body_a, body_b, reach, blocks: Vec::new() }));
+        }
+        if let Some((_, joint)) = joints.last_mut() {
+            joint.blocks.push(ProblemBlock { law: block.law.into(), rows });
+        }
+    }
+    joints.into_iter().map(|(_, joint)| joint).collect()
+}
+
+fn joint_row(block: &RowBlock, i: usize) -> ProblemRow {
+    let j = &block.jacobians[i];
+    ProblemRow {
+        axis: j.axis.map(f64::from),
+        arm_a: f64::from(j.arms[0]),
+        arm_b: f64::from(j.arms[1]),
+        error: f64::from(block.errors[i]),
+        warm_impulse: f64::from(block.impulses[i]),
+    }
 }
 
 fn body(world: &World, i: usize) -> ProblemBody {

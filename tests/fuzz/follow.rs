@@ -23,9 +23,9 @@ use std::path::Path;
 
 /// Scenes of more shapes are read, but not run: all of them may touch all others.
 const MOST_SHAPES: usize = 1500;
-/// Problems of more contacts are read, but not solved.
+/// Problems of more contacts and rows of joints are read, but not solved.
 const MOST_CONTACTS: usize = 12;
-/// Steps of more contacts are not frozen: their files are large.
+/// Steps of more contacts and rows are not frozen: their files are large.
 const MOST_FROZEN: usize = 300;
 /// Longest message (characters).
 const LONGEST_MESSAGE: usize = 600;
@@ -129,7 +129,7 @@ fn steps(world: &mut World, frozen_step: u64) -> Result<String, String> {
 /// The problem of the coming step comes back from its file, or says why it cannot be one.
 fn freeze(world: &mut World) -> Result<(), String> {
     let frozen = Frozen { problem: capture(world, "fuzz"), reference: None };
-    if frozen.problem.contacts.len() > MOST_FROZEN {
+    if frozen.problem.unknowns() > MOST_FROZEN {
         return Ok(());
     }
     match frozen.to_text() {
@@ -155,7 +155,7 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     let again = frozen.to_text().map_err(|e| format!("own file: not written, {e}"))?;
     same_frozen(&frozen, &again)?;
     let Frozen { problem, reference: known } = &frozen;
-    if problem.contacts.len() > MOST_CONTACTS {
+    if problem.unknowns() > MOST_CONTACTS {
         return Ok("accepted: large".to_string());
     }
     let solution = match reference(problem) {
@@ -192,7 +192,8 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
         }
         Err(error) => refused(&error, "")?,
     };
-    Ok(format!("accepted: {solution}, {curves}, {} contacts", problem.contacts.len()))
+    let (contacts, rows) = (problem.contacts.len(), problem.joint_rows());
+    Ok(format!("accepted: {solution}, {curves}, {contacts} contacts, {rows} rows"))
 }
 
 /// Words of the command line: parameters, limits, scene names.

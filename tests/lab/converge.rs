@@ -1,20 +1,24 @@
 //! Solvers on frozen problems: exact rates, the floor of f32, capture and replay.
 
 use simpulse::cli::{capture as capture_command, converge as converge_command};
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
-use simpulse::engine::world::{Order, World};
+use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
 use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
 use simpulse::lab::converge::{ConvergeOptions, ConvergeReport, ReplayCurve, converge, plot, table};
 use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
-use simpulse::lab::reference::gallery::{column, disc_column, heavy_on_light, painleve_rod, sliding_box};
+use simpulse::lab::reference::gallery::{
+    column, disc_column, hanging_chain, heavy_on_light, machine, painleve_rod, sliding_box,
+};
 use simpulse::lab::reference::residual::{Target, natural_map};
 use simpulse::lab::reference::sweeps::{Stop, SweepDirection, pgs};
 use simpulse::lab::reference::{ContactProblem, DPair, Velocity};
+use simpulse::lab::scenes;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -70,6 +74,91 @@ fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
             for tolerance in 0..3 {
                 let count = |c: &ReplayCurve| c.points[c.rigid.first[tolerance].unwrap()].iterations;
                 assert!(count(curve).abs_diff(count(scalar)) <= 1, "n {n}, {} {}", curve.order, curve.start);
+            }
+        }
+    }
+}
+
+/// See [`hanging_chain`]: the residual falls by cos²(π/2n) per sweep, and a decade takes ln 10/−ln cos²(π/2n) ≈ 0.933 n² of them.
+/// The chain is a tree, so every order has the same rate.
+#[test]
+fn sweeps_of_a_chain_of_joints_grow_with_the_square_of_its_links() {
+    let mut decades = Vec::new();
+    for n in [5, 10, 20] {
+        let problem = hanging_chain(n);
+        let settings = ConvergeOptions { max_iterations: 4000, ..options(&["pgs"]) };
+        let report = converge(&problem, Some(&reference(&problem).unwrap()), &settings).unwrap();
+        assert_eq!((report.contacts, report.joint_rows), (0, 2 * n));
+        let rate = (PI / (2 * n) as f64).cos().powi(2);
+        for curve in report.curves.iter().filter(|c| c.arithmetic == "f32" && c.start == Start::Cold) {
+            assert!(curve.own_is_rigid);
+            assert_rate(curve, rate);
+        }
+        let of = |c: &&ReplayCurve| c.solver == "Gauss-Seidel" && c.start == Start::Cold;
+        let scalar = report.curves.iter().find(of).unwrap();
+        let sweeps = |at: usize| scalar.points[scalar.rigid.first[at].unwrap()].iterations;
+        let decade = f64::from(sweeps(4) - sweeps(3));
+        let exact = 10.0_f64.ln() / -rate.ln();
+        assert!((decade - exact).abs() < 1.0 + 0.01 * exact, "{n}: {decade} is not {exact}");
+        decades.push(decade);
+    }
+    assert!((decades[2] / decades[0] - 16.0).abs() < 1.5, "{decades:?}");
+}
+
+/// Contacts and joints of every law at once. What each solver is to reach: its own law, to the floor.
+#[test]
+fn every_solver_converges_on_a_machine_with_contacts_motors_limits_and_springs() {
+    let problem = machine();
+    let truth = reference(&problem).unwrap();
+    let settings = ConvergeOptions { max_iterations: 300, baseline: false, ..options(&[]) };
+    let settings = ConvergeOptions { solvers: VARIANTS.to_vec(), ..settings };
+    let report = converge(&problem, Some(&truth), &settings).unwrap();
+    for curve in report.curves.iter().filter(|c| c.arithmetic == "f32" && c.start == Start::Cold) {
+        let (name, order, own) = (&curve.solver, curve.order, curve.own.smallest);
+        if own.is_finite() && solvers::find(name).is_ok_and(|v| v.promises(Law::Converges)) {
+            assert!(own < 1e-4, "{name} {order}: {own:e}");
+        }
+    }
+    // Those of the rigid law end at the certified velocities, whatever their method is.
+    for name in ["pgs", "nncg", "anderson", "symmetric_gs", "random_order", "direct", "mass_splitting"] {
+        for curve in report.curves.iter().filter(|c| c.solver == name) {
+            let last = curve.points.last().unwrap();
+            println!("{name} {} {}: {:e} {:?}", curve.order, curve.start, last.rigid, last.velocity_error);
+        }
+    }
+}
+
+/// The rows of a captured scene are those that the step solves: a long run of sweeps on them ends at the velocities of the
+/// step itself.
+#[test]
+fn a_captured_step_with_joints_is_the_step() {
+    for (scene, step) in [("crane", 30), ("ball_and_chain", 40)] {
+        let pgs = solvers::find("pgs").unwrap();
+        let budget = Budget { velocity_iterations: 40, ..pgs.budget };
+        let settings = Settings { budget, ..Settings::new(pgs) }.exactly(LaneWidth::W1);
+        let settings = Settings { order: Order::Natural, ..settings };
+        let mut world = scenes::load(scene).unwrap().scene.build(settings).unwrap();
+        for _ in 1..step {
+            world.step().unwrap();
+        }
+        let problem = capture(&mut world, scene);
+        assert!(problem.joint_rows() > 20 && problem.warm_impulses().iter().any(|l| l[0] != 0.0));
+        let text = Frozen { problem: problem.clone(), reference: None }.to_text().unwrap();
+        assert_eq!(Frozen::from_text(&text, Path::new("x")).unwrap().problem, problem);
+        assert!(text.contains("\"version\":2"), "{}", &text[..80]);
+        world.step().unwrap();
+        let mut replay = replay(&problem, Sequence::Natural, pgs);
+        let found = replay.run(pgs, budget, Start::Warm);
+        let moving = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] != BodyKind::Static);
+        for (i, found) in moving.zip(&found.velocities) {
+            let b = &world.bodies;
+            for (found, exact) in found.iter().zip([b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]])
+            {
+                // Free velocities are rounded differently; everything else is the same arithmetic.
+                assert!(
+                    (found - f64::from(exact)).abs() < 2e-4 * (1.0 + found.abs()),
+                    "{scene} {i}: {found} {exact}"
+                );
             }
         }
     }
@@ -498,7 +587,8 @@ fn the_order_of_contacts_is_that_of_bodies_in_block_descent() {
 
 #[test]
 fn bad_input_is_refused_with_its_value() {
-    let empty = ContactProblem { name: "void".into(), h: 0.01, bodies: Vec::new(), contacts: Vec::new() };
+    let empty =
+        ContactProblem { name: "void".into(), h: 0.01, bodies: vec![], contacts: vec![], joints: vec![] };
     let refusal =
         |problem: &ContactProblem| converge(problem, None, &options(&["pgs"])).unwrap_err().to_string();
     assert!(refusal(&empty).contains("'void' has none"));

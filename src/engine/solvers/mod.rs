@@ -71,7 +71,7 @@ pub mod two_level;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 32] = [
+pub static VARIANTS: [&Variant; 35] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,

@@ -7,7 +7,7 @@
 //! **Departures.** A contact gives way by `softness` times its effective inverse mass, along n and t alike; SAP takes 0.025 along n
 //! and 0.001 along t where a contact is to be nearly rigid, MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`], but
 //! without a slop, within which soft contacts would sink from step to step. The first velocities are those of the last impulses, not those of the last step, so that momentum is kept before Newton's method has ended. Factors
-//! are within an envelope (`numerics/blocks.rs`), which has no fill ordering of its own. Where one would take more than `factor_work`, steps come from conjugate
+//! are within an envelope (`numerics/envelope.rs`), which has no fill ordering of its own. Where one would take more than `factor_work`, steps come from conjugate
 //! gradients with blocks on the diagonal, as MuJoCo's second solver does. Rows of joints give way by 10⁻⁸, those of springs as their law has it; motors and capped
 //! springs have the nearest impulse within their bound, in the norm of what they give way.
 //!

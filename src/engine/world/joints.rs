@@ -3,11 +3,25 @@
 use super::World;
 use crate::engine::bodies::{Bodies, BodyHandle};
 use crate::engine::constraints::joints::Joints;
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Joined};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Joined, Placed};
+use crate::engine::constraints::records::rows::{ROWS, RowBlock};
 use crate::engine::error::Error;
 use crate::engine::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
+use crate::engine::lanes::BodyRow;
+use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::collections::BTreeSet;
+
+/// A block of rows of a joint after a step.
+#[derive(Clone, Copy, Debug)]
+pub struct SolvedBlock {
+    /// The joint; none of a constraint of a type of the caller's own.
+    pub joint: Option<JointHandle>,
+    /// Its rows, with the impulses of the last substep.
+    pub block: RowBlock,
+    /// Impulses of the whole step, with `Settings::record_impulses`; else zeros (N·s or N·m·s). `[size]`
+    pub step_impulses: [f32; ROWS],
+}
 
 /// Which joints there are, and where they are solved.
 #[derive(Clone, Debug, Default)]
@@ -140,6 +154,70 @@ impl World {
         self.joint(handle)?;
         let place = self.joints.places[handle.index()];
         Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.booked(i as usize)))
+    }
+
+    /// Blocks of all joints in the coming step, if it were one of `h` (s) without substeps, with the impulses that a warm
+    /// start would give them. Those of a joint follow each other, in the order in which they are solved; the number is that
+    /// of the joint in this order. Call [`World::find_contacts`] first.
+    pub fn coming_blocks(&self, h: f32) -> Vec<(usize, RowBlock)> {
+        let bodies = &self.bodies;
+        let row = |i: usize| BodyRow {
+            velocity: [
+                bodies.velocity_x[i],
+                bodies.velocity_y[i],
+                bodies.angular_velocity[i],
+                bodies.inv_mass[i],
+            ],
+            delta: [0.0, 0.0, 0.0, bodies.inv_inertia[i]],
+        };
+        let rows: Vec<BodyRow> = (0..bodies.len()).map(row).chain([BodyRow::default()]).collect();
+        let poses: Vec<PoseRow> = self.narrow.poses().iter().copied().chain([PoseRow::default()]).collect();
+        let mut found = Vec::new();
+        let mut blocks = Vec::new();
+        let mut number = 0;
+        for joined in &self.work.types {
+            let mut kind = joined.kind.clone();
+            kind.begin(bodies, h);
+            for i in 0..kind.ends().len() {
+                found.clear();
+                kind.collect(i, Placed { rows: &rows, poses: &poses }, &mut found);
+                blocks.extend(found.iter().map(|&block| (number, block)));
+                number += 1;
+            }
+        }
+        blocks
+    }
+
+    /// Blocks of all joints as bodies were after the last step, in the order in which they are solved.
+    pub fn solved_blocks(&self) -> Vec<SolvedBlock> {
+        let work = &self.work;
+        let mut names = vec![Vec::new(); work.types.len()];
+        for (handle, _) in self.joints() {
+            if let Some([group, i]) = self.joints.places[handle.index()] {
+                let of_group: &mut Vec<Option<JointHandle>> = &mut names[group as usize];
+                of_group.resize(of_group.len().max(i as usize + 1), None);
+                of_group[i as usize] = Some(handle);
+            }
+        }
+        let on = Placed { rows: &work.rows, poses: &work.poses };
+        let (mut last, mut step, mut solved) = (Vec::new(), Vec::new(), Vec::new());
+        if work.poses.len() != work.rows.len() {
+            return solved;
+        }
+        for (joined, names) in work.types.iter().zip(&names) {
+            let mut kind = joined.kind.clone();
+            for i in 0..kind.ends().len() {
+                last.clear();
+                step.clear();
+                kind.collect(i, on, &mut last);
+                kind.collect_booked(i, on, &mut step);
+                let joint = names.get(i).copied().flatten();
+                solved.extend(last.iter().zip(&step).map(|(&block, step): (&RowBlock, &RowBlock)| {
+                    SolvedBlock { joint, block, step_impulses: step.impulses }
+                }));
+            }
+        }
+        solved
     }
 
     /// Whether a joint keeps two bodies from colliding.

@@ -44,6 +44,7 @@ mod traits;
 pub use counts::{Criterion, Divergence, Quantity, StepCounts};
 pub use events::{ContactEvent, ContactPoint};
 pub use held::{HeldWorld, Probe};
+pub use joints::SolvedBlock;
 pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
@@ -237,6 +238,7 @@ impl World {
     /// Finds the contacts of the next step, with its warm-start impulses, without solving. The step then finds the
     /// same contacts.
     pub fn find_contacts(&mut self) {
+        self.group_joints();
         self.update_pairs();
         self.update_contacts();
     }

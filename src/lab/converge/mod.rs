@@ -21,6 +21,7 @@
 #[doc(hidden)]
 pub mod plot;
 pub mod replay;
+mod rows;
 mod scalar;
 mod setup;
 #[doc(hidden)]
@@ -38,7 +39,7 @@ use crate::lab::reference::ContactProblem;
 use crate::lab::reference::baseline::gauss_seidel_rate;
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::rates;
-use crate::lab::reference::residual::{Summary, Target, contact_residuals, natural_map};
+use crate::lab::reference::residual::{Summary, Target, contact_residuals, joint_residuals, natural_map};
 use replay::{Replay, Replayed, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
@@ -144,6 +145,9 @@ pub struct ConvergeReport {
     pub bodies: usize,
     /// Contact points.
     pub contacts: usize,
+    /// Rows of joints.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub joint_rows: usize,
     /// Unit of residuals (N·s).
     pub impulse_unit: f64,
     /// The reference's certificate; none if velocities could not be compared.
@@ -161,6 +165,10 @@ pub struct ConvergeReport {
     pub tolerances: [f64; TOLERANCES.len()],
     /// Curves, solver by solver.
     pub curves: Vec<ReplayCurve>,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// A solver's schedule as a function of the number of iterations.
@@ -188,7 +196,7 @@ impl IteratedSchedule {
 
 /// Runs every solver of `options` on `problem`.
 ///
-/// Errors: a problem that is not valid, is out of the range of `f32`, or has no contacts; a reference that does not hold.
+/// Errors: a problem that is not valid, is out of the range of `f32`, or has neither contacts nor joints; a reference that does not hold.
 ///
 /// ```
 /// use simpulse::engine::solvers::find;
@@ -226,8 +234,8 @@ pub fn converge_watched(
     tell: &dyn Fn(usize, usize, &str),
 ) -> Result<ConvergeReport, Error> {
     problem.validate()?;
-    if problem.contacts.is_empty() {
-        return Err(Error::invalid("contacts", format!("'{}' has none", problem.name)));
+    if problem.unknowns() == 0 {
+        return Err(Error::invalid("contacts", format!("'{}' has none, and no joints", problem.name)));
     }
     if let Some(reference) = reference {
         reference.check(problem).map_err(|why| Error::invalid("reference", why))?;
@@ -273,6 +281,7 @@ pub fn converge_watched(
         problem: problem.name.clone(),
         bodies: problem.bodies.len(),
         contacts: problem.contacts.len(),
+        joint_rows: problem.joint_rows(),
         impulse_unit: problem.impulse_unit(),
         certificate: reference.map(|r| r.certificate),
         warm_start: origin,
@@ -304,14 +313,14 @@ fn measure(
     let mut own_is_rigid = true;
     let own = outcome.own.as_ref().map(|own| {
         let target = Target::Own(&own.rows);
-        let parts: Vec<f64> = contact_residuals(problem, target, velocities, impulses)
-            .iter()
-            .flat_map(|r| [r.normal, if own.friction { r.tangent } else { 0.0 }])
-            .collect();
+        let contacts = contact_residuals(problem, target, velocities, impulses);
+        let contacts = contacts.iter().flat_map(|r| [r.normal, if own.friction { r.tangent } else { 0.0 }]);
+        let parts: Vec<f64> =
+            contacts.chain(joint_residuals(problem, target, velocities, impulses)).collect();
         let has_friction = problem.contacts.iter().any(|c| c.friction > 0.0);
         own_is_rigid = own.friction || !has_friction;
-        for (i, row) in own.rows.iter().enumerate() {
-            let rigid = Target::Rigid.row(problem, i);
+        let contacts = (0..problem.contacts.len()).map(|i| Target::Rigid.row(problem, i));
+        for (row, rigid) in own.rows.iter().zip(contacts.chain(problem.rigid_rows())) {
             // Gaps over h, in f32.
             let rounding = 1e-6 * (1.0 + rigid.bias.abs());
             own_is_rigid &= (row.bias - rigid.bias).abs() <= rounding && row.compliance == 0.0;

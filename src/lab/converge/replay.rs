@@ -3,23 +3,29 @@
 //!
 //! Masses, velocities, gaps and impulses are rounded to `f32`. Anchors are recovered from the arms,
 //! r = −(r × t) n + (r × n) t, and the step forms its arms from them again; so the arms that are
-//! solved differ from the frozen ones by a few roundings, as everything in `f32` does.
+//! solved differ from the frozen ones by a few roundings, as everything in `f32` does. Joints have the frozen rows (`rows`).
 
+use super::rows::FrozenJoints;
 use super::setup;
 use super::warm::STEPS;
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::{Clock, PhaseFilter};
 use crate::engine::constraints::kernels::motion::{Integrator, MotionInput, RotationUpdate};
+use crate::engine::constraints::kernels::observe::ObservedRule;
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::kept::{Kept, KeptSize};
 use crate::engine::constraints::step::assign::{Assignment, Sides};
 use crate::engine::constraints::{ImpactLaw, OppositeKind, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
+use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
 use crate::lab::reference::residual::OwnRow;
-use crate::lab::reference::{ContactProblem, DPair, ProblemContact, Velocity};
+use crate::lab::reference::{
+    BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemContact, ProblemJoint, ProblemRow, Velocity,
+};
 use rand::{SeedableRng, seq::SliceRandom};
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -80,7 +86,7 @@ pub struct Replayed {
     pub velocities: Vec<Velocity>,
     /// How far each body has moved and turned (m, m, rad).
     pub moves: Vec<Velocity>,
-    /// (λn, λt), one per contact point (N·s).
+    /// (λn, λt), one per contact point, then (λ, 0) of every row of joints (N·s).
     pub impulses: Vec<DPair>,
     /// Constraint sweeps of every kind.
     pub sweeps: usize,
@@ -91,7 +97,7 @@ pub struct Replayed {
 /// The law that a solver's last velocity sweep solved.
 #[derive(Clone, Debug)]
 pub struct OwnLaw {
-    /// One row per contact point.
+    /// One row per contact point, then one per row of joints.
     pub rows: Vec<OwnRow>,
     /// Whether it had friction rows.
     pub friction: bool,
@@ -115,7 +121,9 @@ pub struct Replay<'a> {
     input: StepInput,
     width: LaneWidth,
     sequence: Sequence,
+    /// Those of the problem, and one that is static if there are joints.
     bodies: Bodies,
+    joints: FrozenJoints,
     /// The solver of the last run.
     solver: Option<Box<dyn Solver>>,
 }
@@ -153,7 +161,7 @@ impl<'a> Replay<'a> {
         problem.validate()?;
         let h = problem.h as f32;
         let bodies = setup::bodies(problem, pushed);
-        let inert = problem.bodies.len() as u32;
+        let inert = bodies.len() as u32;
         let (contacts, places) = setup::contacts(problem, inert);
         let features = setup::features(problem, &contacts);
         let width = if sequence == Sequence::Colored { width } else { LaneWidth::W1 };
@@ -185,6 +193,12 @@ impl<'a> Replay<'a> {
         let mut rows = Vec::new();
         work.motion.load(&bodies, &mut rows, &motion);
         setup::check_range(h, &rows, &contacts)?;
+        let order = sequence.order(problem.joints.len());
+        let joints = FrozenJoints::new(problem, &order, &bodies, problem.bodies.len() as u32, h)?;
+        if !problem.joints.is_empty() {
+            let pose = PoseRow { position: [0.0; 4], rotation: [1.0, 0.0, 0.0, 0.0] };
+            work.poses = vec![pose; rows.len()];
+        }
         let (scratch, solver, kept) = (Vec::new(), None, None);
         let rows_before = rows.clone();
         let mut replay = Replay {
@@ -200,6 +214,7 @@ impl<'a> Replay<'a> {
             width,
             sequence,
             bodies,
+            joints,
             solver,
         };
         replay.assign_lanes();
@@ -230,7 +245,9 @@ impl<'a> Replay<'a> {
         Replayed {
             velocities: self.work.rows[..bodies].iter().map(velocity).collect(),
             moves: self.work.rows[..bodies].iter().map(moves).collect(),
-            impulses: self.places.iter().map(|&place| impulse(&self.scratch, place)).collect(),
+            impulses: (self.places.iter().map(|&place| impulse(&self.scratch, place)))
+                .chain(self.joints.impulses(self.problem, &self.work.types))
+                .collect(),
             sweeps: count.sweeps,
             own: self.own_law(),
         }
@@ -255,11 +272,14 @@ impl<'a> Replay<'a> {
 
     fn reset(&mut self, variant: &'static Variant, start: Start) {
         self.solver = Some((variant.make)());
+        self.reset_joints(start);
         self.assign_lanes();
         self.work.kept = Kept::default();
-        self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), true);
+        self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), true);
         if start == Start::Warm && variant.kept != KeptSize::default() {
             self.keep(variant);
+            self.reset_joints(start);
+            self.assign_lanes();
         }
         self.work.rows.clone_from(&self.rows);
         self.scratch.clone_from(&self.contacts);
@@ -270,6 +290,10 @@ impl<'a> Replay<'a> {
         }
     }
 
+    fn reset_joints(&mut self, start: Start) {
+        self.work.types.clone_from(&self.joints.groups[usize::from(start == Start::Cold)]);
+    }
+
     /// Lets a solver keep what it does after [`STEPS`] steps on the problem of the step before.
     fn keep(&mut self, variant: &'static Variant) {
         if self.kept.as_ref().is_none_or(|(name, _)| *name != variant.name) {
@@ -278,10 +302,10 @@ impl<'a> Replay<'a> {
             self.scratch.clone_from(&self.contacts);
             for _ in 0..STEPS {
                 self.work.rows.clone_from(&self.rows_before);
-                self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), false);
+                self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), false);
                 self.step(&input, &mut Clock::start(false));
             }
-            self.work.kept.follow(variant.kept, &self.contacts, self.problem.bodies.len(), false);
+            self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), false);
             self.kept = Some((variant.name, self.work.kept.clone()));
             self.work.watch = watch;
         }
@@ -313,13 +337,34 @@ impl<'a> Replay<'a> {
                 None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
             }
         };
-        let rows = self.problem.contacts.iter().enumerate().map(row).collect();
-        Some(OwnLaw { rows, friction: rule.friction })
+        let contacts = self.problem.contacts.iter().enumerate().map(row);
+        let joints = self.problem.blocks().flat_map(|(_, joint, block)| self.own_rows(rule, joint, block));
+        Some(OwnLaw { rows: contacts.chain(joints).collect(), friction: rule.friction })
+    }
+
+    /// The law of the last sweep for the rows of a block: λ ← (1 − γ_i) λ − K⁻¹ γ_m (β C + J v) leaves impulses alone where
+    /// J v + β C + (γ_i/γ_m) K λ = 0. An open limit may close.
+    fn own_rows(&self, rule: &ObservedRule, joint: &ProblemJoint, block: &ProblemBlock) -> Vec<OwnRow> {
+        let Softness { bias_rate, mass_scale, impulse_scale } = rule.joints;
+        let delta = |body: Option<u32>| body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
+        let (a, b) = (delta(joint.body_a), delta(joint.body_b));
+        let own = |row: &ProblemRow| {
+            let along = row.axis[0] * (b[0] - a[0]) + row.axis[1] * (b[1] - a[1]);
+            let error = row.error + along + row.arm_b * b[2] - row.arm_a * a[2];
+            match block.law {
+                BlockLaw::Limit if error > 0.0 => OwnRow { bias: error / self.problem.h, compliance: 0.0 },
+                _ => OwnRow {
+                    bias: f64::from(bias_rate) * error,
+                    compliance: f64::from(impulse_scale) / f64::from(mass_scale),
+                },
+            }
+        };
+        block.rows.iter().map(own).collect()
     }
 
     /// Gives every contact its lane, as a world's step does.
     fn assign_lanes(&mut self) {
-        let (problem, bodies) = (self.problem, self.problem.bodies.len());
+        let (problem, bodies) = (self.problem, self.bodies.len());
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let solver = self.solver.as_mut();
         let levels = solver.and_then(|solver| solver.levels(&self.bodies, contacts));

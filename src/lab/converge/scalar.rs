@@ -6,7 +6,7 @@ use crate::lab::reference::certify::Reference;
 use crate::lab::reference::nncg::nncg;
 use crate::lab::reference::residual::Target;
 use crate::lab::reference::sweeps::{self, Splitting, Stop};
-use crate::lab::reference::{ContactProblem, DPair, ProblemContact};
+use crate::lab::reference::{ContactProblem, DPair};
 
 /// Scalar methods in `f64`, from `truth`. A contact is solved row by row there, so where there is
 /// friction the order of rows differs a little from the solvers'.
@@ -22,6 +22,8 @@ pub(super) fn curves(
     let manifolds: Vec<_> = problem.contacts.chunk_by(|p, q| p.manifold == q.manifold).collect();
     shuffled.contacts =
         order.order(manifolds.len()).iter().flat_map(|&i| manifolds[i as usize].iter().copied()).collect();
+    shuffled.joints =
+        order.order(problem.joints.len()).iter().map(|&i| problem.joints[i as usize].clone()).collect();
     type Method = fn(&ContactProblem, &[DPair], Stop) -> sweeps::IterativeRun;
     let methods: [(&str, &ContactProblem, Sequence, usize, Method); 5] = [
         ("Gauss-Seidel", problem, Sequence::Natural, 1, |p, l, s| {
@@ -41,10 +43,8 @@ pub(super) fn curves(
     let mut curves = Vec::new();
     for (name, problem, order, sweeps, method) in methods {
         for start in [Start::Cold, Start::Warm].into_iter().take(if has_warm_start { 2 } else { 1 }) {
-            let warm = |c: &ProblemContact| {
-                if start == Start::Warm { c.warm_impulse } else { [0.0; 2] }
-            };
-            let run = method(problem, &problem.contacts.iter().map(warm).collect::<Vec<_>>(), stop);
+            let impulses = if start == Start::Warm { problem.warm_impulses() } else { problem.no_impulses() };
+            let run = method(problem, &impulses, stop);
             let last = run.history.len() - 1;
             let error = reference.map(|r| problem.velocity_error(&run.velocities, &r.velocities));
             let points: Vec<CurvePoint> = (0..=last)

@@ -9,7 +9,8 @@ use crate::lab::error::Error;
 use crate::lab::reference::{ContactProblem, ProblemContact};
 use glam::Vec2;
 
-/// Bodies at the end of a step without contacts; `pushed`: at its beginning, under forces that act in every substep of h.
+/// Those of the problem, and one for the static sides of joints, which have a body on either side; at the end of a step
+/// without contacts, or `pushed`: at its beginning, under forces that act in every substep of h.
 pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
     let mut bodies = Bodies::default();
     for b in &problem.bodies {
@@ -37,6 +38,10 @@ pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
             (bodies.force_x[i], bodies.force_y[i]) = (force(0, b.inv_mass), force(1, b.inv_mass));
             bodies.torque[i] = force(2, b.inv_inertia);
         }
+    }
+    if !problem.joints.is_empty() {
+        let none = MassProperties { mass: 0.0, inertia: 0.0, center: [0.0; 2] };
+        bodies.push(&BodyDef::fixed([0.0; 2]), &none);
     }
     bodies
 }
@@ -100,7 +105,8 @@ pub(super) fn features(problem: &ContactProblem, contacts: &[Contact]) -> Featur
     let two_points = contacts.iter().any(|c| c.manifold.count > 1);
     let turned = |c: &ProblemContact| c.sides().any(|(_, [normal, _])| normal[2] != 0.0);
     let spins = problem.bodies.iter().any(|b| b.free_velocity[2] != 0.0);
-    let rotation = friction || two_points || spins || problem.contacts.iter().any(turned);
+    let joined = !problem.joints.is_empty();
+    let rotation = friction || two_points || spins || joined || problem.contacts.iter().any(turned);
     Features { rotation, friction, two_points, ..Features::NONE }
 }
 

@@ -12,10 +12,11 @@ const NEVER: &str = "—";
 /// Human-readable tables: iterations to each tolerance, and times where they were measured.
 pub fn text(report: &ConvergeReport) -> String {
     let mut out = format!(
-        "{}: {} bodies, {} contact points; residuals in units of {:.4e} N·s\n{}\n",
+        "{}: {} bodies, {} contact points{}; residuals in units of {:.4e} N·s\n{}\n",
         report.problem,
         report.bodies,
         report.contacts,
+        if report.joint_rows > 0 { format!(", {} rows of joints", report.joint_rows) } else { String::new() },
         report.impulse_unit,
         reference_line(report)
     );

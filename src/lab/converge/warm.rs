@@ -9,13 +9,14 @@
 //! ```
 //!
 //! the velocities are those of the reference, impulses are in their cones, and what was open, stuck or slipping still
-//! is. Warm starts are λ′: exact for the step before, off by up to a tenth for this one.
+//! is. Impulses of motors and springs, which their laws determine from the velocities, are left as they are.
+//! Warm starts are λ′: exact for the step before, off by up to a tenth for this one.
 //!
 //! Solvers with numbers of their own ([`crate::engine::solvers::Variant::kept`]: multipliers, penalties, drifts)
 //! have made [`STEPS`] steps on the step before, at their standard budget without substeps.
 
 use crate::lab::reference::certify::Reference;
-use crate::lab::reference::{ContactProblem, DPair};
+use crate::lab::reference::{BlockLaw, ContactProblem, DPair};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
@@ -48,17 +49,24 @@ pub(super) struct Warmed {
 /// Finds impulses to start from.
 pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) -> Warmed {
     let (mut warm, mut before) = (problem.clone(), problem.clone());
-    let has = |c: &ContactProblem| c.contacts.iter().any(|c| c.warm_impulse != [0.0; 2]);
+    let has = |p: &ContactProblem| p.warm_impulses().iter().any(|l| *l != [0.0; 2]);
     let origin = match reference {
         _ if has(problem) => WarmStartSource::Captured,
         Some(reference) => {
             // The same whatever the seed of the shuffled order is.
             let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+            let rows = problem.blocks().flat_map(|(_, _, block)| block.rows.iter().map(|_| block.law));
+            let moves = problem
+                .contacts
+                .iter()
+                .map(|_| true)
+                .chain(rows.map(|law| matches!(law, BlockLaw::Rigid | BlockLaw::Limit)));
             let changes: Vec<DPair> = reference
                 .impulses
                 .iter()
-                .map(|impulse| {
-                    let off = OFF * random.random_range(-1.0..=1.0);
+                .zip(moves)
+                .map(|(impulse, moves)| {
+                    let off = if moves { OFF * random.random_range(-1.0..=1.0) } else { 0.0 };
                     impulse.map(|l| off * l)
                 })
                 .collect();
@@ -66,10 +74,10 @@ pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) ->
             for (body, velocity) in before.bodies.iter_mut().zip(problem.velocities(&apart)) {
                 body.free_velocity = velocity;
             }
-            for (i, (impulse, change)) in reference.impulses.iter().zip(&changes).enumerate() {
-                let start = [impulse[0] + change[0], impulse[1] + change[1]];
-                (warm.contacts[i].warm_impulse, before.contacts[i].warm_impulse) = (start, start);
-            }
+            let sum = |(l, change): (&DPair, &DPair)| [l[0] + change[0], l[1] + change[1]];
+            let start: Vec<DPair> = reference.impulses.iter().zip(&changes).map(sum).collect();
+            warm.set_warm_impulses(&start);
+            before.set_warm_impulses(&start);
             if has(&warm) { WarmStartSource::Drawn } else { WarmStartSource::None }
         }
         None => WarmStartSource::None,

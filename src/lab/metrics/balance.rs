@@ -193,7 +193,7 @@ impl Balance {
     pub fn close(&self) -> Imbalance {
         let by_weight = self.weight * self.dt;
         let momentum = (2.0 * self.kinetic_max * self.mass).sqrt().max(by_weight);
-        let energy = self.kinetic_max + self.weight * self.body_size;
+        let energy = self.energy_scale();
         Imbalance {
             momentum: ratio(self.momentum_max, momentum),
             angular_momentum: ratio(self.angular_max, momentum * self.gyration),
@@ -204,6 +204,11 @@ impl Balance {
             impact_loss: ratio(self.impact, energy),
             energy_unexplained: ratio(self.unexplained_max, energy),
         }
+    }
+
+    /// What energies are measured in (J), see [`Self::close`].
+    pub fn energy_scale(&self) -> f64 {
+        self.kinetic_max + self.weight * self.body_size
     }
 
     /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, fell for since they were

@@ -14,6 +14,7 @@
 //! | momentum, angular momentum | whether impulses come in pairs | [`balance`] |
 //! | energy | energy gained or lost, and where it went | [`balance`], [`state`] |
 //! | rest velocity, creep, settle time | whether bodies that should rest do | [`rest`] |
+//! | gap, lean, excess, residual, work of joints | how well joints hold, and what they give | [`mod@joints`] |
 //! | velocity error | how far velocities are from a reference | [`velocity`] |
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
@@ -163,6 +164,27 @@ pub struct Errors {
     /// Largest violation of a joint's limits (m or rad).
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_excess_max: Option<f64>,
+    /// Law residual of rows of joints, root mean square, in the weight of the lighter body × step; see [`joints`].
+    #[serde(rename = "joint_residual_rms_lighter_weights", skip_serializing_if = "Option::is_none", default)]
+    pub joint_law_rms: Option<f64>,
+    /// Largest of them.
+    #[serde(rename = "joint_residual_max_lighter_weights", skip_serializing_if = "Option::is_none", default)]
+    pub joint_law_max: Option<f64>,
+    /// Largest speed that a motor misses although its impulse is below its cap (m/s or rad/s).
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_motor_miss_max: Option<f64>,
+    /// Largest share of its cap that a motor used.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_motor_load_max: Option<f64>,
+    /// Energy that springs gave over the run; negative if they took it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_spring_work: Option<f64>,
+    /// Energy that motors gave over the run.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_motor_work: Option<f64>,
+    /// Energy that limits gave over the run: negative where bodies hit them.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub joint_limit_work: Option<f64>,
     /// Energy that friction took.
     pub friction_loss: f64,
     /// Energy that normal impulses took.
@@ -329,7 +351,7 @@ impl Observation {
         }
         let given = Given::of(world, &bodies, |body| self.balance.acts_at(body));
         self.balance.add(&bodies, &points, &given);
-        self.joints.add(world);
+        self.joints.add(world, &bodies);
         self.add_penetrations(world, &points);
 
         let kinetic: f64 = now.iter().map(BodyState::kinetic_energy).sum();
@@ -427,6 +449,7 @@ impl Observation {
         let depths = self.softness.filter(|_| touched).map(|_| self.depths.largest());
         let balance = self.balance.close();
         let creep = self.rest.creep();
+        let work = self.joints.work.map(|work| ratio(work, self.balance.energy_scale()));
         Errors {
             steps: self.steps,
             points: self.penetration.count(),
@@ -464,6 +487,13 @@ impl Observation {
             joint_gap_rms: self.joints.gap_rms(),
             joint_lean_max: self.joints.gap_rms().map(|_| self.joints.lean_max),
             joint_excess_max: self.joints.gap_rms().map(|_| self.joints.excess_max),
+            joint_law_rms: self.joints.residual().map(|r| r[0]),
+            joint_law_max: self.joints.residual().map(|r| r[1]),
+            joint_motor_miss_max: self.joints.gap_rms().map(|_| self.joints.motor_miss_max),
+            joint_motor_load_max: self.joints.gap_rms().map(|_| self.joints.motor_load_max),
+            joint_spring_work: self.joints.gap_rms().map(|_| work[0]),
+            joint_motor_work: self.joints.gap_rms().map(|_| work[1]),
+            joint_limit_work: self.joints.gap_rms().map(|_| work[2]),
             friction_loss: balance.friction_loss,
             impact_loss: balance.impact_loss,
             energy_unexplained: balance.energy_unexplained,

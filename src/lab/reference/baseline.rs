@@ -17,10 +17,11 @@ const MOST_UPDATES: usize = 100_000_000;
 /// Factor by which a forward sweep of Gauss–Seidel, in the order of the contacts and from zero, reduces the
 /// residual in the end. None where it comes to no solution, or too fast for a fit.
 pub fn gauss_seidel_rate(problem: &ContactProblem) -> Option<f64> {
-    let count = problem.contacts.len();
+    // A block of a joint takes as long as some contacts.
+    let count = problem.contacts.len() + 4 * problem.joint_rows();
     // Well above the rounding floor.
     let stop = Stop { tolerance: 1e-11, iterations: MOST_UPDATES / count.max(1) };
-    rate(&pgs(problem, Target::Rigid, &vec![[0.0; 2]; count], SweepDirection::Forward, stop).history)
+    rate(&pgs(problem, Target::Rigid, &problem.no_impulses(), SweepDirection::Forward, stop).history)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! tells whether a distance is meaningful.
 
 use super::interior::interior_point;
+use super::joints::impulse_sizes;
 use super::newton::{newton, newton_after};
 use super::nncg::nncg;
 use super::problem::{ContactProblem, DPair, Velocity};
@@ -26,6 +27,9 @@ pub const CERTIFIED: f64 = 1e-11;
 pub const AGREED: f64 = 1e-8;
 /// Most contacts that are given to Lemke's method, whose work grows with their cube.
 pub const LEMKE_CONTACTS: usize = 150;
+
+/// Most rows of joints that are eliminated before it, whose work grows with their cube.
+pub const LEMKE_ROWS: usize = 450;
 
 /// A family of methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,7 +105,7 @@ pub struct Certificate {
 pub struct Reference {
     /// v⁺ (m/s, m/s, rad/s), one per body.
     pub velocities: Vec<Velocity>,
-    /// λ (N·s), one per contact; one of many if the problem is hyperstatic.
+    /// λ (N·s), one per contact, then (λ, 0) of every row of joints; one of many if the problem is hyperstatic.
     pub impulses: Vec<DPair>,
     /// Why it was accepted.
     pub certificate: Certificate,
@@ -143,13 +147,14 @@ impl Reference {
 
     /// Checks this reference against the problem afresh; says what does not hold.
     pub fn check(&self, problem: &ContactProblem) -> Result<(), String> {
-        if (self.velocities.len(), self.impulses.len()) != (problem.bodies.len(), problem.contacts.len()) {
+        if (self.velocities.len(), self.impulses.len()) != (problem.bodies.len(), problem.unknowns()) {
+            let (contacts, rows) = (problem.contacts.len(), problem.joint_rows());
+            let of_joints = if rows > 0 { format!(" and {rows} rows of joints") } else { String::new() };
             return Err(format!(
-                "reference has {} velocities and {} impulses for {} bodies and {} contacts",
+                "reference has {} velocities and {} impulses for {} bodies and {contacts} contacts{of_joints}",
                 self.velocities.len(),
                 self.impulses.len(),
                 problem.bodies.len(),
-                problem.contacts.len()
             ));
         }
         let residual = certify(problem, &self.impulses);
@@ -175,7 +180,7 @@ impl Reference {
 /// [`ContactProblem::impulse_unit`] and the largest impulse: both below the total load, so that the
 /// certificate of a large pile is no weaker than that of a small one.
 pub fn certify(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
-    let largest = impulses.iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
+    let largest = impulse_sizes(problem, impulses);
     let residual = natural_map(problem, Target::Rigid, &problem.velocities(impulses), impulses);
     residual / problem.impulse_unit().max(largest)
 }
@@ -190,7 +195,7 @@ struct Attempt {
 /// Solves by one method; none if it ended without impulses. Budgets grow no worse than linearly
 /// with the number of contacts.
 fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
-    let cold = vec![[0.0; 2]; problem.contacts.len()];
+    let cold = problem.no_impulses();
     // Two decades below the certificate, whose scale is at least as large as that of the history.
     let stop = |iterations| Stop { tolerance: 0.01 * CERTIFIED, iterations };
     let impulses = match method {
@@ -214,8 +219,11 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
 pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     let fail = |why| NoReference { problem: problem.name.clone(), why };
     problem.validate().map_err(|e| fail(e.to_string()))?;
-    let mut methods = vec![Method::Nncg, Method::Newton, Method::Pgs, Method::InteriorPoint];
-    if problem.contacts.len() <= LEMKE_CONTACTS {
+    let mut methods = vec![Method::Nncg, Method::Newton, Method::Pgs];
+    if problem.joints.is_empty() {
+        methods.push(Method::InteriorPoint);
+    }
+    if problem.contacts.len() <= LEMKE_CONTACTS && problem.joint_rows() <= LEMKE_ROWS {
         methods.insert(0, Method::StewartTrinkle);
     }
     let mut found: Vec<Attempt> = Vec::new();
@@ -246,7 +254,8 @@ pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
             None => format!("{} ended at a residual of {:e}", best.method, best.natural_map),
         }));
     }
-    let uniqueness = if problem.contacts.iter().all(|c| c.friction == 0.0) {
+    let convex = problem.contacts.iter().all(|c| c.friction == 0.0) && problem.has_boxes_alone();
+    let uniqueness = if convex {
         Uniqueness::Proven
     } else if agreed {
         Uniqueness::Agreed

@@ -11,7 +11,7 @@
 //! | key | meaning |
 //! |---|---|
 //! | `format` | always `simpulse-frozen` |
-//! | `version` | 1; a reader refuses larger ones |
+//! | `version` | 1, or 2 with joints; a reader refuses larger ones |
 //! | `bytes` | length of the second line without its line feed |
 //! | `checksum` | FNV-1a, 64 bits, of those bytes: 16 lower-case hexadecimal digits |
 //!
@@ -24,14 +24,18 @@
 //! | `problem.h` | step (s) |
 //! | `problem.bodies[]` | bodies that are not static: `inv_mass` (1/kg), `inv_inertia` (1/(kg·m²)), `velocity` before the step, `free_velocity` v* it would have after it without contacts |
 //! | `problem.contacts[]` | contact points: `body_a`, `body_b` (index, or null for static), `manifold`, `normal` (from a to b), `arm_a`, `arm_b` (r × n, r × t; m), `gap` (m, negative is overlap), `friction`, `rebound` (m/s), `warm_impulse` (N·s) |
+//! | `problem.joints[]` | version 2: joints in the order in which they are solved: `body_a`, `body_b`, `reach` (\|r_a\|, \|r_b\|; m), `blocks` |
+//! | `….blocks[]` | rows that are solved together: `law` and one to three `rows` |
+//! | `….law` | `"rigid"`, `"limit"`, `{"motor":{"speed","cap"}}` or `{"spring":{"stiffness","damping","cap"}}`: u (m/s or rad/s), F h (N·s or N·m·s), S (1/s), D (1); a spring without `cap` has no bound |
+//! | `….rows[]` | `axis` d (a unit vector, or zero for an angle), `arm_a`, `arm_b` (r × d in m, or 1), `error` C (m or rad), `warm_impulse` (N·s or N·m·s) |
 //! | `reference` | null, or the solution of the rigid law |
 //! | `reference.velocities[]` | v⁺ of every body |
-//! | `reference.impulses[]` | (λn, λt) of every contact (N·s) |
+//! | `reference.impulses[]` | (λn, λt) of every contact (N·s), then (λ, 0) of every row of joints |
 //! | `reference.certificate` | `method`, `natural_map`, `witness` (null, or `method`, `natural_map`, `distance`), `uniqueness` |
 //!
 //! Numbers are decimal in the shortest form that reads back as the same `f64`, so writing and
 //! reading keep every bit. A file that is cut short, altered, newer, or whose reference does not
-//! solve its problem is refused.
+//! solve its problem is refused. What rows, blocks and laws mean is derived in [`super::joints`].
 
 use super::certify::Reference;
 use super::problem::ContactProblem;
@@ -43,8 +47,8 @@ use std::path::Path;
 
 /// Value of `format` in the header.
 pub const FORMAT: &str = "simpulse-frozen";
-/// Newest version that this crate reads, and the one it writes.
-pub const VERSION: u64 = 1;
+/// Newest version that this crate reads: that of problems with joints. Others have version 1.
+pub const VERSION: u64 = 2;
 
 /// A contact problem and, if it is known, its solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,7 +76,7 @@ impl Frozen {
         let payload = serde_json::to_string(self).map_err(|e| Error::invalid("payload", e.to_string()))?;
         let header = FrozenHeader {
             format: FORMAT.into(),
-            version: VERSION,
+            version: self.version(),
             bytes: payload.len() as u64,
             checksum: checksum(payload.as_bytes()),
         };
@@ -99,8 +103,8 @@ impl Frozen {
                     "version {v} is newer than {VERSION}, the newest this program reads"
                 )));
             }
-            Some(VERSION) => {}
-            _ => return Err(refuse(format!("version is {}, must be {VERSION}", header["version"]))),
+            Some(1..) => {}
+            _ => return Err(refuse(format!("version is {}, must be 1 or {VERSION}", header["version"]))),
         }
         let header: FrozenHeader =
             serde_json::from_value(header).map_err(|e| refuse(format!("header: {e}")))?;
@@ -121,6 +125,11 @@ impl Frozen {
             return Err(refuse(format!("corrupted: checksum {actual}, header has {}", header.checksum)));
         }
         let frozen: Frozen = serde_json::from_str(payload).map_err(|e| refuse(format!("payload: {e}")))?;
+        if header.version != frozen.version() {
+            let message =
+                format!("version is {}, but that of its problem is {}", header.version, frozen.version());
+            return Err(refuse(message));
+        }
         frozen.validate().map_err(|e| refuse(e.to_string()))?;
         Ok(frozen)
     }
@@ -138,6 +147,10 @@ impl Frozen {
             message: format!("not a frozen problem: not UTF-8 at byte {}", e.valid_up_to()),
         })?;
         Self::from_text(text, path)
+    }
+
+    fn version(&self) -> u64 {
+        if self.problem.joints.is_empty() { 1 } else { VERSION }
     }
 
     fn validate(&self) -> Result<(), Error> {
@@ -221,8 +234,10 @@ mod tests {
     #[test]
     fn other_files_and_newer_versions_are_refused() {
         let text = sample().to_text().unwrap();
-        let newer = text.replacen("\"version\":1", "\"version\":2", 1);
-        assert!(refusal(&newer).contains("version 2 is newer"));
+        let newer = text.replacen("\"version\":1", "\"version\":3", 1);
+        assert!(refusal(&newer).contains("version 3 is newer"));
+        let with_joints = text.replacen("\"version\":1", "\"version\":2", 1);
+        assert!(refusal(&with_joints).contains("version is 2, but that of its problem is 1"));
         assert!(refusal(&text.replacen("\"version\":1", "\"version\":0", 1)).contains("version is 0"));
         assert!(refusal("").contains("not a frozen problem"));
         assert!(refusal("{}\n{}\n").contains("not a frozen problem"));

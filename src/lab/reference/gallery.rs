@@ -4,6 +4,7 @@
 //! solution in its docs. They are the material for tests of references and for exact
 //! convergence rates.
 
+use super::joints::{BlockLaw, ProblemBlock, ProblemJoint, ProblemRow};
 use super::problem::{ContactProblem, ProblemBody, ProblemContact, Velocity};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -20,7 +21,7 @@ struct Builder {
 
 impl Builder {
     fn new(name: String, h: f64) -> Self {
-        let problem = ContactProblem { name, h, bodies: Vec::new(), contacts: Vec::new() };
+        let problem = ContactProblem { name, h, bodies: vec![], contacts: vec![], joints: vec![] };
         Builder { problem, centers: Vec::new(), gravity: [0.0, -GRAVITY] }
     }
 
@@ -51,6 +52,31 @@ impl Builder {
         let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold);
         self.contact(a, b, points[1], normal, mu);
         self.problem.contacts.last_mut().expect("just pushed").manifold = manifold;
+    }
+}
+
+impl Builder {
+    /// A hinge at `point`; its place among the joints.
+    fn hinge(&mut self, a: Option<u32>, b: u32, point: [f64; 2]) -> usize {
+        let r = [a, Some(b)].map(|body| {
+            let [x, y] = body.map_or(point, |body| self.centers[body as usize]);
+            [point[0] - x, point[1] - y]
+        });
+        self.problem.joints.push(ProblemJoint::revolute([a, Some(b)], r));
+        self.problem.joints.len() - 1
+    }
+
+    /// One more row of the angle of a joint, solved before the others.
+    fn angle(&mut self, joint: usize, law: BlockLaw, error: f64) {
+        let row = ProblemRow { axis: [0.0; 2], arm_a: 1.0, arm_b: 1.0, error, warm_impulse: 0.0 };
+        self.problem.joints[joint].blocks.insert(0, ProblemBlock { law, rows: vec![row] });
+    }
+
+    /// A row along `axis` from the world to the center of mass of a body.
+    fn line(&mut self, b: u32, axis: [f64; 2], law: BlockLaw, error: f64) {
+        let row = ProblemRow { axis, arm_a: 0.0, arm_b: 0.0, error, warm_impulse: 0.0 };
+        let blocks = vec![ProblemBlock { law, rows: vec![row] }];
+        self.problem.joints.push(ProblemJoint { body_a: None, body_b: Some(b), reach: [0.0; 2], blocks });
     }
 }
 
@@ -177,6 +203,66 @@ pub fn painleve_rod(h: f64) -> ContactProblem {
     p.problem
 }
 
+/// `n` rods of 1 kg and 1 m that hang from each other, hinges listed from the ceiling down.
+///
+/// Hinge i, from 0, carries the rods below it: λ = (0, (n − i) g h) on the lower one. Vertical impulses go through all centers of
+/// mass, so they turn nothing and are apart from horizontal ones, which stay zero. Among them G is that of
+/// [`disc_column`], the ceiling in the place of the ground: Gauss–Seidel converges by cos²(π/2n) per sweep. With
+/// ln cos²θ = −θ² − O(θ⁴), a residual falls to ε of itself in
+///
+/// ```text
+/// k = ln ε / ln cos²(π/2n) ≈ 4 n² ln(1/ε)/π²
+/// ```
+///
+/// sweeps: twice the links take four times as many.
+pub fn hanging_chain(n: usize) -> ContactProblem {
+    let mut p = Builder::new(format!("chain of {n} hanging rods"), H);
+    let mut above = None;
+    for i in 0..n {
+        let y = -(i as f64);
+        let rod = p.body([0.0, y - 0.5], 1.0, 1.0 / 12.0, [0.0; 3]);
+        p.hinge(above, rod, [0.0, y]);
+        above = Some(rod);
+    }
+    p.problem
+}
+
+/// A rod of 1 kg and 1 m, hinged at the left end and let go at `angle` (rad) above the horizontal.
+///
+/// With r = −½ (cos, sin) from its center to the hinge, K = 1 + 12 (r_y², −r_x r_y; ·, r_x²) in 1/kg and K λ = (0, g h). Level, K is
+/// diagonal, 1 and 1 + 12/4 = 4: the hinge bears a quarter of the weight.
+pub fn pendulum_rod(angle: f64) -> ContactProblem {
+    let mut p = Builder::new(format!("rod let go at {angle} rad"), H);
+    let rod = p.body([0.5 * angle.cos(), 0.5 * angle.sin()], 1.0, 1.0 / 12.0, [0.0; 3]);
+    p.hinge(None, rod, [0.0, 0.0]);
+    p.problem
+}
+
+/// Four bodies of 1 kg, each with a joint at a bound or a spring. With g h = 1/24 m/s:
+///
+/// * a disc of I = ½ kg·m², hinged at its center, with a motor of 10 rad/s and 0.01 N·m·s: it gives all it has and turns at
+///   0.02 rad/s; the hinge bears g h;
+/// * a level rod of 1 m, hinged at its left end, 0.1 mrad above a limit, which it meets: ω = −0.0001/h = −0.024 rad/s. Alone it would
+///   have ω* = −(g h/2)/(1/3); the limit's impulse is (ω − ω*)/3, the hinge's g h + ω/2;
+/// * a point on a vertical spring of S = 20/s and D = ½, stretched by 10 mm: λ = (D g h + S 0.01)/(1 + D);
+/// * a box on a floor, µ = ½, that a spring pulls to the left with 0.01 N·s at most, less than the floor's µ g h: it stays, and the
+///   floor holds it by as much.
+pub fn machine() -> ContactProblem {
+    let mut p = Builder::new("joints at their bounds".into(), H);
+    let disc = p.body([0.0, 0.0], 1.0, 0.5, [0.0; 3]);
+    let axle = p.hinge(None, disc, [0.0, 0.0]);
+    p.angle(axle, BlockLaw::Motor { speed: 10.0, cap: 0.01 }, 0.0);
+    let rod = p.body([3.5, 0.0], 1.0, 1.0 / 12.0, [0.0; 3]);
+    let hinge = p.hinge(None, rod, [3.0, 0.0]);
+    p.angle(hinge, BlockLaw::Limit, 1e-4);
+    let point = p.body([6.0, 0.0], 1.0, f64::INFINITY, [0.0; 3]);
+    p.line(point, UP, BlockLaw::Spring { stiffness: 20.0, damping: 0.5, cap: None }, -0.01);
+    let cube = p.body([9.0, 0.0], 1.0, f64::INFINITY, [0.0; 3]);
+    p.contact(None, Some(cube), [9.0, -0.5], UP, 0.5);
+    p.line(cube, [1.0, 0.0], BlockLaw::Spring { stiffness: 20.0, damping: 0.5, cap: Some(0.01) }, 0.5);
+    p.problem
+}
+
 /// A wedge (1 kg, not turning) between walls leaning outwards by `half_angle` from the vertical.
 /// If it does not slip it rests with impulses that self-stress leaves undetermined:
 /// with friction, any squeeze may be added once µ > tan(half_angle).
@@ -234,5 +320,8 @@ pub fn library() -> Vec<(&'static str, ContactProblem)> {
         ("box-pyramid-5", box_pyramid(5, 0.6)),
         ("painleve-rod", painleve_rod(1e-3)),
         ("wedge", wedge(0.25, 0.5)),
+        ("hanging-chain-10", hanging_chain(10)),
+        ("hanging-chain-20", hanging_chain(20)),
+        ("machine", machine()),
     ]
 }

@@ -1,6 +1,6 @@
 //! Exact and certified solutions of a contact problem.
 //!
-//! Reading order: [`problem`] states the problem, [`residual`] the law and its residual. [`stewart_trinkle`] solves
+//! Reading order: [`problem`] states the problem, [`residual`] the law and its residual, [`joints`] those of joints. [`stewart_trinkle`] solves
 //! small problems exactly by Lemke's method ([`crate::engine::constraints::numerics::lemke`]); [`sweeps`], [`nncg`]
 //! and [`newton`], through [`sparse`], solve large ones, and [`interior`] what these leave. [`certify`] accepts a solution only with a certificate.
 //! [`statics`] decides without a time step whether rest is possible, through [`nnls`]. [`frozen`] stores problems in
@@ -15,6 +15,7 @@ pub mod certify;
 pub mod frozen;
 pub mod gallery;
 pub mod interior;
+pub mod joints;
 pub mod newton;
 pub mod nncg;
 pub mod nnls;
@@ -26,6 +27,7 @@ pub mod sparse;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
-mod validate;
+pub(crate) mod validate;
 
+pub use joints::{BlockLaw, ProblemBlock, ProblemJoint, ProblemRow};
 pub use problem::{ContactProblem, DPair, ProblemBody, ProblemContact, Velocity};

@@ -12,6 +12,9 @@
 //! closed and the tangential ones of sticking contacts, the rows of G named on the right, a
 //! slipping contact acting along n + s µ t. In the right states it gives the solution at once.
 //!
+//! Rows of joints, J v + b + R λ = 0 within bounds, are free or at a bound, by the same sign; a block whose norm is capped
+//! is held where its projection was.
+//!
 //! **Source**: Alart & Curnier 1991; Acary, Brémond & Huber 2018 (line search, proximal outer loop).
 //! **Departures**: hyperstatic contacts make the linear problem singular and their states
 //! ambiguous. So Newton solves a sequence of proximal problems (Rockafellar 1976): ε D (λ − λ_k) is
@@ -24,6 +27,7 @@
 //! **Fails when** a pile is jammed by friction, so that G has eigenvalues near ε that matter; then
 //! it stalls at residuals around 10⁻⁶ and [`mod@super::certify`] refuses its answer.
 
+use super::joints::{BlockLine, RowVector};
 use super::problem::{ContactProblem, DPair, ProblemContact, SideRows};
 use super::residual::{OwnRow, Target, clamp, positive};
 use super::sparse;
@@ -52,6 +56,10 @@ enum IterateState {
     Stick,
     /// Direction of λt.
     Slip(f64),
+    /// A row of a joint within its bounds.
+    Free,
+    /// A row of a joint that has this impulse.
+    At(f64),
 }
 
 /// Newton's method from `start`; one iteration is one proximal problem, or a bout of sweeps.
@@ -104,6 +112,7 @@ struct Proximal<'a> {
     problem: &'a ContactProblem,
     law: Vec<OwnRow>,
     diagonal: Vec<DPair>,
+    lines: Vec<BlockLine>,
     shift: f64,
     center: &'a [DPair],
 }
@@ -111,7 +120,14 @@ struct Proximal<'a> {
 impl<'a> Proximal<'a> {
     fn new(problem: &'a ContactProblem, target: Target, shift: f64, center: &'a [DPair]) -> Self {
         let law = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-        Proximal { problem, law, diagonal: problem.delassus_diagonal(), shift, center }
+        Proximal {
+            problem,
+            law,
+            diagonal: problem.delassus_diagonal(),
+            lines: problem.lines(target),
+            shift,
+            center,
+        }
     }
 
     /// Impulses that solve this problem well enough, or none.
@@ -158,7 +174,19 @@ impl<'a> Proximal<'a> {
             let normal = ln - (un + self.shift * gn * (ln - cn)) / (gn + self.law[i].compliance);
             [normal, lt - ut / gt - self.shift * (lt - ct)]
         };
-        self.problem.contacts.iter().enumerate().map(one).collect()
+        let mut arguments: Vec<DPair> = self.problem.contacts.iter().enumerate().map(one).collect();
+        for line in &self.lines {
+            let (u, l, center) = (line.velocity(&velocities), line.read(impulses), line.read(self.center));
+            let fixed = line.fixed();
+            let (bias, softness) = (line.bias(), line.softness());
+            arguments.extend((0..line.size).map(|i| {
+                let k = &line.response[i];
+                let soft = softness * (k[0] * l[0] + k[1] * l[1] + k[2] * l[2]);
+                let f = u[i] + bias[i] + soft + self.shift * k[i] * (l[i] - center[i]);
+                [fixed.map_or_else(|| l[i] - f / (k[i] * (1.0 + softness)), |fixed| fixed[i]), 0.0]
+            }));
+        }
+        arguments
     }
 
     /// Energy-weighted square of the natural map ∑ G_ii r_i² (J): the same in all units of mass.
@@ -168,7 +196,12 @@ impl<'a> Proximal<'a> {
             let radius = c.friction * positive(yn);
             gn * (ln - positive(yn)).powi(2) + gt * (lt - clamp(yt, radius)).powi(2)
         };
-        self.problem.contacts.iter().enumerate().map(one).sum()
+        let contacts: f64 = self.problem.contacts.iter().enumerate().map(one).sum();
+        let of_line = |line: &BlockLine| {
+            let (l, y) = (line.read(impulses), line.bound.project(line.read(arguments)));
+            (0..line.size).map(|i| line.response[i][i] * (l[i] - y[i]).powi(2)).sum::<f64>()
+        };
+        contacts + self.lines.iter().map(of_line).sum::<f64>()
     }
 
     fn states(&self, arguments: &[DPair]) -> Vec<IterateState> {
@@ -181,7 +214,15 @@ impl<'a> Proximal<'a> {
                 IterateState::Slip(tangent.signum())
             }
         };
-        arguments.iter().zip(&self.problem.contacts).map(one).collect()
+        let mut states: Vec<IterateState> = arguments.iter().zip(&self.problem.contacts).map(one).collect();
+        for line in &self.lines {
+            let y = line.read(arguments);
+            let projected = line.bound.project(y);
+            let is_free = line.fixed().is_none() && line.bound.is_inside(y);
+            let state = |i: usize| if is_free { IterateState::Free } else { IterateState::At(projected[i]) };
+            states.extend((0..line.size).map(state));
+        }
+        states
     }
 
     /// Solves the linear problem of fixed states; none if it cannot be factorized.
@@ -191,8 +232,8 @@ impl<'a> Proximal<'a> {
         let mut index = vec![[usize::MAX; 2]; states.len()];
         for (i, state) in states.iter().enumerate() {
             let directions = match state {
-                IterateState::Open => 0,
-                IterateState::Slip(_) => 1,
+                IterateState::Open | IterateState::At(_) => 0,
+                IterateState::Slip(_) | IterateState::Free => 1,
                 IterateState::Stick => 2,
             };
             for (direction, index) in index[i].iter_mut().enumerate().take(directions) {
@@ -201,15 +242,22 @@ impl<'a> Proximal<'a> {
             }
         }
         let n = unknowns.len();
+        let rows: Vec<(&BlockLine, usize)> =
+            self.lines.iter().flat_map(|line| (0..line.size).map(move |i| (line, i))).collect();
+        let contacts = self.problem.contacts.len();
+        let g = |i: usize, d: usize| match i.checked_sub(contacts) {
+            Some(row) => rows[row].0.response[rows[row].1][rows[row].1],
+            None => self.diagonal[i][d],
+        };
         // Rows and columns scaled by 1/√G_ii: unit diagonal.
-        let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / self.diagonal[i][d].sqrt()).collect();
+        let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / g(i, d).sqrt()).collect();
         let slope = |i: usize| match states[i] {
             IterateState::Slip(sign) => sign * self.problem.contacts[i].friction,
             _ => 0.0,
         };
 
         let mut entries: Vec<sparse::Triplet> = Vec::new();
-        for (body, touching) in contacts_of_bodies(self.problem, states).iter().enumerate() {
+        for (body, touching) in self.rows_of_bodies(states).iter().enumerate() {
             let b = &self.problem.bodies[body];
             let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
             for (i, rows) in touching {
@@ -229,16 +277,32 @@ impl<'a> Proximal<'a> {
                 }
             }
         }
-        let free = self.problem.velocities(&vec![[0.0; 2]; states.len()]);
+        let held = |state: &IterateState| if let IterateState::At(l) = *state { [l, 0.0] } else { [0.0; 2] };
+        let mut impulses: Vec<DPair> = states.iter().map(held).collect();
+        let free = self.problem.velocities(&impulses);
         let mut right = vec![0.0; n];
         for (u, &(i, d)) in unknowns.iter().enumerate() {
+            let pull = self.shift * self.center[i][d] / scale[u];
+            if let Some(row) = i.checked_sub(contacts) {
+                let (line, r) = rows[row];
+                right[u] = pull - (line.velocity(&free)[r] + line.bias()[r]) * scale[u];
+                entries.push((u, u, self.shift));
+                for c in 0..line.size {
+                    let column = index[line.first + c][0];
+                    entries.push((
+                        column,
+                        u,
+                        line.softness() * line.response[r][c] * scale[u] * scale[column],
+                    ));
+                }
+                continue;
+            }
             let law = if d == 0 { self.law[i] } else { OwnRow::default() };
             let velocity = self.problem.contacts[i].velocity(&free)[d] + law.bias;
-            right[u] = -velocity * scale[u] + self.shift * self.center[i][d] / scale[u];
+            right[u] = pull - velocity * scale[u];
             entries.push((u, u, law.compliance * scale[u] * scale[u] + self.shift));
         }
         let x = sparse::solve(entries, &right)?;
-        let mut impulses = vec![[0.0; 2]; states.len()];
         for (u, &(i, d)) in unknowns.iter().enumerate() {
             impulses[i][d] = x[u] * scale[u];
         }
@@ -249,17 +313,23 @@ impl<'a> Proximal<'a> {
         }
         Some(impulses)
     }
-}
 
-/// Closed contacts of every body, with their rows on that body.
-fn contacts_of_bodies(problem: &ContactProblem, states: &[IterateState]) -> Vec<Vec<(usize, SideRows)>> {
-    let mut touching = vec![Vec::new(); problem.bodies.len()];
-    for (i, c) in problem.contacts.iter().enumerate() {
-        if states[i] != IterateState::Open {
-            c.sides().for_each(|(body, block)| touching[body].push((i, block)));
+    /// Closed contacts and free rows of joints of every body, with their rows on that body.
+    fn rows_of_bodies(&self, states: &[IterateState]) -> Vec<Vec<(usize, SideRows)>> {
+        let mut touching = vec![Vec::new(); self.problem.bodies.len()];
+        for (i, c) in self.problem.contacts.iter().enumerate() {
+            if states[i] != IterateState::Open {
+                c.sides().for_each(|(body, block)| touching[body].push((i, block)));
+            }
         }
+        for line in &self.lines {
+            for (body, rows) in &line.sides {
+                let free = (0..line.size).filter(|i| states[line.first + i] == IterateState::Free);
+                touching[*body].extend(free.map(|i| (line.first + i, [rows[i], RowVector::default()])));
+            }
+        }
+        touching
     }
-    touching
 }
 
 #[cfg(test)]

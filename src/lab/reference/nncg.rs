@@ -15,12 +15,11 @@ use super::sweeps::{IterativeRun, ScalarRows, Stop, gauss_seidel, iterate};
 /// NNCG from `start`; one iteration is a sweep and an extrapolation.
 pub fn nncg(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
     let rows = ScalarRows::new(problem, target);
-    let n = problem.contacts.len();
-    let mut direction = vec![[0.0; 2]; n];
+    let mut direction = problem.no_impulses();
     let mut previous = f64::INFINITY;
     iterate(problem, target, start, stop, |impulses, velocities| {
         let before = impulses.clone();
-        gauss_seidel(problem, &rows, 0..n, impulses, velocities);
+        gauss_seidel(problem, &rows, false, impulses, velocities);
         let descent: Vec<DPair> =
             impulses.iter().zip(&before).map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let square: f64 = descent.iter().map(|d| d[0] * d[0] + d[1] * d[1]).sum();

@@ -15,8 +15,10 @@
 //! v⁺ = v* + M⁻¹ Jᵀ λ,      v* = v + h M⁻¹ f,
 //! ```
 //!
-//! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
+//! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix. Joints have rows
+//! and laws of their own: [`crate::lab::reference::joints`].
 
+use super::joints::ProblemJoint;
 pub use crate::engine::constraints::numerics::coulomb_lcp::DPair;
 use crate::engine::constraints::numerics::matrix::Matrix;
 use serde::{Deserialize, Serialize};
@@ -151,6 +153,9 @@ pub struct ContactProblem {
     pub bodies: Vec<ProblemBody>,
     /// Contact points, those of a manifold together.
     pub contacts: Vec<ProblemContact>,
+    /// Joints, in the order in which they are solved.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<ProblemJoint>,
 }
 
 impl ContactProblem {
@@ -171,6 +176,7 @@ impl ContactProblem {
         for (c, &impulse) in self.contacts.iter().zip(impulses) {
             self.apply(c, impulse, &mut v);
         }
+        self.push_joints(impulses, &mut v);
         v
     }
 
@@ -179,7 +185,7 @@ impl ContactProblem {
         self.contacts.iter().map(|c| c.velocity(velocities)).collect()
     }
 
-    /// Jᵀ λ: what the contacts give each body (N·s, N·s, N·m·s). Unlike single impulses of a
+    /// Jᵀ λ: what contacts and joints give each body (N·s, N·s, N·m·s). Unlike single impulses of a
     /// hyperstatic pile, this is determined by the velocities.
     pub fn body_impulses(&self, impulses: &[DPair]) -> Vec<Velocity> {
         let mut p = vec![[0.0; 3]; self.bodies.len()];
@@ -190,10 +196,11 @@ impl ContactProblem {
                 }
             }
         }
+        self.sum_joint_impulses(impulses, &mut p);
         p
     }
 
-    /// G λ = J M⁻¹ Jᵀ λ (m/s).
+    /// G λ = J M⁻¹ Jᵀ λ of the contacts (m/s).
     pub fn delassus_product(&self, impulses: &[DPair]) -> Vec<DPair> {
         let mut v = vec![[0.0; 3]; self.bodies.len()];
         for (c, &impulse) in self.contacts.iter().zip(impulses) {
@@ -202,7 +209,7 @@ impl ContactProblem {
         self.contact_velocities(&v)
     }
 
-    /// Dense G, rows and columns (n₀, t₀, n₁, t₁, …), 1/kg.
+    /// Dense G of the contacts, rows and columns (n₀, t₀, n₁, t₁, …), 1/kg.
     pub fn delassus(&self) -> Matrix {
         let mut g = Matrix::zeros(2 * self.contacts.len(), 2 * self.contacts.len());
         let mut v = vec![[0.0; 3]; self.bodies.len()];
@@ -268,7 +275,7 @@ mod tests {
             warm_impulse: [0.0; 2],
         };
         let bodies = vec![body(1.0, 4.0, [1.0, 0.0, 2.0]), body(0.5, 2.0, [0.0, 3.0, -1.0])];
-        ContactProblem { name: "oblique".into(), h: 0.1, bodies, contacts: vec![contact] }
+        ContactProblem { name: "oblique".into(), h: 0.1, bodies, contacts: vec![contact], joints: vec![] }
     }
 
     fn close(a: f64, b: f64) {

@@ -18,6 +18,7 @@
 //!
 //! With ρ = 1/G_ii it is an impulse: how much one exact sweep over this row alone would change it.
 
+use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
 
 /// The right-hand side b of un = Jn v + b that a residual is measured against.
@@ -29,16 +30,17 @@ pub enum Target<'a> {
     /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step,
     /// overlapping ones may not deepen.
     Rigid,
-    /// The solver's own law: one row for every contact of the problem.
+    /// The solver's own law: one row for every contact of the problem, then one for every row of its joints.
     Own(&'a [OwnRow]),
 }
 
-/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn.
+/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. Of a rigid row or a limit of a joint:
+/// J v + bias + compliance K λ; motors and springs have the law of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnRow {
     /// m/s; negative pushes apart.
     pub bias: f64,
-    /// 1/kg, ≥ 0: velocity that the contact yields per impulse.
+    /// 1/kg, ≥ 0: velocity that the contact yields per impulse; of a row of a joint in its K (1).
     pub compliance: f64,
 }
 
@@ -86,17 +88,55 @@ pub fn contact_residuals(
     velocities: &[Velocity],
     impulses: &[DPair],
 ) -> Vec<ContactResidual> {
-    let diagonal = problem.delassus_diagonal();
-    let one = |i: usize| {
-        let c = &problem.contacts[i];
-        let row = target.row(problem, i);
+    let measure = Measure::new(problem, target);
+    (0..problem.contacts.len()).map(|i| measure.contact(i, velocities, impulses)).collect()
+}
+
+/// Residual of every row of joints (N·s), in their order; see [`super::joints`].
+///
+/// `velocities` need not follow from `impulses`.
+pub fn joint_residuals(
+    problem: &ContactProblem,
+    target: Target,
+    velocities: &[Velocity],
+    impulses: &[DPair],
+) -> Vec<f64> {
+    let lines = problem.lines(target);
+    lines.iter().flat_map(|line| line.residuals(velocities, impulses).into_iter().take(line.size)).collect()
+}
+
+/// A problem under a law, with everything that does not change with impulses.
+pub(super) struct Measure<'a> {
+    problem: &'a ContactProblem,
+    diagonal: Vec<DPair>,
+    rows: Vec<OwnRow>,
+    lines: Vec<BlockLine>,
+}
+
+impl<'a> Measure<'a> {
+    pub fn new(problem: &'a ContactProblem, target: Target) -> Self {
+        let rows = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
+        Measure { problem, diagonal: problem.delassus_diagonal(), rows, lines: problem.lines(target) }
+    }
+
+    fn contact(&self, i: usize, velocities: &[Velocity], impulses: &[DPair]) -> ContactResidual {
+        let (c, row, [gn, gt]) = (&self.problem.contacts[i], self.rows[i], self.diagonal[i]);
         let [vn, ut] = c.velocity(velocities);
         let [ln, lt] = impulses[i];
         let un = vn + row.bias + row.compliance * ln;
-        let [rho_n, rho_t] = [1.0 / (diagonal[i][0] + row.compliance), 1.0 / diagonal[i][1]];
-        law_residual(c.friction, [un, ut], [ln, lt], [rho_n, rho_t])
-    };
-    (0..problem.contacts.len()).map(one).collect()
+        law_residual(c.friction, [un, ut], [ln, lt], [1.0 / (gn + row.compliance), 1.0 / gt])
+    }
+
+    /// See [`natural_map`].
+    pub fn natural_map(&self, velocities: &[Velocity], impulses: &[DPair]) -> f64 {
+        let contacts = (0..self.problem.contacts.len()).flat_map(|i| {
+            let r = self.contact(i, velocities, impulses);
+            [r.normal, r.tangent]
+        });
+        let joints = self.lines.iter().flat_map(|line| line.residuals(velocities, impulses));
+        // `f64::max` would drop NaN.
+        contacts.chain(joints).fold(0.0, |m: f64, r| if m.is_nan() || m >= r.abs() { m } else { r.abs() })
+    }
 }
 
 /// Residuals of one contact with relative velocity `u` (m/s), impulse `l` (N·s) and ρ (kg).
@@ -148,16 +188,14 @@ pub(super) fn clamp(x: f64, radius: f64) -> f64 {
     }
 }
 
-/// Largest |natural map| over all contacts and both directions (N·s); NaN if anything is.
+/// Largest |natural map| over all contacts and both directions, and all rows of joints (N·s); NaN if anything is.
 pub fn natural_map(
     problem: &ContactProblem,
     target: Target,
     velocities: &[Velocity],
     impulses: &[DPair],
 ) -> f64 {
-    let residuals = contact_residuals(problem, target, velocities, impulses);
-    let parts: Vec<f64> = residuals.iter().flat_map(|r| [r.normal, r.tangent]).collect();
-    Summary::of(&parts).max
+    Measure::new(problem, target).natural_map(velocities, impulses)
 }
 
 /// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): velocities that do not follow from the impulses.

@@ -236,7 +236,13 @@ mod tests {
             contact(None, Some(1), [0.0, 1.0], [0.0; 2], right_foot, base, 1),
             contact(Some(0), Some(1), [1.0, 0.0], left_top, right_top, 1.0, 2),
         ];
-        let problem = ContactProblem { name: "A-frame".into(), h: 1.0, bodies: vec![body; 2], contacts };
+        let problem = ContactProblem {
+            name: "A-frame".into(),
+            h: 1.0,
+            bodies: vec![body; 2],
+            contacts,
+            joints: vec![],
+        };
         let moment = |top: [f64; 2]| -extra * GRAVITY * top[0];
         let weight = -(1.0 + extra) * GRAVITY;
         (problem, vec![[0.0, weight, moment(left_top)], [0.0, weight, moment(right_top)]])

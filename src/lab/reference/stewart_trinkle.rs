@@ -5,12 +5,25 @@
 //! The matrices are those of [`crate::engine::constraints::numerics::coulomb_lcp`], with the compliance of a target on
 //! the diagonal.
 //!
-//! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts.
+//! **Joints.** Rows without bounds are free: J v + b + R λ = 0, whatever λ is. They are eliminated first, by LDLᵀ in their
+//! order; what is left of G is its Schur complement,
+//!
+//! ```text
+//! G ← G_cc − G_cf (G_ff + R)⁻¹ G_fc      b ← b_c − G_cf (G_ff + R)⁻¹ b_f
+//! ```
+//!
+//! and a row that follows from those before it has no pivot and no impulse. Limits are then points without friction, rows
+//! with a cap tangential rows with a bound of their own. Blocks of several rows with a cap are free here: if their impulses
+//! end beyond the cap, the method has no answer.
+//!
+//! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts. O(n³) for n rows of joints.
 
-use super::problem::{ContactProblem, DPair};
+use super::joints::Bound;
+use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::engine::constraints::numerics::lemke::LemkeOutcome;
+use crate::engine::constraints::numerics::matrix::Matrix;
 
 /// Pivots allowed per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
@@ -18,6 +31,8 @@ const PIVOTS_PER_ROW: usize = 50;
 const PATHS: usize = 6;
 /// Relative natural-map residual that counts as exact.
 const EXACT: f64 = 1e-13;
+/// A row of which less than this is left after elimination follows from those before it (1).
+const REDUNDANT: f64 = 1e-11;
 
 /// Impulses of a solution, or why there is none. `target` may be compliant.
 ///
@@ -25,6 +40,11 @@ const EXACT: f64 = 1e-13;
 /// one of Lemke's paths on a spurious ray or at an inaccurate basis; then other covering vectors are
 /// tried and the answer with the least residual returned.
 pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<DPair>, LemkeOutcome> {
+    if !problem.joints.is_empty() {
+        let eliminated = Eliminated::new(problem, target);
+        let lcp = eliminated.lcp()?;
+        return by_lemke(problem, target, &lcp, |pairs| eliminated.impulses(pairs));
+    }
     let rows: Vec<_> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
     let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; rows.len()]));
     let free: Vec<DPair> = free.iter().zip(&rows).map(|(u, row)| [u[0] + row.bias, u[1]]).collect();
@@ -33,10 +53,21 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<D
     let lcp = CoulombLcp::new(&friction, &problem.delassus_diagonal(), &free, |i, j| {
         g[(i, j)] + if i == j && i % 2 == 0 { rows[i / 2].compliance } else { 0.0 }
     });
+    by_lemke(problem, target, &lcp, Some)
+}
+
+/// The best answer of several paths; `whole` makes impulses of the problem from those of the LCP, or refuses them.
+fn by_lemke(
+    problem: &ContactProblem,
+    target: Target,
+    lcp: &CoulombLcp,
+    whole: impl Fn(Vec<DPair>) -> Option<Vec<DPair>>,
+) -> Result<Vec<DPair>, LemkeOutcome> {
     let mut best: Result<(f64, Vec<DPair>), LemkeOutcome> = Err(LemkeOutcome::Ray);
     for path in 0..PATHS {
         match lcp.solve(&covering_vector(lcp.rows(), path), PIVOTS_PER_ROW * lcp.rows() + 100) {
             Ok(l) => {
+                let Some(l) = whole(l) else { continue };
                 let residual =
                     natural_map(problem, target, &problem.velocities(&l), &l) / problem.impulse_unit();
                 if best.as_ref().map_or(true, |(least, _)| residual < *least) {
@@ -50,6 +81,180 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<D
         }
     }
     best.map(|(_, impulses)| impulses)
+}
+
+/// A problem with joints, its free rows eliminated.
+struct Eliminated<'a> {
+    problem: &'a ContactProblem,
+    /// G + R, and b as its last column; rows of `pivots` as they were when they were eliminated. A contact has two rows, a row
+    /// of a joint one.
+    cells: Matrix,
+    /// Diagonal before the elimination.
+    diagonal: Vec<f64>,
+    /// Impulses that do not depend on velocities: of springs without damping, and of redundant rows. `[rows of joints]`
+    fixed: Vec<Option<f64>>,
+    /// Rows that were eliminated, in order.
+    pivots: Vec<usize>,
+    /// Rows of limits, and rows with a cap.
+    limits: Vec<usize>,
+    caps: Vec<(usize, f64)>,
+    /// First row, rows and cap of blocks that are free up to it.
+    balls: Vec<(usize, usize, f64)>,
+}
+
+impl<'a> Eliminated<'a> {
+    fn new(problem: &'a ContactProblem, target: Target) -> Self {
+        let contacts = 2 * problem.contacts.len();
+        let lines = problem.lines(target);
+        let n = contacts + problem.joint_rows();
+        // Bodies of every row, with its part of J.
+        let mut sides: Vec<Vec<(usize, Velocity)>> = Vec::with_capacity(n);
+        for c in &problem.contacts {
+            for direction in 0..2 {
+                sides.push(c.sides().map(|(body, rows)| (body, rows[direction])).collect());
+            }
+        }
+        let (mut fixed, mut free, mut limits, mut caps, mut balls) = (vec![], vec![], vec![], vec![], vec![]);
+        let mut start = problem.no_impulses();
+        for line in &lines {
+            let first = sides.len();
+            for i in 0..line.size {
+                sides.push(line.sides.iter().map(|(body, rows)| (*body, rows[i])).collect());
+            }
+            let held = line.fixed();
+            fixed.extend((0..line.size).map(|i| held.map(|held| held[i])));
+            match (held, line.bound) {
+                (Some(held), _) => line.write(held, &mut start),
+                (None, Bound::Positive) => limits.push(first),
+                (None, Bound::Cap(cap)) if line.size == 1 => caps.push((first, cap)),
+                (None, bound) => {
+                    free.extend(first..first + line.size);
+                    if let Bound::Cap(cap) = bound {
+                        balls.push((first, line.size, cap));
+                    }
+                }
+            }
+        }
+        let inverse = |body: usize| {
+            let b = &problem.bodies[body];
+            [b.inv_mass, b.inv_mass, b.inv_inertia]
+        };
+        let mut cells = Matrix::from_fn(n, n + 1, |row, column| {
+            let Some(other) = sides.get(column) else { return 0.0 };
+            let common =
+                sides[row].iter().flat_map(|a| other.iter().filter(move |b| a.0 == b.0).map(move |b| (a, b)));
+            common.map(|(a, b)| (0..3).map(|k| inverse(a.0)[k] * a.1[k] * b.1[k]).sum::<f64>()).sum()
+        });
+        let velocities = problem.velocities(&start);
+        for (row, sides) in sides.iter().enumerate() {
+            cells[(row, n)] =
+                sides.iter().map(|(body, j)| (0..3).map(|k| j[k] * velocities[*body][k]).sum::<f64>()).sum();
+        }
+        for i in 0..problem.contacts.len() {
+            let law = target.row(problem, i);
+            cells[(2 * i, n)] += law.bias;
+            cells[(2 * i, 2 * i)] += law.compliance;
+        }
+        for line in lines.iter().filter(|line| line.fixed().is_none()) {
+            let first = contacts + line.first - problem.contacts.len();
+            for r in 0..line.size {
+                cells[(first + r, n)] += line.bias()[r];
+                for c in 0..line.size {
+                    cells[(first + r, first + c)] += line.softness() * line.response[r][c];
+                }
+            }
+        }
+        let diagonal = (0..n).map(|i| cells[(i, i)]).collect();
+        let mut eliminated =
+            Eliminated { problem, cells, diagonal, fixed, pivots: vec![], limits, caps, balls };
+        eliminated.eliminate(&free);
+        eliminated
+    }
+
+    fn eliminate(&mut self, free: &[usize]) {
+        let (contacts, n) = (2 * self.problem.contacts.len(), self.diagonal.len());
+        let mut is_open = vec![true; n];
+        for &row in free {
+            is_open[row] = false;
+            let pivot = self.cells[(row, row)];
+            if pivot <= REDUNDANT * self.diagonal[row] {
+                self.fixed[row - contacts] = Some(0.0);
+                continue;
+            }
+            self.pivots.push(row);
+            let above = self.cells.row(row).to_vec();
+            for i in (0..n).filter(|&i| is_open[i] && above[i] != 0.0) {
+                let factor = above[i] / pivot;
+                for (j, x) in above.iter().enumerate() {
+                    self.cells[(i, j)] -= factor * x;
+                }
+            }
+        }
+    }
+
+    fn lcp(&self) -> Result<CoulombLcp, LemkeOutcome> {
+        let (n, contacts) = (self.diagonal.len(), self.problem.contacts.len());
+        // Points, two rows each, of which a limit has one; then rows with a cap.
+        let pair = |row: usize| [Some(row), None];
+        let points = (0..contacts).flat_map(|i| [Some(2 * i), Some(2 * i + 1)]);
+        let rows: Vec<Option<usize>> = points
+            .chain(self.limits.iter().flat_map(|&row| pair(row)))
+            .chain(self.caps.iter().map(|&(row, _)| Some(row)))
+            .collect();
+        for row in rows.iter().flatten() {
+            if self.cells[(*row, *row)] <= REDUNDANT * self.diagonal[*row] {
+                return Err(LemkeOutcome::Singular);
+            }
+        }
+        let paired = |of: &dyn Fn(usize) -> f64| -> Vec<DPair> {
+            let one = |row: Option<&Option<usize>>| row.copied().flatten().map_or(1.0, of);
+            (0..rows.len()).step_by(2).map(|i| [one(rows.get(i)), one(rows.get(i + 1))]).collect()
+        };
+        let friction: Vec<f64> =
+            self.problem.contacts.iter().map(|c| c.friction).chain(self.limits.iter().map(|_| 0.0)).collect();
+        let caps: Vec<f64> = self.caps.iter().map(|cap| cap.1).collect();
+        let (diagonal, free) = (paired(&|i| self.cells[(i, i)]), paired(&|i| self.cells[(i, n)]));
+        Ok(CoulombLcp::with_caps(&friction, &caps, &diagonal, &free, |i, j| match (rows[i], rows[j]) {
+            (Some(i), Some(j)) => self.cells[(i, j)],
+            _ => 0.0,
+        }))
+    }
+
+    /// Impulses of the problem from those of the LCP; none if a block exceeds its cap.
+    fn impulses(&self, pairs: Vec<DPair>) -> Option<Vec<DPair>> {
+        let (contacts, n) = (self.problem.contacts.len(), self.diagonal.len());
+        let mut of_rows = vec![0.0; n];
+        of_rows[..2 * contacts].copy_from_slice(pairs[..contacts].as_flattened());
+        for (&row, pair) in self.limits.iter().zip(&pairs[contacts..]) {
+            of_rows[row] = pair[0];
+        }
+        let capped = pairs[contacts + self.limits.len()..].as_flattened();
+        self.caps.iter().zip(capped).for_each(|(&(row, _), &l)| of_rows[row] = l);
+        // Each pivot row knows of those that were not eliminated before it.
+        let mut is_known = vec![true; n];
+        self.pivots.iter().for_each(|&row| is_known[row] = false);
+        for (i, l) in self.fixed.iter().enumerate() {
+            // Springs are part of the velocities already.
+            is_known[2 * contacts + i] &= l.is_none();
+        }
+        for &row in self.pivots.iter().rev() {
+            let cells = self.cells.row(row);
+            let known: f64 = (0..n).filter(|&j| is_known[j]).map(|j| cells[j] * of_rows[j]).sum();
+            of_rows[row] = -(cells[n] + known) / cells[row];
+            is_known[row] = true;
+        }
+        for (i, l) in self.fixed.iter().enumerate() {
+            of_rows[2 * contacts + i] = l.unwrap_or(of_rows[2 * contacts + i]);
+        }
+        let exceeds = |&(first, size, cap): &(usize, usize, f64)| {
+            of_rows[first..first + size].iter().map(|l| l * l).sum::<f64>().sqrt() > cap
+        };
+        if self.balls.iter().any(exceeds) {
+            return None;
+        }
+        let joints = of_rows[2 * contacts..].iter().map(|&l| [l, 0.0]);
+        Some(pairs[..contacts].iter().copied().chain(joints).collect())
+    }
 }
 
 /// All ones, then ones shifted by up to one half by multiples of the golden ratio.

@@ -13,9 +13,12 @@
 //! the inverse mass, and averaging divides the effect of its impulse by k again. So it is Jacobi
 //! with D_i = ∑_sides k J_i M⁻¹ J_iᵀ, and since (∑ᵢ xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G: it
 //! converges.
+//!
+//! Joints are solved block by block, before the contacts as in the simulation, each by the impulses that satisfy it alone.
 
+use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{OwnRow, Target, clamp, natural_map, positive};
+use super::residual::{Measure, OwnRow, Target, clamp, positive};
 
 /// When an iteration ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +60,8 @@ pub(super) struct ScalarRows {
     /// 1/(G_ii + compliance), normal and tangential (kg).
     inverse: Vec<DPair>,
     law: Vec<OwnRow>,
+    /// Blocks of joints.
+    lines: Vec<BlockLine>,
 }
 
 impl ScalarRows {
@@ -67,7 +72,8 @@ impl ScalarRows {
     fn with_diagonal(problem: &ContactProblem, target: Target, diagonal: &[DPair]) -> Self {
         let law: Vec<OwnRow> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
         let invert = |(g, row): (&DPair, &OwnRow)| [1.0 / (g[0] + row.compliance), 1.0 / g[1]];
-        ScalarRows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law }
+        let lines = problem.lines(target);
+        ScalarRows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law, lines }
     }
 
     /// Normal impulse that would satisfy row `i` alone; NaN stays NaN, so that divergence shows.
@@ -82,8 +88,38 @@ impl ScalarRows {
     }
 }
 
-/// One Gauss–Seidel pass in the given order.
+/// One Gauss–Seidel pass over joints, then contacts; or the other way round, from last to first.
 pub(super) fn gauss_seidel(
+    problem: &ContactProblem,
+    rows: &ScalarRows,
+    reversed: bool,
+    impulses: &mut [DPair],
+    velocities: &mut [Velocity],
+) {
+    if reversed {
+        sweep_contacts(problem, rows, (0..problem.contacts.len()).rev(), impulses, velocities);
+        sweep_joints(problem, rows.lines.iter().rev(), impulses, velocities);
+    } else {
+        sweep_joints(problem, rows.lines.iter(), impulses, velocities);
+        sweep_contacts(problem, rows, 0..problem.contacts.len(), impulses, velocities);
+    }
+}
+
+fn sweep_joints<'a>(
+    problem: &ContactProblem,
+    lines: impl Iterator<Item = &'a BlockLine>,
+    impulses: &mut [DPair],
+    velocities: &mut [Velocity],
+) {
+    for line in lines {
+        let old = line.read(impulses);
+        let new = line.solution(line.velocity(velocities), old);
+        line.apply(problem, [0, 1, 2].map(|i| new[i] - old[i]), velocities);
+        line.write(new, impulses);
+    }
+}
+
+fn sweep_contacts(
     problem: &ContactProblem,
     rows: &ScalarRows,
     order: impl Iterator<Item = usize>,
@@ -121,13 +157,13 @@ pub(super) fn iterate(
     stop: Stop,
     mut step: impl FnMut(&mut Vec<DPair>, &mut Vec<Velocity>),
 ) -> IterativeRun {
-    let unit = problem.impulse_unit();
+    let (unit, measure) = (problem.impulse_unit(), Measure::new(problem, target));
     let mut impulses = start.to_vec();
     let mut history = Vec::new();
     loop {
         // Afresh from the impulses, so that rounding of millions of updates does not add up.
         let mut velocities = problem.velocities(&impulses);
-        let residual = natural_map(problem, target, &velocities, &impulses) / unit;
+        let residual = measure.natural_map(&velocities, &impulses) / unit;
         history.push(residual);
         let status = if residual <= stop.tolerance {
             Status::Converged
@@ -152,11 +188,10 @@ pub fn pgs(
     stop: Stop,
 ) -> IterativeRun {
     let rows = ScalarRows::new(problem, target);
-    let n = problem.contacts.len();
     iterate(problem, target, start, stop, |impulses, velocities| {
-        gauss_seidel(problem, &rows, 0..n, impulses, velocities);
+        gauss_seidel(problem, &rows, false, impulses, velocities);
         if sweep == SweepDirection::Symmetric {
-            gauss_seidel(problem, &rows, (0..n).rev(), impulses, velocities);
+            gauss_seidel(problem, &rows, true, impulses, velocities);
         }
     })
 }
@@ -182,8 +217,15 @@ pub fn jacobi(
         Splitting::Whole => problem.delassus_diagonal(),
         Splitting::Mass => split_diagonal(problem),
     };
-    let rows = ScalarRows::with_diagonal(problem, target, &diagonal);
+    let mut rows = ScalarRows::with_diagonal(problem, target, &diagonal);
+    if split == Splitting::Mass {
+        let share = shares(problem);
+        rows.lines.iter_mut().for_each(|line| line.split(problem, &share));
+    }
     iterate(problem, target, start, stop, |impulses, velocities| {
+        for line in &rows.lines {
+            line.write(line.solution(line.velocity(velocities), line.read(impulses)), impulses);
+        }
         for (i, c) in problem.contacts.iter().enumerate() {
             let [un, ut] = c.velocity(velocities);
             let normal = rows.normal(i, un, impulses[i][0]);
@@ -194,12 +236,7 @@ pub fn jacobi(
 
 /// ∑_sides k J_i M⁻¹ J_iᵀ with k the number of rows on that body: two per contact with friction.
 fn split_diagonal(problem: &ContactProblem) -> Vec<DPair> {
-    let mut count = vec![0.0; problem.bodies.len()];
-    for c in &problem.contacts {
-        for (body, _) in c.sides() {
-            count[body] += if c.friction > 0.0 { 2.0 } else { 1.0 };
-        }
-    }
+    let count = shares(problem);
     let mut diagonal = vec![[0.0; 2]; problem.contacts.len()];
     for (c, d) in problem.contacts.iter().zip(&mut diagonal) {
         for (body, block) in c.sides() {
@@ -212,6 +249,22 @@ fn split_diagonal(problem: &ContactProblem) -> Vec<DPair> {
         }
     }
     diagonal
+}
+
+/// Rows on each body: two per contact with friction, and all of its joints.
+fn shares(problem: &ContactProblem) -> Vec<f64> {
+    let mut count = vec![0.0; problem.bodies.len()];
+    for c in &problem.contacts {
+        for (body, _) in c.sides() {
+            count[body] += if c.friction > 0.0 { 2.0 } else { 1.0 };
+        }
+    }
+    for joint in &problem.joints {
+        for body in [joint.body_a, joint.body_b].into_iter().flatten() {
+            count[body as usize] += joint.rows().count() as f64;
+        }
+    }
+    count
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Validation of a contact problem.
 
+use super::joints::{BlockLaw, ProblemBlock, ProblemJoint, ROWS, inverted};
 use super::problem::ContactProblem;
 use crate::lab::error::Error;
 
 impl ContactProblem {
     /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
-    /// that every contact has a side that answers to impulses.
+    /// that every contact has a side that answers to impulses, and every block of a joint has rows that do.
     pub fn validate(&self) -> Result<(), Error> {
         // Names go into tables.
         require(!self.name.chars().any(char::is_control), "name", || {
@@ -52,9 +53,59 @@ impl ContactProblem {
                 format!("manifold {} has points of different bodies or normals", c.manifold)
             })?;
         }
+        for (i, joint) in self.joints.iter().enumerate() {
+            let place = || format!("joints[{i}]");
+            finite(place(), &joint.reach)?;
+            for body in [joint.body_a, joint.body_b].into_iter().flatten() {
+                require((body as usize) < self.bodies.len(), place(), || {
+                    format!("names body {body} of {}", self.bodies.len())
+                })?;
+            }
+            require(joint.body_a != joint.body_b, place(), || format!("both sides are {:?}", joint.body_a))?;
+            require(!joint.blocks.is_empty() && joint.blocks.len() <= BLOCKS, place(), || {
+                format!("has {} blocks, must have 1 to {BLOCKS}", joint.blocks.len())
+            })?;
+            for (k, block) in joint.blocks.iter().enumerate() {
+                self.validate_block(&format!("joints[{i}].blocks[{k}]"), joint, block)?;
+            }
+        }
         Ok(())
     }
+
+    fn validate_block(&self, place: &str, joint: &ProblemJoint, block: &ProblemBlock) -> Result<(), Error> {
+        let rows = block.rows.len();
+        require((1..=ROWS).contains(&rows), place, || format!("has {rows} rows, must have 1 to {ROWS}"))?;
+        for row in &block.rows {
+            finite(place, &[row.axis[0], row.axis[1], row.arm_a, row.arm_b, row.error, row.warm_impulse])?;
+            let length = row.axis[0].hypot(row.axis[1]);
+            // As normals.
+            require(row.is_angular() || (length - 1.0).abs() < 1e-5, place, || {
+                format!("the axis has length {length}, must be 1, or 0 of an angle")
+            })?;
+        }
+        let not_negative = |name: &str, value: f64| {
+            finite(place, &[value])?;
+            require(value >= 0.0, place, || format!("{name} is {value}, must be ≥ 0"))
+        };
+        match block.law {
+            BlockLaw::Rigid => {}
+            BlockLaw::Limit => require(rows == 1, place, || format!("a limit has {rows} rows, must have 1"))?,
+            BlockLaw::Motor { speed, .. } => finite(place, &[speed])?,
+            BlockLaw::Spring { stiffness, damping, .. } => {
+                not_negative("stiffness", stiffness)?;
+                not_negative("damping", damping)?;
+            }
+        }
+        block.law.cap().map_or(Ok(()), |cap| not_negative("cap", cap))?;
+        let inverse = inverted(self.block_response(joint, block), rows);
+        require(inverse.is_some(), place, || {
+            "its rows do not answer to impulses, or depend on each other".to_string()
+        })
+    }
 }
+
+/// Most blocks of a joint.
+pub const BLOCKS: usize = 6;
 
 fn require(ok: bool, place: impl Into<String>, message: impl FnOnce() -> String) -> Result<(), Error> {
     if ok { Ok(()) } else { Err(Error::invalid(place, message())) }

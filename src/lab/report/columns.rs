@@ -128,6 +128,34 @@ pub static STUDY: Sheet = Sheet {
         column("dissipation", "1", "largest gap to maximal dissipation, over (weight × step)²/mass"),
         column("own_residual_rms", "1", "residual of the solver's own law, rms, over weight × substep"),
         column("own_residual_max", "1", "the same, largest part"),
+        column(
+            "joint_gap_rms_m",
+            "m",
+            "gap of joints, root mean square over all of them and all steps; empty without joints",
+        ),
+        column("joint_gap_max_m", "m", "the same, largest"),
+        column("joint_lean_max_rad", "rad", "error of an angle that a joint holds, largest"),
+        column("joint_excess_max", "*", "violation of a joint's limits, largest (m or rad)"),
+        column(
+            "joint_residual_rms_lighter_weights",
+            "1",
+            "residual of the law of joints, in the weight of the lighter body × step",
+        ),
+        column("joint_residual_max_lighter_weights", "1", "the same, largest"),
+        column(
+            "joint_motor_miss_max",
+            "*",
+            "speed that a motor misses although its impulse is below its cap, largest (m/s or rad/s)",
+        ),
+        column("joint_motor_load_max", "1", "impulse of a motor ÷ its cap, largest"),
+        column(
+            "joint_work",
+            "1",
+            "energy given by springs, motors and driven bodies through joints, relative",
+        ),
+        column("joint_spring_work", "1", "energy given by springs, relative"),
+        column("joint_motor_work", "1", "energy given by motors, relative"),
+        column("joint_limit_work", "1", "energy given by limits, relative; negative where bodies hit them"),
         column("momentum", "1", "momentum out of balance, relative"),
         column("angular_momentum", "1", "angular momentum out of balance, relative"),
         column("energy_change", "1", "energy gained (positive) or lost over the run, relative"),
@@ -281,8 +309,43 @@ pub static CONTACTS: Sheet = Sheet {
     ],
 };
 
+/// Columns of `run --joints`.
+pub static JOINTS: Sheet = Sheet {
+    file: "FILE of run --joints",
+    command: "simpulse run --joints FILE",
+    line: "a joint after a step",
+    columns: &[
+        column("step", "", "step, from 1"),
+        column("joint", "", "index in the scene, from 0"),
+        column("type", "", "as in files: revolute, prismatic, …"),
+        column("body_a", "", "index of the first body"),
+        column("body_b", "", "index of the second body"),
+        column("gap", "m", "size of the error of what is held along lines"),
+        column("lean", "rad", "error of the angle, where it is held"),
+        column("angle", "rad", "of b against a, whole turns included"),
+        column("translation", "m", "of b's anchor along the axis, or distance of the anchors"),
+        column("excess", "*", "beyond limits (m or rad)"),
+        column(
+            "rigid_1",
+            "N s",
+            "impulse on body b over the step: of the first rigid row along a line; empty if there is none",
+        ),
+        column("rigid_2", "N s", "the same of the second: x and y of the world, or across the axis"),
+        column("rigid_angle", "N m s", "the same of the angle that is held"),
+        column("spring_1", "N s", "the same of a spring: of x, or along the axis"),
+        column("spring_2", "N s", "the same of y"),
+        column("spring_angle", "N m s", "the same of the angle"),
+        column("motor", "*", "the same of the motor (N s or N m s)"),
+        column("lower", "*", "the same of the lower limit, ≥ 0 (N s or N m s)"),
+        column("upper", "*", "the same of the upper limit, which acts the other way, ≥ 0"),
+        column("force", "N", "force of the last substep"),
+        column("torque", "N m", "torque of the last substep"),
+        column("breaks", "", "whether they exceed the break load"),
+    ],
+};
+
 /// All of them.
-pub static SHEETS: [&Sheet; 5] = [&STUDY, &CONVERGE, &GROWTH, &STATE, &CONTACTS];
+pub static SHEETS: [&Sheet; 6] = [&STUDY, &CONVERGE, &GROWTH, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
     /// The names, in their order.

@@ -79,7 +79,10 @@ fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
         contact(Some(0), Some(1), [1.0, 0.0], top, mirrored(top), 1.0, 2),
     ];
     let loads = [top, mirrored(top)].map(|top| [0.0, -(1.0 + extra) * G, -extra * G * top[0]]);
-    (ContactProblem { name: "cards".into(), h: 1.0, bodies: vec![body; 2], contacts }, loads.to_vec())
+    (
+        ContactProblem { name: "cards".into(), h: 1.0, bodies: vec![body; 2], contacts, joints: vec![] },
+        loads.to_vec(),
+    )
 }
 
 /// Half length and half thickness of a simulated card (m): long, so that overlap hardly changes its angle.

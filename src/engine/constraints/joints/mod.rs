@@ -94,6 +94,8 @@ pub struct Joints<T: JointType> {
     angles: Vec<f32>,
     /// Of the step; empty unless asked for. `[joints]`
     booked: Vec<Booked>,
+    /// Sums of `kept` over the substeps of the step; empty unless asked for. `[joints × kept]`
+    summed: Vec<f32>,
     /// Substep that the impulses belong to (s).
     h: f32,
 }
@@ -103,7 +105,8 @@ impl<T: JointType> Joints<T> {
     /// to (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, booked: vec![], h }
+        let (booked, summed) = (vec![], vec![]);
+        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, booked, summed, h }
     }
 
     /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
@@ -200,7 +203,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Adds Jᵀ λ of each joint, which is what a warm start gives to bodies of unit mass and inertia at rest.
+    /// Adds λ, and Jᵀ λ of each joint, which is what a warm start gives to bodies of unit mass and inertia at rest.
     fn book<L: Lanes>(&mut self, on: TypeInput<'_>) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
         for i in 0..on.batches.visits().len() {
@@ -219,6 +222,11 @@ impl<T: JointType> Joints<T> {
                 });
                 let (numbers, kept) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
+                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+                    let sums = &mut self.summed[joint as usize * kept.len()..][..kept.len()];
+                    let of_lane = bytemuck::cast_slice::<L, f32>(kept).chunks_exact(L::WIDTH);
+                    sums.iter_mut().zip(of_lane).for_each(|(sum, kept)| *sum += kept[lane]);
+                }
                 for driving in [false, true] {
                     let mut pass = JointWarmStart { pair: JointPair::new(bodies, anchors), driving };
                     rows_once::<T, L>(self.form, numbers, kept, &mut pass);
@@ -330,8 +338,8 @@ impl<T: JointType> Joints<T> {
 }
 
 impl<T: JointType> Joints<T> {
-    /// States the rows of one joint, in one lane, to a pass over `blocks`.
-    fn state(&mut self, joint: usize, Placed { rows, poses }: Placed<'_>, blocks: Blocks<'_>) {
+    /// States the rows of one joint, in one lane, to a pass over `blocks`; `booked`: with the impulses of the step.
+    fn state(&mut self, joint: usize, Placed { rows, poses }: Placed<'_>, blocks: Blocks<'_>, booked: bool) {
         let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
         let [a, b] = names.map(|body| body as usize);
@@ -346,8 +354,8 @@ impl<T: JointType> Joints<T> {
         let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
         let pair = JointPair::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
-        let (numbers, kept) =
-            (&self.numbers[joint * numbers..][..numbers], &mut self.kept[joint * kept..][..kept]);
+        let numbers = &self.numbers[joint * numbers..][..numbers];
+        let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
         rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
     }
 }
@@ -378,6 +386,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn begin(&mut self, bodies: &Bodies, h: f32) {
         self.booked.clear();
+        self.summed.clear();
         if self.h != h {
             // The forces stay the same.
             let factor = if self.h > 0.0 { h / self.h } else { 1.0 };
@@ -405,6 +414,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
             (_, PassMode::Forget) => at_width!(width, Self::forget(self, on)),
             (_, PassMode::Book) => {
                 self.booked.resize(self.joints.len(), Booked::default());
+                self.summed.resize(self.kept.len(), 0.0);
                 at_width!(width, Self::book(self, on));
             }
             (Phase::Prepare, _) => at_width!(width, Self::fill(self, on)),
@@ -436,11 +446,16 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
-        self.state(constraint, on, Blocks::To(to));
+        self.state(constraint, on, Blocks::To(to), false);
     }
 
     fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
-        self.state(constraint, on, Blocks::From(blocks.iter()));
+        self.state(constraint, on, Blocks::From(blocks.iter()), false);
+    }
+
+    fn collect_booked(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
+        self.summed.resize(self.kept.len(), 0.0);
+        self.state(constraint, on, Blocks::To(to), true);
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {
@@ -462,6 +477,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
             + held(&self.anchors)
             + held(&self.numbers)
             + held(&self.kept)
+            + held(&self.summed)
             + held(&self.angles)
     }
 

@@ -5,6 +5,7 @@
 //! measured against a law that it does not solve. Nothing is observed unless
 //! [`crate::engine::constraints::step::Workspace::observe`] is set; a step then costs one branch per sweep.
 
+use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::kernels::velocity::sweep::VelocitySweep;
 use crate::engine::lanes::BodyRow;
 use std::fmt;
@@ -17,11 +18,18 @@ pub struct ObservedRule {
     /// How far each row's body had moved since the step began: Δx, Δy (m), Δθ (rad); the fourth
     /// is not a motion. `[rows]`
     pub deltas: Vec<[f32; 4]>,
+    /// The rule for rigid rows of joints.
+    pub joints: Softness,
 }
 
 impl Clone for ObservedRule {
     fn clone(&self) -> Self {
-        ObservedRule { sweep: self.sweep.boxed(), friction: self.friction, deltas: self.deltas.clone() }
+        ObservedRule {
+            sweep: self.sweep.boxed(),
+            friction: self.friction,
+            deltas: self.deltas.clone(),
+            joints: self.joints,
+        }
     }
 }
 
@@ -53,6 +61,7 @@ impl ObservedRule {
             sweep: sweep.boxed(),
             friction: sweep.has_friction(),
             deltas: rows.iter().map(|row| row.delta).collect(),
+            joints: sweep.law_of(),
         }
     }
 

@@ -179,6 +179,9 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
         None
     }
 
+    /// As [`Self::collect`], with the impulses of the whole last step, where they were recorded ([`PassMode::Book`]); else zeros.
+    fn collect_booked(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
+
     /// Angle of a constraint's bodies, counted on from turn to turn (rad).
     fn angle(&self, _constraint: usize) -> f32 {
         0.0

@@ -21,6 +21,9 @@
 //! A is scaled by S = 1/√G_ii on both sides of impulse rows and by the inverse on σ: G gets a unit
 //! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn). q is divided by its largest
 //! entry, which gives tolerances a meaning: the problem is homogeneous in (z, q).
+//!
+//! A row with bounds of its own, |λ| ≤ c, is a tangential row whose µ λn is the number c: the last line becomes
+//! 0 ≤ σ ⊥ c − β⁺ − β⁻ ≥ 0. A row with λ ≥ 0 is a point without friction.
 
 use crate::engine::constraints::numerics::lemke::{LemkeOutcome, lemke};
 use crate::engine::constraints::numerics::matrix::Matrix;
@@ -37,8 +40,8 @@ pub struct CoulombLcp {
     unit: f64,
     /// 1/√G_ii
     scale: Vec<DPair>,
-    /// The points that have friction.
-    frictional: Vec<usize>,
+    /// Rows of G that have two sides: tangential ones of points with friction, then those with bounds of their own.
+    bounded: Vec<usize>,
 }
 
 impl CoulombLcp {
@@ -50,56 +53,75 @@ impl CoulombLcp {
         free: &[DPair],
         g: impl Fn(usize, usize) -> f64,
     ) -> Self {
-        let frictional: Vec<usize> = (0..friction.len()).filter(|&i| friction[i] > 0.0).collect();
-        let (points, nf) = (friction.len(), frictional.len());
-        let n = points + 3 * nf;
+        Self::with_caps(friction, &[], diagonal, free, g)
+    }
+
+    /// The same with rows of |λ| ≤ `caps` (N·s) behind those of points: each has a row of G, and a pair of `diagonal` and `free`
+    /// for two of them.
+    pub fn with_caps(
+        friction: &[f64],
+        caps: &[f64],
+        diagonal: &[DPair],
+        free: &[DPair],
+        g: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let points = friction.len();
+        let frictional: Vec<usize> = (0..points).filter(|&i| friction[i] > 0.0).collect();
+        let of_points = frictional.iter().map(|i| 2 * i + 1);
+        let bounded: Vec<usize> = of_points.chain((0..caps.len()).map(|k| 2 * points + k)).collect();
+        let sided = bounded.len();
+        let n = points + 3 * sided;
         let scale: Vec<DPair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
-        // Normal rows of all points; then β⁺ and β⁻ of each that has friction; then σ.
-        // An impulse row is a (point, direction, sign); a σ row has none.
+        // Normal rows of all points; then β⁺ and β⁻ of each row with two sides; then σ.
+        // An impulse row is a row of G and a sign; a σ row has none.
         let impulse_row = |row: usize| {
             if row < points {
-                Some((row, 0, 1.0))
-            } else if row < points + 2 * nf {
+                Some((2 * row, 1.0))
+            } else if row < points + 2 * sided {
                 let k = row - points;
-                Some((frictional[k / 2], 1, if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
+                Some((bounded[k / 2], if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
             } else {
                 None
             }
         };
-        let slip = |k: usize| points + 2 * nf + k;
+        let scaled = |row: usize| scale[row / 2][row % 2];
+        let slip = |k: usize| points + 2 * sided + k;
         let mut a = Matrix::from_fn(n, n, |row, column| match (impulse_row(row), impulse_row(column)) {
-            (Some((i, di, si)), Some((j, dj, sj))) => {
-                si * sj * g(2 * i + di, 2 * j + dj) * scale[i][di] * scale[j][dj]
-            }
+            (Some((i, si)), Some((j, sj))) => si * sj * g(i, j) * scaled(i) * scaled(j),
             _ => 0.0,
         });
         let mut q = vec![0.0; n];
-        for (row, q) in q.iter_mut().enumerate().take(points + 2 * nf) {
-            if let Some((i, direction, sign)) = impulse_row(row) {
-                *q = sign * scale[i][direction] * free[i][direction];
+        for (row, q) in q.iter_mut().enumerate().take(points + 2 * sided) {
+            if let Some((i, sign)) = impulse_row(row) {
+                *q = sign * scaled(i) * free[i / 2][i % 2];
             }
         }
-        for (k, &i) in frictional.iter().enumerate() {
+        for (k, &i) in bounded.iter().enumerate() {
             for beta in [points + 2 * k, points + 2 * k + 1] {
                 a[(beta, slip(k))] = 1.0;
                 a[(slip(k), beta)] = -1.0;
             }
-            a[(slip(k), i)] = friction[i] * scale[i][0] / scale[i][1];
+            if let Some(&point) = frictional.get(k) {
+                a[(slip(k), point)] = friction[point] * scale[point][0] / scale[point][1];
+            } else {
+                q[slip(k)] = caps[k - frictional.len()] / scaled(i);
+            }
         }
-        let unit = q.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        // Caps may be as good as infinite.
+        let unit = q[..points + 2 * sided].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         if unit > 0.0 {
             q.iter_mut().for_each(|x| *x /= unit);
         }
-        CoulombLcp { a, q, unit, scale, frictional }
+        CoulombLcp { a, q, unit, scale, bounded }
     }
 
-    /// Rows: one of each point, and three more of each with friction.
+    /// Rows: one of each point, and three more of each with friction; three of each row with a cap.
     pub fn rows(&self) -> usize {
         self.q.len()
     }
 
     /// (λn, λt) of all points (N·s) by Lemke's method with this covering vector, by at most `pivots` pivots, or
-    /// why there is no answer.
+    /// why there is no answer. Behind them are the rows with caps, two in a pair.
     ///
     /// # Panics
     /// If `covering` is not [`Self::rows`] long.
@@ -108,10 +130,12 @@ impl CoulombLcp {
             LemkeOutcome::Solution(z) => z,
             other => return Err(other),
         };
-        let (scale, unit, points) = (&self.scale, self.unit, self.scale.len());
-        let mut impulses: Vec<DPair> = (0..points).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
-        for (k, &i) in self.frictional.iter().enumerate() {
-            impulses[i][1] = unit * scale[i][1] * (z[points + 2 * k] - z[points + 2 * k + 1]);
+        let (scale, unit) = (&self.scale, self.unit);
+        let points = self.rows() - 3 * self.bounded.len();
+        let normal = |i: usize| if i < points { unit * scale[i][0] * z[i] } else { 0.0 };
+        let mut impulses: Vec<DPair> = (0..scale.len()).map(|i| [normal(i), 0.0]).collect();
+        for (k, &i) in self.bounded.iter().enumerate() {
+            impulses[i / 2][i % 2] = unit * scale[i / 2][i % 2] * (z[points + 2 * k] - z[points + 2 * k + 1]);
         }
         Ok(impulses)
     }
@@ -134,6 +158,16 @@ mod tests {
         for (along, tangent) in [(1.0, -2.0), (-1.0, 2.0), (2.0, -3.0), (-4.0, 3.0)] {
             let [normal, found] = pushed(along);
             assert!((normal - 6.0).abs() < 1e-14 && (found - tangent).abs() < 1e-14, "{along}: {found}");
+        }
+    }
+
+    /// A mass of 2 kg that moves at 3 m/s against a brake of `cap` N·s: it stops, or the brake slips.
+    #[test]
+    fn a_row_with_a_cap_holds_up_to_it() {
+        for (cap, impulse) in [(10.0, -6.0), (6.5, -6.0), (2.0, -2.0), (0.0, 0.0), (1e12, -6.0)] {
+            let law = CoulombLcp::with_caps(&[], &[cap], &[[0.5, 1.0]], &[[3.0, 0.0]], |_, _| 0.5);
+            assert_eq!(law.rows(), 3);
+            assert_eq!(law.solve(&[1.0; 3], 100).unwrap(), [[impulse, 0.0]]);
         }
     }
 

@@ -1,0 +1,221 @@
+//! Joints of a frozen problem as a joint type of the simulation: their rows are the frozen ones.
+//!
+//! Axes and arms stay those of the start of the step, and an error changes by J times what bodies have moved: where a
+//! solver moves bodies and solves again, the rows are those of the tangent.
+
+use crate::engine::bodies::Bodies;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::engine::constraints::joints::{JointType, Joints, Placing};
+use crate::engine::constraints::kernels::types::Joined;
+use crate::engine::lanes::Lanes;
+use crate::lab::error::Error;
+use crate::lab::reference::validate::BLOCKS;
+use crate::lab::reference::{BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemJoint};
+
+/// Which blocks a joint has: rows of each, and its law.
+type Blocks = [Option<(usize, LawForm)>; BLOCKS];
+
+/// A law without its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LawForm {
+    Rigid,
+    Limit,
+    Motor,
+    Spring,
+    CappedSpring,
+}
+
+/// Numbers of a row: axis, arms and error.
+const ROW: usize = 5;
+
+impl LawForm {
+    fn of(law: &BlockLaw) -> Self {
+        match law {
+            BlockLaw::Rigid => LawForm::Rigid,
+            BlockLaw::Limit => LawForm::Limit,
+            BlockLaw::Motor { .. } => LawForm::Motor,
+            BlockLaw::Spring { cap: None, .. } => LawForm::Spring,
+            BlockLaw::Spring { cap: Some(_), .. } => LawForm::CappedSpring,
+        }
+    }
+
+    const fn numbers(self) -> usize {
+        match self {
+            LawForm::Rigid | LawForm::Limit => 0,
+            LawForm::Motor | LawForm::Spring => 2,
+            LawForm::CappedSpring => 3,
+        }
+    }
+
+    /// Kept per row: the impulse, and the error of a spring.
+    const fn kept(self) -> usize {
+        match self {
+            LawForm::Rigid | LawForm::Limit | LawForm::Motor => 1,
+            LawForm::Spring | LawForm::CappedSpring => 2,
+        }
+    }
+
+    fn law<L: Lanes>(self, numbers: &[L]) -> RowLaw<L> {
+        match self {
+            LawForm::Rigid => RowLaw::Rigid,
+            LawForm::Limit => RowLaw::Limit,
+            LawForm::Motor => RowLaw::Motor { speed: numbers[0], cap: numbers[1] },
+            LawForm::Spring => RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: None },
+            LawForm::CappedSpring => {
+                RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) }
+            }
+        }
+    }
+}
+
+/// A joint of a problem.
+#[derive(Clone, Debug)]
+struct FrozenJoint {
+    reach: DPair,
+    numbers: Vec<f32>,
+}
+
+fn form(joint: &ProblemJoint) -> Blocks {
+    let mut form = [None; BLOCKS];
+    for (form, block) in form.iter_mut().zip(&joint.blocks) {
+        *form = Some((block.rows.len(), LawForm::of(&block.law)));
+    }
+    form
+}
+
+/// Numbers of a block.
+fn numbers(block: &ProblemBlock) -> Vec<f32> {
+    let rows = block.rows.iter().flat_map(|row| [row.axis[0], row.axis[1], row.arm_a, row.arm_b, row.error]);
+    let law = match block.law {
+        BlockLaw::Rigid | BlockLaw::Limit => [None; 3],
+        BlockLaw::Motor { speed, cap } => [Some(speed), Some(cap), None],
+        BlockLaw::Spring { stiffness, damping, cap } => [Some(stiffness), Some(damping), cap],
+    };
+    rows.chain(law.into_iter().flatten()).map(|x| x as f32).collect()
+}
+
+impl JointType for FrozenJoint {
+    type Form = Blocks;
+
+    /// Their lengths are all that is known of them.
+    fn anchors(&self) -> [[f64; 2]; 2] {
+        self.reach.map(|reach| [reach, 0.0])
+    }
+
+    fn numbers(form: Blocks) -> usize {
+        form.into_iter().flatten().map(|(rows, law)| ROW * rows + law.numbers()).sum()
+    }
+
+    fn kept(form: Blocks) -> usize {
+        form.into_iter().flatten().map(|(rows, law)| rows * law.kept()).sum()
+    }
+
+    fn place(&self, _: Blocks, _: Placing<'_>, numbers: &mut [f32]) {
+        numbers.copy_from_slice(&self.numbers);
+    }
+
+    #[inline(always)]
+    fn rows<L: Lanes>(form: Blocks, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
+        let (mut numbers, mut kept) = (numbers, kept);
+        for (rows, law) in form.into_iter().flatten() {
+            let (of_block, others) = numbers.split_at(ROW * rows + law.numbers());
+            let (impulses, rest) = kept.split_at_mut(rows * law.kept());
+            (numbers, kept) = (others, rest);
+            match rows {
+                1 => block::<L, 1>(law, of_block, impulses, on),
+                2 => block::<L, 2>(law, of_block, impulses, on),
+                _ => block::<L, 3>(law, of_block, impulses, on),
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn block<L: Lanes, const N: usize>(law: LawForm, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
+    let row = |i: usize| &numbers[ROW * i..][..ROW];
+    let j: [Jacobian<L>; N] = std::array::from_fn(|i| {
+        let row = row(i);
+        Jacobian { axis: [row[0], row[1]], arms: [row[2], row[3]] }
+    });
+    let error = std::array::from_fn(|i| row(i)[4] + on.travel(&j[i]));
+    on.block(j, error, law.law(&numbers[ROW * N..]), kept);
+}
+
+/// The joints of a problem in groups that are solved together, and where each went: its group, and its place there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FrozenJoints {
+    /// The groups, with warm impulses or without.
+    pub groups: [Vec<Joined>; 2],
+    places: Vec<(usize, usize)>,
+}
+
+impl FrozenJoints {
+    /// Joints in this `order`, static sides on body `ground`. `h`: the step (s). Errors: a number beyond `f32`.
+    pub fn new(
+        problem: &ContactProblem,
+        order: &[u32],
+        bodies: &Bodies,
+        ground: u32,
+        h: f32,
+    ) -> Result<Self, Error> {
+        let mut groups: [Vec<Joints<FrozenJoint>>; 2] = [Vec::new(), Vec::new()];
+        let mut keys = Vec::new();
+        let mut places = vec![(0, 0); problem.joints.len()];
+        for &number in order {
+            let joint = &problem.joints[number as usize];
+            let ends = [joint.body_a, joint.body_b].map(|body| body.unwrap_or(ground));
+            let key = (form(joint), !bodies.is_dynamic(ends[1] as usize));
+            let group = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
+                keys.push(key);
+                groups.iter_mut().for_each(|groups| groups.push(Joints::new(key.0, key.1, h)));
+                keys.len() - 1
+            });
+            let numbers: Vec<f32> = joint.blocks.iter().flat_map(numbers).collect();
+            let warm: Vec<f32> = joint.blocks.iter().flat_map(warm_impulses).collect();
+            let reach = joint.reach.map(|reach| reach as f32);
+            if !numbers.iter().chain(&warm).chain(&reach).all(|x| x.is_finite()) {
+                return Err(Error::invalid(
+                    format!("joints[{number}]"),
+                    "a number is out of the range of f32",
+                ));
+            }
+            let frozen = FrozenJoint { reach: joint.reach, numbers };
+            for (groups, kept) in groups.iter_mut().zip([&warm[..], &[]]) {
+                groups[group].push(frozen.clone(), bodies, ends, kept, 0.0);
+            }
+            places[number as usize] = (group, groups[0][group].joints.len() - 1);
+        }
+        let groups = groups.map(|groups| {
+            let joined = |group| {
+                let mut joined = Joined::new(Box::new(group));
+                joined.kind.begin(bodies, h);
+                joined
+            };
+            groups.into_iter().map(joined).collect()
+        });
+        Ok(FrozenJoints { groups, places })
+    }
+
+    /// (λ, 0) of every row, in the order of the problem (N·s or N·m·s).
+    pub fn impulses<'a>(
+        &'a self,
+        problem: &'a ContactProblem,
+        groups: &'a [Joined],
+    ) -> impl Iterator<Item = DPair> + 'a {
+        problem.joints.iter().zip(&self.places).flat_map(move |(joint, &(group, place))| {
+            let kept = groups[group].kind.impulses(place);
+            let mut next = 0;
+            joint.blocks.iter().flat_map(move |block| {
+                let (first, rows) = (next, block.rows.len());
+                next += rows * LawForm::of(&block.law).kept();
+                kept[first..first + rows].iter().map(|&impulse| [f64::from(impulse), 0.0])
+            })
+        })
+    }
+}
+
+/// What a block keeps at the start of a warm step.
+fn warm_impulses(block: &ProblemBlock) -> impl Iterator<Item = f32> {
+    let errors = (LawForm::of(&block.law).kept() - 1) * block.rows.len();
+    block.rows.iter().map(|row| row.warm_impulse as f32).chain(std::iter::repeat_n(0.0, errors))
+}

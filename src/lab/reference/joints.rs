@@ -1,0 +1,775 @@
+//! Joints of a problem: rows in blocks, the law of a block, and how far impulses are from it.
+//!
+//! # Rows
+//!
+//! A row has the error C (m or rad) and the Jacobian J of its rate, as `engine::constraints::joints::rows` states them:
+//!
+//! ```text
+//! J v = d·(v_b − v_a) + s_b ω_b − s_a ω_a
+//! ```
+//!
+//! Rows of a block are solved together, K = J M⁻¹ Jᵀ. Vectors of impulses have the pairs (λn, λt) of contacts first,
+//! then a pair (λ, 0) for every row.
+//!
+//! # Laws
+//!
+//! Over a step of h, with v⁺ at its end:
+//!
+//! ```text
+//! rigid    J v⁺ = 0                             an error that is there stays, as overlap does
+//! limit    0 ≤ λ ⊥ J v⁺ + max(C, 0)/h ≥ 0       may close within the step, and no more
+//! motor    λ = Π(λ − ρ (J v⁺ − u)),  |λ| ≤ F h
+//! spring   λ = Π(−K⁻¹ (S C + D J v⁺)),  |λ| ≤ F h where it is bounded
+//! ```
+//!
+//! Π is the projection on the bounds: the nearest impulse whose norm over the block is within the cap. For a single row all of
+//! them are J v + b + R λ = 0 on the box [lo, hi], with b = max(C, 0)/h, −u or (S/D) C, and R = K/D of springs.
+//!
+//! # Residual
+//!
+//! Every law is the fixed point of a line,
+//!
+//! ```text
+//! λ = Π(y),   y = α λ − K⁻¹ (c + q J v⁺)
+//!
+//! rigid, limit   α = q = 1/(1 + σ)   c = b/(1 + σ)      σ K: softness of a solver's own law; 0 of the rigid law
+//! motor          α = q = 1           c = −u
+//! spring         α = q = D/(1 + D)   c = S C/(1 + D)
+//! ```
+//!
+//! which is the exact solution of the block alone. The residual r = λ − Π(y) is therefore the natural map with ρ = 1/(K + R)
+//! of the block: what one exact sweep over it would change, as for contacts. For the spring: its fixed point inside the bounds
+//! is (1 − α) λ = −K⁻¹ (c + q J v), the law times 1/(1 + D); on the bound y = (D λ + f)/(1 + D) with f = −K⁻¹(S C + D J v)
+//! points along λ and is no shorter exactly if f does and is not, so λ = Π(f).
+//!
+//! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of mass that has
+//! the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2: so N·s for all rows.
+
+use super::problem::{ContactProblem, DPair, Velocity};
+use super::residual::{OwnRow, Target, positive};
+use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::records::rows::RowLaw;
+use serde::{Deserialize, Serialize};
+
+/// Rows of the largest block.
+pub const ROWS: usize = 3;
+/// Numbers of the rows of a block; those of absent rows are zero.
+pub type RowVector = [f64; ROWS];
+/// A spring that is damped less than this (1) pushes as its error says, whatever its velocity is.
+pub(super) const UNDAMPED: f64 = 1e-12;
+
+/// A joint of a problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemJoint {
+    /// Body a; none if that side is static.
+    pub body_a: Option<u32>,
+    /// Body b; none if that side is static.
+    pub body_b: Option<u32>,
+    /// Lengths of the arms from the centers of mass of a and b to the anchors (m).
+    pub reach: DPair,
+    /// Its blocks, in the order in which they are solved.
+    pub blocks: Vec<ProblemBlock>,
+}
+
+/// Rows of a joint that are solved together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemBlock {
+    /// The law of all of them.
+    pub law: BlockLaw,
+    /// One to three rows.
+    pub rows: Vec<ProblemRow>,
+}
+
+/// The law of a block; see the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum BlockLaw {
+    /// C = 0.
+    Rigid,
+    /// C ≥ 0, of one row.
+    Limit,
+    /// J v = u.
+    Motor {
+        /// u (m/s or rad/s)
+        speed: f64,
+        /// F h (N·s or N·m·s)
+        cap: f64,
+    },
+    /// A spring.
+    Spring {
+        /// S (1/s)
+        stiffness: f64,
+        /// D (1)
+        damping: f64,
+        /// F h (N·s or N·m·s), if it is bounded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cap: Option<f64>,
+    },
+}
+
+impl From<RowLaw<f32>> for BlockLaw {
+    fn from(law: RowLaw<f32>) -> Self {
+        match law {
+            RowLaw::Rigid => BlockLaw::Rigid,
+            RowLaw::Limit => BlockLaw::Limit,
+            RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
+            RowLaw::Spring { stiffness, damping, cap } => {
+                let cap = cap.map(f64::from);
+                BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap }
+            }
+        }
+    }
+}
+
+impl BlockLaw {
+    /// Greatest norm of its impulses, where there is one.
+    pub fn cap(&self) -> Option<f64> {
+        match *self {
+            BlockLaw::Motor { cap, .. } => Some(cap),
+            BlockLaw::Spring { cap, .. } => cap,
+            BlockLaw::Rigid | BlockLaw::Limit => None,
+        }
+    }
+}
+
+/// A row of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemRow {
+    /// d: a unit vector, or zero for an angle.
+    pub axis: [f64; 2],
+    /// s_a: r_a × d (m), or 1 for an angle.
+    pub arm_a: f64,
+    /// s_b: the same of b.
+    pub arm_b: f64,
+    /// C at the start of the step (m or rad).
+    pub error: f64,
+    /// Impulse that a warm-started solver begins with (N·s or N·m·s).
+    pub warm_impulse: f64,
+}
+
+impl ProblemRow {
+    /// Whether it is a row of an angle.
+    pub fn is_angular(&self) -> bool {
+        self.axis == [0.0; 2]
+    }
+}
+
+impl ProblemJoint {
+    /// Rows of all its blocks.
+    pub fn rows(&self) -> impl Iterator<Item = &ProblemRow> {
+        self.blocks.iter().flat_map(|block| &block.rows)
+    }
+
+    /// A revolute joint whose anchors meet: `r` from the centers of mass to the point (m).
+    pub fn revolute(bodies: [Option<u32>; 2], r: [[f64; 2]; 2]) -> Self {
+        let arm = |k: usize, d: [f64; 2]| bodies[k].map_or(0.0, |_| r[k][0] * d[1] - r[k][1] * d[0]);
+        let row = |axis| ProblemRow {
+            axis,
+            arm_a: arm(0, axis),
+            arm_b: arm(1, axis),
+            error: 0.0,
+            warm_impulse: 0.0,
+        };
+        let [body_a, body_b] = bodies;
+        let rows = vec![row([1.0, 0.0]), row([0.0, 1.0])];
+        let reach = [0, 1].map(|k| bodies[k].map_or(0.0, |_| r[k][0].hypot(r[k][1])));
+        ProblemJoint { body_a, body_b, reach, blocks: vec![ProblemBlock { law: BlockLaw::Rigid, rows }] }
+    }
+}
+
+/// Bounds of the impulses of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Bound {
+    None,
+    /// λ ≥ 0
+    Positive,
+    /// Greatest norm.
+    Cap(f64),
+}
+
+impl Bound {
+    /// Whether impulses are off the bound, so that they answer to velocities.
+    pub fn is_inside(self, y: RowVector) -> bool {
+        match self {
+            Bound::None => true,
+            Bound::Positive => y[0] > 0.0,
+            Bound::Cap(cap) => y.iter().map(|y| y * y).sum::<f64>().sqrt() < cap,
+        }
+    }
+
+    /// Π; NaN stays NaN.
+    pub fn project(self, mut y: RowVector) -> RowVector {
+        match self {
+            Bound::None => {}
+            Bound::Positive => y[0] = positive(y[0]),
+            Bound::Cap(cap) => {
+                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+                if norm > cap {
+                    y = y.map(|y| y * (cap / norm));
+                }
+            }
+        }
+        y
+    }
+}
+
+/// The law of a block as a line in the velocity; see the [module](self).
+#[derive(Clone, Debug)]
+pub struct LawLine {
+    /// Rows.
+    pub size: usize,
+    /// K
+    pub(super) response: [RowVector; ROWS],
+    /// K⁻¹
+    inverse: [RowVector; ROWS],
+    /// P of [`Self::solution`], K⁻¹ at first.
+    step: [RowVector; ROWS],
+    /// α = q
+    alpha: f64,
+    offset: RowVector,
+    pub(super) bound: Bound,
+}
+
+impl LawLine {
+    /// The line of `law` for `size` rows with these errors, in a block of response K. `own`: right-hand sides of rigid rows and
+    /// limits.
+    pub fn new(
+        law: BlockLaw,
+        size: usize,
+        errors: RowVector,
+        own: [OwnRow; ROWS],
+        response: [RowVector; ROWS],
+    ) -> Self {
+        let alpha = match law {
+            BlockLaw::Rigid | BlockLaw::Limit => 1.0 / (1.0 + own[0].compliance),
+            BlockLaw::Motor { .. } => 1.0,
+            BlockLaw::Spring { damping, .. } => damping / (1.0 + damping),
+        };
+        let mut offset = [0.0; ROWS];
+        for (i, offset) in offset.iter_mut().enumerate().take(size) {
+            *offset = match law {
+                BlockLaw::Rigid | BlockLaw::Limit => alpha * own[i].bias,
+                BlockLaw::Motor { speed, .. } => -speed,
+                BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * errors[i],
+            };
+        }
+        let bound = match (law, law.cap()) {
+            (BlockLaw::Limit, _) => Bound::Positive,
+            (_, Some(cap)) => Bound::Cap(cap),
+            (_, None) => Bound::None,
+        };
+        let inverse = inverted(response, size).unwrap_or_default();
+        LawLine { size, response, inverse, step: inverse, alpha, offset, bound }
+    }
+
+    /// K⁻¹ x
+    fn solved(&self, x: RowVector) -> RowVector {
+        product(&self.inverse, x)
+    }
+
+    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
+    /// with impulses `l`.
+    pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
+        let soft = product(&self.response, l);
+        let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
+        let x = product(&self.step, f);
+        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+    }
+
+    /// Impulses of a spring whose force does not depend on the velocity.
+    pub(super) fn fixed(&self) -> Option<RowVector> {
+        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
+    }
+
+    /// b of J v + b + R λ = 0 (m/s or rad/s).
+    pub(super) fn bias(&self) -> RowVector {
+        self.offset.map(|c| c / self.alpha)
+    }
+
+    /// R = `softness` K (1).
+    pub(super) fn softness(&self) -> f64 {
+        (1.0 - self.alpha) / self.alpha
+    }
+}
+
+/// A block with everything that does not change with impulses.
+#[derive(Clone, Debug)]
+pub(super) struct BlockLine {
+    line: LawLine,
+    /// Place of its first row in vectors of impulses.
+    pub first: usize,
+    /// Bodies that are not static, with their part of J, sign included.
+    pub sides: Vec<(usize, [Velocity; ROWS])>,
+    /// Impulses to N·s (1, or 1/m of angular rows).
+    pub scale: RowVector,
+}
+
+impl std::ops::Deref for BlockLine {
+    type Target = LawLine;
+
+    fn deref(&self) -> &LawLine {
+        &self.line
+    }
+}
+
+/// What an impulse of a row counts in N·s, by the sum of both inverse masses (1/kg): 1, or √(K m) of an angle (1/m).
+pub fn row_scale(is_angular: bool, response: f64, inv_mass: f64) -> f64 {
+    if is_angular && inv_mass > 0.0 { (response / inv_mass).sqrt() } else { 1.0 }
+}
+
+impl BlockLine {
+    fn new(
+        problem: &ContactProblem,
+        target: Target,
+        joint: &ProblemJoint,
+        block: &ProblemBlock,
+        first: usize,
+    ) -> Self {
+        let sides = sides(joint, block);
+        let response = response(problem, &sides);
+        let (mut own, mut errors, mut scale) = ([OwnRow::default(); ROWS], [0.0; ROWS], [1.0; ROWS]);
+        let through: f64 = sides.iter().map(|&(body, _)| problem.bodies[body].inv_mass).sum();
+        for (i, row) in block.rows.iter().enumerate() {
+            own[i] = match target {
+                Target::Own(rows) => rows[first + i],
+                Target::Rigid => OwnRow { bias: row.rigid_bias(block.law, problem.h), compliance: 0.0 },
+            };
+            errors[i] = row.error;
+            scale[i] = row_scale(row.is_angular(), response[i][i], through);
+        }
+        let line = LawLine::new(block.law, block.rows.len(), errors, own, response);
+        BlockLine { line, first, sides, scale }
+    }
+
+    /// J v (m/s or rad/s).
+    pub fn velocity(&self, velocities: &[Velocity]) -> RowVector {
+        let mut u = [0.0; ROWS];
+        for (body, rows) in &self.sides {
+            for (u, row) in u.iter_mut().zip(rows) {
+                *u += dot(row, &velocities[*body]);
+            }
+        }
+        u
+    }
+
+    /// Adds M⁻¹ Jᵀ `impulse` to the velocities.
+    pub fn apply(&self, problem: &ContactProblem, impulse: RowVector, velocities: &mut [Velocity]) {
+        apply(problem, &self.sides, impulse, velocities);
+    }
+
+    /// λ − Π(y) of every row (N·s); see the [module](self).
+    pub fn residuals(&self, velocities: &[Velocity], impulses: &[DPair]) -> RowVector {
+        let own = self.read(impulses);
+        let exact = self.solution(self.velocity(velocities), own);
+        [0, 1, 2].map(|i| self.scale[i] * (own[i] - exact[i]))
+    }
+
+    /// Its impulses in a vector.
+    pub fn read(&self, impulses: &[DPair]) -> RowVector {
+        let mut own = [0.0; ROWS];
+        own.iter_mut().zip(&impulses[self.first..][..self.size]).for_each(|(own, pair)| *own = pair[0]);
+        own
+    }
+
+    /// Puts its impulses into a vector.
+    pub fn write(&self, own: RowVector, impulses: &mut [DPair]) {
+        impulses[self.first..][..self.size].iter_mut().zip(own).for_each(|(pair, own)| pair[0] = own);
+    }
+
+    /// Takes J M⁻¹ Jᵀ with each side's part times `share` of its body for the response to its own impulses: P = (α D + (1 − α) K)⁻¹.
+    pub fn split(&mut self, problem: &ContactProblem, share: &[f64]) {
+        let mut d = [[0.0; ROWS]; ROWS];
+        for side in &self.sides {
+            let k = response(problem, std::slice::from_ref(side));
+            (0..ROWS).for_each(|r| (0..ROWS).for_each(|c| d[r][c] += share[side.0] * k[r][c]));
+        }
+        for (d, k) in d.iter_mut().flatten().zip(self.response.iter().flatten()) {
+            *d = self.alpha * *d + (1.0 - self.alpha) * k;
+        }
+        self.line.step = inverted(d, self.size).unwrap_or_default();
+    }
+}
+
+fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
+    matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+}
+
+fn dot(a: &Velocity, b: &Velocity) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Bodies that are not static, with their part of J, sign included.
+fn sides(joint: &ProblemJoint, block: &ProblemBlock) -> Vec<(usize, [Velocity; ROWS])> {
+    let side = |body: Option<u32>, sign: f64, arm: fn(&ProblemRow) -> f64| {
+        let mut rows = [[0.0; 3]; ROWS];
+        for (to, row) in rows.iter_mut().zip(&block.rows) {
+            *to = [row.axis[0], row.axis[1], arm(row)].map(|x| sign * x);
+        }
+        body.map(|body| (body as usize, rows))
+    };
+    let both = [side(joint.body_a, -1.0, |row| row.arm_a), side(joint.body_b, 1.0, |row| row.arm_b)];
+    both.into_iter().flatten().collect()
+}
+
+/// K
+fn response(problem: &ContactProblem, sides: &[(usize, [Velocity; ROWS])]) -> [RowVector; ROWS] {
+    let mut k = [[0.0; ROWS]; ROWS];
+    for (body, rows) in sides {
+        let b = &problem.bodies[*body];
+        for (r, k) in k.iter_mut().enumerate() {
+            for (c, k) in k.iter_mut().enumerate() {
+                let along = rows[r][0] * rows[c][0] + rows[r][1] * rows[c][1];
+                *k += b.inv_mass * along + b.inv_inertia * rows[r][2] * rows[c][2];
+            }
+        }
+    }
+    k
+}
+
+fn apply(
+    problem: &ContactProblem,
+    sides: &[(usize, [Velocity; ROWS])],
+    impulse: RowVector,
+    velocities: &mut [Velocity],
+) {
+    for (body, rows) in sides {
+        let b = &problem.bodies[*body];
+        let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+        for (row, impulse) in rows.iter().zip(impulse) {
+            for k in 0..3 {
+                velocities[*body][k] += inverse[k] * (row[k] * impulse);
+            }
+        }
+    }
+}
+
+/// The inverse of K, the diagonal of which is scaled to 1 first; none if it has none to 9 digits.
+pub(super) fn inverted(k: [RowVector; ROWS], size: usize) -> Option<[RowVector; ROWS]> {
+    let mut inverse = [[0.0; ROWS]; ROWS];
+    let scale = [0, 1, 2].map(|i| if i < size { 1.0 / k[i][i].sqrt() } else { 1.0 });
+    for column in 0..size {
+        let mut a = [0.0; ROWS * ROWS];
+        let (a, x) = (&mut a[..size * size], &mut [0.0; ROWS][..size]);
+        for r in 0..size {
+            for c in 0..size {
+                a[r * size + c] = scale[r] * k[r][c] * scale[c];
+            }
+        }
+        x[column] = 1.0;
+        if a.iter().any(|a| !a.is_finite()) || !solve_in_place(a, x, 1e-9) {
+            return None;
+        }
+        for (row, x) in x.iter().enumerate() {
+            inverse[row][column] = scale[row] * x * scale[column];
+        }
+    }
+    Some(inverse)
+}
+
+impl ProblemRow {
+    /// b of the rigid law (m/s or rad/s).
+    pub fn rigid_bias(&self, law: BlockLaw, h: f64) -> f64 {
+        match law {
+            BlockLaw::Limit => self.error.max(0.0) / h,
+            _ => 0.0,
+        }
+    }
+}
+
+impl ContactProblem {
+    /// Every block with its joint and the place of its first row in vectors of impulses.
+    pub fn blocks(&self) -> impl Iterator<Item = (usize, &ProblemJoint, &ProblemBlock)> {
+        let mut next = self.contacts.len();
+        let blocks =
+            self.joints.iter().flat_map(|joint| joint.blocks.iter().map(move |block| (joint, block)));
+        blocks.map(move |(joint, block)| {
+            let first = next;
+            next += block.rows.len();
+            (first, joint, block)
+        })
+    }
+
+    /// Rows of joints.
+    pub fn joint_rows(&self) -> usize {
+        self.joints.iter().map(|joint| joint.rows().count()).sum()
+    }
+
+    /// Length of vectors of impulses: a pair for every contact, then one for every row of joints.
+    pub fn unknowns(&self) -> usize {
+        self.contacts.len() + self.joint_rows()
+    }
+
+    /// Impulses of a cold start.
+    pub fn no_impulses(&self) -> Vec<DPair> {
+        vec![[0.0; 2]; self.unknowns()]
+    }
+
+    /// Impulses of a warm start.
+    pub fn warm_impulses(&self) -> Vec<DPair> {
+        let joints = self.joints.iter().flat_map(ProblemJoint::rows).map(|row| [row.warm_impulse, 0.0]);
+        self.contacts.iter().map(|c| c.warm_impulse).chain(joints).collect()
+    }
+
+    /// Replaces the impulses of a warm start.
+    ///
+    /// # Panics
+    /// If there are not [`Self::unknowns`] of them.
+    pub fn set_warm_impulses(&mut self, impulses: &[DPair]) {
+        assert_eq!(impulses.len(), self.unknowns(), "a pair for every contact and every row");
+        let (of_contacts, of_rows) = impulses.split_at(self.contacts.len());
+        self.contacts.iter_mut().zip(of_contacts).for_each(|(c, &impulse)| c.warm_impulse = impulse);
+        let rows =
+            self.joints.iter_mut().flat_map(|joint| &mut joint.blocks).flat_map(|block| &mut block.rows);
+        rows.zip(of_rows).for_each(|(row, impulse)| row.warm_impulse = impulse[0]);
+    }
+
+    /// The rigid law of every row of joints.
+    pub fn rigid_rows(&self) -> impl Iterator<Item = OwnRow> {
+        self.blocks().flat_map(|(_, _, block)| {
+            block.rows.iter().map(|row| OwnRow { bias: row.rigid_bias(block.law, self.h), compliance: 0.0 })
+        })
+    }
+
+    /// The blocks under a law.
+    pub(super) fn lines(&self, target: Target) -> Vec<BlockLine> {
+        self.blocks().map(|(first, joint, block)| BlockLine::new(self, target, joint, block, first)).collect()
+    }
+
+    /// Adds M⁻¹ Jᵀ λ of all joints to the velocities.
+    pub(super) fn push_joints(&self, impulses: &[DPair], velocities: &mut [Velocity]) {
+        for (first, joint, block) in self.blocks() {
+            let mut own = [0.0; ROWS];
+            own.iter_mut().zip(&impulses[first..][..block.rows.len()]).for_each(|(own, pair)| *own = pair[0]);
+            apply(self, &sides(joint, block), own, velocities);
+        }
+    }
+
+    /// Adds Jᵀ λ of all joints (N·s, N·s, N·m·s).
+    pub(super) fn sum_joint_impulses(&self, impulses: &[DPair], sums: &mut [Velocity]) {
+        for (first, joint, block) in self.blocks() {
+            for (body, rows) in sides(joint, block) {
+                for (row, pair) in rows.iter().zip(&impulses[first..][..block.rows.len()]) {
+                    (0..3).for_each(|k| sums[body][k] += row[k] * pair[0]);
+                }
+            }
+        }
+    }
+
+    /// K of a block; see the [module](self).
+    pub(super) fn block_response(&self, joint: &ProblemJoint, block: &ProblemBlock) -> [RowVector; ROWS] {
+        response(self, &sides(joint, block))
+    }
+
+    /// Whether all impulses of joints are bounded row by row: then a problem without friction is convex.
+    pub(super) fn has_boxes_alone(&self) -> bool {
+        self.blocks().all(|(_, _, block)| block.rows.len() == 1 || block.law.cap().is_none())
+    }
+}
+
+/// Sizes of all impulses (N·s), those of angular rows as in residuals.
+pub(super) fn impulse_sizes(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
+    let contacts = impulses[..problem.contacts.len()].iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
+    let lines = problem.lines(Target::Rigid);
+    let rows =
+        lines.iter().flat_map(|line| (0..line.size).map(|i| line.scale[i] * impulses[line.first + i][0]));
+    rows.fold(contacts, |m, l| m.max(l.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::certify::{Method, Uniqueness, reference};
+    use crate::lab::reference::gallery::{GRAVITY, hanging_chain, machine, pendulum_rod};
+    use crate::lab::reference::newton::newton;
+    use crate::lab::reference::nncg::nncg;
+    use crate::lab::reference::residual::{joint_residuals, natural_map};
+    use crate::lab::reference::stewart_trinkle::stewart_trinkle;
+    use crate::lab::reference::sweeps::{Splitting, Stop, SweepDirection, jacobi, pgs};
+
+    const STOP: Stop = Stop { tolerance: 1e-14, iterations: 4000 };
+
+    /// Impulses of every family, all of them certified.
+    fn solutions(p: &ContactProblem) -> Vec<(&'static str, Vec<DPair>)> {
+        p.validate().unwrap();
+        let (cold, law) = (p.no_impulses(), Target::Rigid);
+        let all = vec![
+            ("Lemke", stewart_trinkle(p, law).unwrap()),
+            ("Newton", newton(p, law, &cold, Stop { iterations: 60, ..STOP }).impulses),
+            ("NNCG", nncg(p, law, &cold, STOP).impulses),
+            ("PGS", pgs(p, law, &cold, SweepDirection::Symmetric, STOP).impulses),
+            ("split Jacobi", jacobi(p, law, &cold, Splitting::Mass, STOP).impulses),
+        ];
+        for (name, impulses) in &all {
+            let residual = natural_map(p, law, &p.velocities(impulses), impulses) / p.impulse_unit();
+            assert!(residual < 1e-11, "{name} on {}: {residual:e}", p.name);
+        }
+        all
+    }
+
+    fn close(name: &str, found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-11, "{name}: {found} is not {expected}");
+    }
+
+    /// The classical quarter of the weight, and an oblique rod, by Cramer's rule.
+    #[test]
+    fn a_hinge_bears_a_quarter_of_a_level_rod() {
+        for angle in [0.0_f64, 0.7, -1.2] {
+            let p = pendulum_rod(angle);
+            let load = GRAVITY * p.h;
+            let (x, y) = (0.5 * angle.cos(), 0.5 * angle.sin());
+            let k = [1.0 + 12.0 * y * y, -12.0 * x * y, 1.0 + 12.0 * x * x];
+            let determinant = k[0] * k[2] - k[1] * k[1];
+            for (name, l) in solutions(&p) {
+                close(name, l[0][0], -k[1] * load / determinant);
+                close(name, l[1][0], k[0] * load / determinant);
+                if angle == 0.0 {
+                    close(name, l[1][0], load / 4.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn chains_carry_what_hangs_below() {
+        let p = hanging_chain(6);
+        for (name, l) in solutions(&p) {
+            for i in 0..6 {
+                close(name, l[2 * i][0], 0.0);
+                close(name, l[2 * i + 1][0], (6 - i) as f64 * GRAVITY * p.h);
+            }
+        }
+    }
+
+    #[test]
+    fn motors_stall_limits_stop_and_springs_give_way() {
+        let p = machine();
+        let load = GRAVITY * p.h;
+        let omega = -1e-4 / p.h;
+        let expected = [
+            // The contact, the motor and its hinge.
+            (0, load),
+            (1, 0.01),
+            (2, 0.0),
+            (3, load),
+            // The limit and its hinge.
+            (4, (omega + 1.5 * load) / 3.0),
+            (6, load + 0.5 * omega),
+            // The springs.
+            (7, (0.5 * load + 0.2) / 1.5),
+            (8, -0.01),
+        ];
+        for (name, l) in solutions(&p) {
+            expected.iter().for_each(|&(i, impulse)| close(&format!("{name} {i}"), l[i][0], impulse));
+            close(name, l[0][1], 0.01);
+            let v = p.velocities(&l);
+            close(name, v[0][2], 0.02);
+            close(name, v[1][2], omega);
+        }
+    }
+
+    /// A body of 1 kg at 3 m/s along x under two rows with a cap: the impulse opposes the motion, at its full size; and all of
+    /// them that a spring asks for within it.
+    #[test]
+    fn a_cap_bounds_the_norm_of_a_block() {
+        let mut p = pendulum_rod(0.0);
+        p.bodies[0] =
+            super::super::ProblemBody { inv_inertia: 0.0, free_velocity: [3.0, 4.0, 0.0], ..p.bodies[0] };
+        let solve = |p: &ContactProblem| {
+            pgs(p, Target::Rigid, &p.no_impulses(), SweepDirection::Forward, STOP).impulses
+        };
+        p.joints[0].blocks[0].law = BlockLaw::Motor { speed: 0.0, cap: 2.5 };
+        p.validate().unwrap();
+        let l = solve(&p);
+        // 5 m/s along (3, 4)/5.
+        close("x", l[0][0], -1.5);
+        close("y", l[1][0], -2.0);
+        // λ = −D v⁺ = −D (v* + λ): −(3, 4)/2 with D = 1, of norm 2.5.
+        for (cap, factor) in [(3.0, 0.5), (2.0, 0.4)] {
+            p.joints[0].blocks[0].law = BlockLaw::Spring { stiffness: 7.0, damping: 1.0, cap: Some(cap) };
+            let l = solve(&p);
+            close("x", l[0][0], -3.0 * factor);
+            close("y", l[1][0], -4.0 * factor);
+            let r = reference(&p).unwrap();
+            close("reference", r.impulses[0][0], -3.0 * factor);
+            // Without a proof, as the law is no box: by two families, of which Lemke's is none where the cap holds.
+            assert_eq!(r.certificate.uniqueness, Uniqueness::Agreed);
+            assert_eq!(r.certificate.method == Method::StewartTrinkle, factor == 0.5);
+        }
+    }
+
+    /// r = λ − Π(y) by hand, and as an impulse through the centers of mass for an angle.
+    #[test]
+    fn residuals_are_what_one_sweep_would_change() {
+        let p = machine();
+        let v = vec![[0.0; 3]; p.bodies.len()];
+        let r = joint_residuals(&p, Target::Rigid, &v, &p.no_impulses());
+        // A motor that stands still: 0.01 N·m·s are missing, and count by √(K m) = √2/m.
+        close("motor", r[0], -0.01 * 2.0_f64.sqrt());
+        // Hinges at rest, without load; the open limit.
+        [1, 2, 3, 4, 5].iter().for_each(|&i| close("rest", r[i], 0.0));
+        // Springs: (D λ + f)/(1 + D) with f = −S C.
+        close("spring", r[6], -0.2 / 1.5);
+        close("capped spring", r[7], 0.01);
+        // Pushing without need.
+        let mut l = p.no_impulses();
+        l[4][0] = 0.5;
+        close(
+            "limit",
+            joint_residuals(&p, Target::Rigid, &v, &l)[3],
+            (12.0_f64).sqrt() * (1e-4 / p.h / 12.0),
+        );
+        l[4][0] = -0.5;
+        close("pull", joint_residuals(&p, Target::Rigid, &v, &l)[3], -0.5 * (12.0_f64).sqrt());
+    }
+
+    #[test]
+    fn undamped_springs_and_redundant_rows_are_solved() {
+        // Without damping a spring pushes −S C, whatever happens.
+        let mut p = machine();
+        p.joints[2].blocks[0].law = BlockLaw::Spring { stiffness: 20.0, damping: 0.0, cap: None };
+        for (name, l) in solutions(&p) {
+            close(name, l[7][0], 0.2);
+        }
+        // A rod hung on two hinges at the same point, one as good as the other.
+        let mut p = pendulum_rod(0.0);
+        p.joints.push(p.joints[0].clone());
+        for (name, l) in solutions(&p) {
+            close(name, l[1][0] + l[3][0], GRAVITY * p.h / 4.0);
+        }
+        assert_eq!(reference(&p).unwrap().certificate.uniqueness, Uniqueness::Proven);
+    }
+
+    #[test]
+    fn bad_joints_are_named() {
+        type Spoil = fn(&mut ContactProblem);
+        let spoils: [(Spoil, &str); 9] = [
+            (|p| p.joints[0].body_b = Some(9), "joints[0]: names body 9 of 4"),
+            (|p| p.joints[0].body_b = None, "joints[0]: both sides"),
+            (|p| p.joints[1].blocks.clear(), "joints[1]: has 0 blocks"),
+            (|p| p.joints[1].blocks[0].rows.clear(), "joints[1].blocks[0]: has 0 rows"),
+            (
+                |p| p.joints[1].blocks[1].rows[0].axis = [2.0, 0.0],
+                "joints[1].blocks[1]: the axis has length 2",
+            ),
+            (|p| p.joints[1].blocks[1].law = BlockLaw::Limit, "joints[1].blocks[1]: a limit has 2 rows"),
+            (|p| p.joints[0].blocks[0].rows[0].error = f64::NAN, "joints[0].blocks[0]: NaN"),
+            (
+                |p| p.joints[0].blocks[0].law = BlockLaw::Motor { speed: 1.0, cap: -1.0 },
+                "joints[0].blocks[0]: cap is -1",
+            ),
+            (
+                |p| p.joints[1].blocks[1].rows[1] = p.joints[1].blocks[1].rows[0],
+                "joints[1].blocks[1]: its rows do not answer",
+            ),
+        ];
+        for (spoil, message) in spoils {
+            let mut p = machine();
+            spoil(&mut p);
+            let error = p.validate().unwrap_err().to_string();
+            assert!(error.starts_with(message), "{error}");
+        }
+    }
+}
