@@ -22,6 +22,8 @@ struct Symmetry {
     back: fn([f64; 2], f64) -> [f64; 2],
     /// From a number in 0..1, what the other two are given.
     amount: fn(f64) -> f64,
+    /// Where in the list of so many bodies the image of a body is.
+    place: fn(usize, usize) -> usize,
 }
 
 fn turn([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
@@ -123,29 +125,67 @@ fn thrice(scene: &Scene, by: f64) -> Scene {
     image
 }
 
+/// The last body first.
+fn reordered(scene: &Scene, _: f64) -> Scene {
+    let mut image = scene.clone();
+    image.bodies.reverse();
+    image
+}
+
 fn stays(p: [f64; 2], _: f64) -> [f64; 2] {
     p
 }
 
-const SYMMETRIES: [Symmetry; 8] = [
-    Symmetry { name: "turned", image: turned, back: |p, a| turn(p, -a), amount: |u| 2.0 * PI * u },
-    Symmetry { name: "mirrored", image: mirrored, back: |[x, y], _| [-x, y], amount: |u| u },
+fn same(_: usize, i: usize) -> usize {
+    i
+}
+
+const SYMMETRIES: [Symmetry; 9] = [
+    Symmetry {
+        name: "turned",
+        image: turned,
+        back: |p, a| turn(p, -a),
+        amount: |u| 2.0 * PI * u,
+        place: same,
+    },
+    Symmetry { name: "mirrored", image: mirrored, back: |[x, y], _| [-x, y], amount: |u| u, place: same },
     Symmetry {
         name: "moved",
         image: moved,
         back: |[x, y], by| [x - by, y + by],
         amount: |u| if u < 0.5 { 1e3 } else { -1e3 },
+        place: same,
     },
     Symmetry {
         name: "scaled",
         image: scaled,
         back: |[x, y], k| [x / k, y / k],
         amount: |u| 10f64.powf(4.0 * u - 2.0),
+        place: same,
     },
-    Symmetry { name: "heavier", image: heavier, back: stays, amount: |u| 10f64.powf(6.0 * u - 3.0) },
-    Symmetry { name: "stepped", image: stepped, back: stays, amount: |u| 10f64.powf(2.0 * u - 1.0) },
-    Symmetry { name: "in_company", image: in_company, back: stays, amount: |u| 300.0 + 100.0 * u },
-    Symmetry { name: "thrice", image: thrice, back: stays, amount: |u| 100.0 + 100.0 * u },
+    Symmetry {
+        name: "heavier",
+        image: heavier,
+        back: stays,
+        amount: |u| 10f64.powf(6.0 * u - 3.0),
+        place: same,
+    },
+    Symmetry {
+        name: "stepped",
+        image: stepped,
+        back: stays,
+        amount: |u| 10f64.powf(2.0 * u - 1.0),
+        place: same,
+    },
+    Symmetry {
+        name: "in_company",
+        image: in_company,
+        back: stays,
+        amount: |u| 300.0 + 100.0 * u,
+        place: same,
+    },
+    Symmetry { name: "thrice", image: thrice, back: stays, amount: |u| 100.0 + 100.0 * u, place: same },
+    Symmetry { name: "reordered", image: reordered, back: stays, amount: |u| u, place: |n, i| n - 1 - i },
 ];
 
 /// Times times `factor`, lengths as they are: velocities over it, gravity over its square.
@@ -173,7 +213,8 @@ fn deviation(symmetry: &Symmetry, variant: &'static Variant, scene: &Scene, u: f
     }
     let dynamic = (0..scene.bodies.len()).filter(|&i| scene.bodies[i].kind == BodyKind::Dynamic);
     let apart = dynamic.map(|i| {
-        let ([x, y], [u, v]) = (a.bodies.center(i), (symmetry.back)(b.bodies.center(i), amount));
+        let place = (symmetry.place)(scene.bodies.len(), i);
+        let ([x, y], [u, v]) = (a.bodies.center(i), (symmetry.back)(b.bodies.center(place), amount));
         (x - u).hypot(y - v)
     });
     apart.fold(0.0, f64::max)

@@ -7,7 +7,8 @@
 //! What goes beyond [`super::soft_step`], in `shim/`:
 //!
 //! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
-//! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses;
+//! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses, and gets no
+//!   faster than the piston can make it;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
@@ -83,6 +84,9 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
+/// Place among the parameters.
+const PUSH_SPEED: usize = 2;
+
 /// Places in [`MECHANISMS`].
 mod part {
     pub const STATICS: usize = 0;
@@ -117,7 +121,7 @@ const MECHANISMS: [Mechanism; 11] = [
     },
     Mechanism {
         name: "rising",
-        meaning: "where something moves, springs are shortened for loads as these rise within 0.2 s",
+        meaning: "springs are shortened for more load only where nothing moves, within 3 s",
         case: "torture ratios restless",
         lines: 0,
     },
@@ -163,7 +167,7 @@ const MECHANISMS: [Mechanism; 11] = [
     },
     Mechanism {
         name: "jams",
-        meaning: "contacts that push against each other on what is caught or squeezed begin without impulses",
+        meaning: "what is caught or squeezed begins a step without impulses, within the speed that squeezes it",
         case: "torture driven energy",
         lines: lines_of(include_str!("shim/jams.rs")),
     },
@@ -202,7 +206,10 @@ impl Solver for Shim {
             .into_iter()
             .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
         if !scene.without.leaves_out(part::JAMS) {
-            self.jams.release(scene.contacts, &scene.bodies.kind);
+            let push_speed = scene.parameters[PUSH_SPEED];
+            self.jams.release(scene, push_speed);
+        } else {
+            self.jams.clear();
         }
         self.place(scene);
         if scene.contacts_changed || scene.gravity != self.gravity {
@@ -241,10 +248,12 @@ impl Solver for Shim {
                 }
                 passes.iteration_done();
             }
+            self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, rigid);
             }
+            self.jams.bound(passes);
             passes.end_substep(substep);
         }
         self.stepped = passes.parts().work.rows.len() - 1;

@@ -4,7 +4,11 @@
 //! rest in a step, v ≤ dt (|a_a| + |a_b|), and it is still closed in the middle of the step: a load acts until its end, and one that acts
 //! on what has left works on it. That work is all that keeps a box rocking. One that closes begins with the impulse of the last substep.
 //!
-//! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between.
+//! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between. If its springs
+//! are also shortened for nearly all of its load, they follow it at once from then on ([`super::shorten`]).
+//!
+//! What is left of impulses, after the part that springs are shortened for, is what statics does not know. A point that was open has no such
+//! part: it keeps all of its impulse, or a body that rocks loses its support in each step in which a corner closes.
 
 use super::OPEN;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -20,7 +24,10 @@ const CLOSED: f32 = 0.02 * LINEAR_SLOP;
 const CALM_SPEED: f32 = 1e-3;
 
 /// For so long (s).
-const CALM_TIME: f32 = 0.3;
+pub(super) const CALM_TIME: f32 = 0.3;
+
+/// Part of a load from which on the springs of a calm contact follow it at once (1).
+const NEARLY: f32 = 0.99;
 
 /// Finds closed points, and starts from their loads.
 pub(in super::super) struct Close<'a> {
@@ -81,7 +88,7 @@ fn close<L: Lanes>(
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
         let [calm, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut loads = [open, zero, open, zero];
-        let mut fastest = zero;
+        let (mut fastest, mut is_short) = (zero, zero);
         for p in 0..layout.points {
             let arms = arms_of(record, layout, p);
             let vn = a[2].neg_mul_add(arms[0][0], b[2].mul_add(arms[1][0], straight));
@@ -101,8 +108,12 @@ fn close<L: Lanes>(
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // What is left of impulses is what statics does not know.
-            let borne = if p == 0 { borne_0 } else { borne_1 }.max(zero);
-            let part = last[2 * p].select_positive(borne / last[2 * p], one);
+            let borne = if p == 0 { borne_0 } else { borne_1 };
+            let opened = (borne + L::splat(0.5)).select_positive(zero, one);
+            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], opened);
+            let lacks =
+                (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
+            is_short = is_short.max(lacks);
             let at = layout.at(p, layout.normal_impulse);
             record[at] = part.neg_mul_add(impulse[0], record[at]);
             if layout.has_friction {
@@ -120,7 +131,7 @@ fn close<L: Lanes>(
         let calm = (L::splat(CALM_SPEED) - fastest).select_positive(calm, zero);
         let at_once = calm - L::splat(CALM_TIME);
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
-        let at_once = is_pair.select_positive(at_once, zero);
+        let at_once = is_pair.select_positive(is_short.select_positive(zero, at_once), zero);
         let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
         store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, lead, borne[0], borne[1]]);
     }

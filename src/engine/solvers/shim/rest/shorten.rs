@@ -2,14 +2,22 @@
 //!
 //! # Loads that rise
 //!
-//! What shortens a spring that bears F by δ does the work F δ, and a load that comes a step late does it with what moves. So where something
-//! moves, the load that a spring is shortened for follows its load at once downwards, and upwards within τ = 0.2 s:
+//! A spring that bears F and is shortened by another dδ does the work F dδ. Over a cycle of what rocks or sways that is
+//!
+//! ```text
+//! ∮ F dδ > 0   if δ follows F late,        0   if δ stays or is a function of F
+//! ```
+//!
+//! so shortening a spring while its body moves drives the motion, and where δ stays, what the spring gives way is lost to its damper. The
+//! load that a spring is shortened for follows its load at once downwards, which does no work that the load has not done. Upwards it follows
+//! where the contact is calm alone ([`super::closed`]), within τ = 3 s, a few periods of a column that sways:
 //!
 //! ```text
 //! F ← min(N, F + (N − F) dt/(τ + dt))
 //! ```
 //!
-//! Contacts that are calm ([`super::closed`]) have all of it at once, and so have those that are found in the first step of one of their bodies.
+//! Calm contacts that bear nearly all of it follow at once, so that columns that lean get the moment that they need; and so do
+//! those that are found in the first step of one of their bodies.
 //!
 //! # Contacts that roll
 //!
@@ -30,6 +38,7 @@
 //! the depth at which they reach the push speed u, plus a depth that grows with their load. So a body thrown into
 //! another is not thrown back.
 
+use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
@@ -45,7 +54,7 @@ pub(in super::super) struct Shorten {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
-    /// Loads rise slowly where something moves.
+    /// Loads rise slowly, and only where nothing moves.
     pub rises: bool,
     /// Contacts of one point keep what they were shortened by.
     pub holds: bool,
@@ -59,8 +68,8 @@ const LEAST: f32 = 0.5;
 /// See [`LEAST`].
 const MOST: f32 = 1.1;
 
-/// τ: time in which loads rise on what moves (s).
-const RISE: f32 = 0.2;
+/// τ: time in which loads rise on what is calm (s).
+const RISE: f32 = 3.0;
 
 /// Depth that springs see beyond that of the push speed, per sag (1).
 const EARNED: f32 = 20.0;
@@ -116,6 +125,7 @@ fn shorten<L: Lanes>(
         } else {
             one
         };
+        let grows = (calm - L::splat(CALM_TIME)).select_positive(grows, zero);
         let risen = |borne: L, load: L| {
             let grown = grows.mul_add(load - borne, borne).min(load);
             (borne + L::splat(0.5)).select_positive(grown, load)
