@@ -26,6 +26,7 @@ mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::joints::trees::Trees;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -91,10 +92,11 @@ mod part {
     pub const RELEASE: usize = 8;
     pub const JAMS: usize = 9;
     pub const HELD: usize = 10;
+    pub const TREES: usize = 11;
 }
 
 /// What a run can leave out, and what fails then.
-const MECHANISMS: [Mechanism; 11] = [
+const MECHANISMS: [Mechanism; 12] = [
     Mechanism {
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
@@ -168,6 +170,12 @@ const MECHANISMS: [Mechanism; 11] = [
         case: "rest::a_pile_of_discs_hardly_breathes",
         lines: 0,
     },
+    Mechanism {
+        name: "trees",
+        meaning: "joints that hang from what does not move are solved at once",
+        case: "B17.ratio",
+        lines: lines_of(include_str!("../constraints/joints/trees.rs")),
+    },
 ];
 
 /// What it keeps.
@@ -175,6 +183,7 @@ const MECHANISMS: [Mechanism; 11] = [
 struct Shim {
     hand_down: HandDown,
     jams: Jams,
+    trees: Trees,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -221,6 +230,11 @@ impl Solver for Shim {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
+        if passes.has(part::TREES) {
+            passes.find_trees(&mut self.trees);
+        } else {
+            self.trees = Trees::default();
+        }
         for substep in 0..budget.substeps {
             if substep == 0 {
                 passes.integrate_velocities();
@@ -228,6 +242,7 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
+            passes.solve_trees(&mut self.trees);
             for _ in 0..budget.velocity_iterations {
                 if passes.has(part::BEARING) {
                     passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
@@ -242,6 +257,7 @@ impl Solver for Shim {
             }
             passes.end_substep(substep);
         }
+        passes.rejoin_trees();
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 
@@ -250,7 +266,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + self.jams.held_bytes() + held(&self.fields)
+        self.hand_down.held_bytes() + self.trees.held_bytes() + self.jams.held_bytes() + held(&self.fields)
     }
 }
 
