@@ -12,9 +12,9 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
+use crate::engine::constraints::records::rows::ROWS;
 use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
-use crate::engine::constraints::records::rows::ROWS;
 use rows::{
     Besides, Blocks, Collected, DisplacementRule, Displacements, Found, JointPair, JointPass, JointWarmStart,
     Places, RigidRows, RowBlock, Vectors, Velocities, VelocityRule,
@@ -413,6 +413,7 @@ impl<T: JointType> Joints<T> {
 
 impl<T: JointType> Joints<T> {
     /// The two bodies of one joint, in one lane, and their names.
+    #[inline]
     fn pair(&self, joint: usize, Placed { rows, poses }: Placed<'_>) -> (JointPair<f32>, [u32; 2]) {
         let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
@@ -544,8 +545,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let numbers = &self.numbers[constraint * numbers..][..numbers];
         let mut found = Found { pair, rows: RigidRows::none(names), blocks: 0 };
-        let kept = &mut self.kept[constraint * kept..][..kept];
-        rows_once::<T, f32>(self.form, numbers, kept, &mut found);
+        T::rows(self.form, numbers, &mut self.kept[constraint * kept..][..kept], &mut found);
         found.rows
     }
 

@@ -7,11 +7,10 @@
 //! start, the increments δ of velocities and impulses obey
 //!
 //! ```text
-//! M δv = Jᵀ δλ,      J (v + δv) + C/h + γ K (λ + δλ) = 0,      K = J M⁻¹ Jᵀ of each joint alone
+//! M δv = Jᵀ δλ,      J (v + δv) + C/h = 0
 //! ```
 //!
-//! The errors are gone at the end of the substep to first order. [`GIVE`], γ, makes the system definite where rows contradict
-//! each other: a straight bridge bears its weight with an infinite tension. At rest the joint gives way by C = γ K λ h.
+//! The errors are gone at the end of the substep to first order.
 //!
 //! # Elimination
 //!
@@ -19,14 +18,24 @@
 //! its joint toward the root and p is the body there. Then
 //!
 //! ```text
-//! S = J_c A⁻¹ J_cᵀ + γ K,      s = −(J v + C/h + γ K λ) − J_c A⁻¹ g,      δλ = S⁻¹ (s − J_p δv_p)
+//! S = J_c A⁻¹ J_cᵀ,    s = −(J v + C/h) − J_c A⁻¹ g,    δλ = S⁻¹ (s − J_p δv_p)
 //! A_p ← A_p + J_pᵀ S⁻¹ J_p,    g_p ← g_p + J_pᵀ S⁻¹ s
 //! ```
 //!
-//! and back from the root, δv_c = A⁻¹ (g + J_cᵀ δλ). A second joint to what does not move has no body c: S = γ K.
-//! This is Featherstone's articulated-body algorithm in the coordinates of bodies.
+//! and back from the root, δv_c = A⁻¹ (g + J_cᵀ δλ). This is Featherstone's articulated-body algorithm in the coordinates of
+//! bodies. Of hinges, whose rows are J = ±(1 | p) with p = (−r_y, r_x), most products are with 0 and 1, and are left out; and
+//! with A⁻¹ = B/a, S = T/a and T⁻¹ = U/t, where B and U are of cofactors, S⁻¹ = (a/t) U takes one division.
 //!
-//! Trees are those of two joints or more that are connected to a body that no impulse moves, without loops. All else is
+//! A second joint to what does not move closes a loop through it: rows may contradict each other, as those of a straight bridge,
+//! whose tension has no bound. Such a joint gives way a little. It has no body c, and
+//!
+//! ```text
+//! S = γ K,   s = −(J v + C/h + γ K λ),   K = J M⁻¹ Jᵀ
+//! ```
+//!
+//! so that at rest C = γ K λ h.
+//!
+//! Trees are those of two joints or more that are connected to a body that no impulse moves, without other loops. All else is
 //! left to sweeps: the bodies of ragdolls differ little in mass, and a loop has no leaf. It runs in `f64`, one body after the
 //! other: the same bits at any width.
 
@@ -35,9 +44,8 @@ use crate::engine::constraints::records::rows::{ROWS, RigidRows};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 
-/// γ: softness of rows (1), as a share of K. A joint under a load F gives way by γ K F h²: 2500 times less than the stiffest
-/// springs that one sweep bears.
-const GIVE: f64 = 1e-4;
+/// γ (1), of joints that close a loop through what does not move.
+const GIVE: f64 = 1e-3;
 
 /// Fastest speed at which errors of a joint are removed (m/s or rad/s).
 const MOST_SPEED: f64 = 10.0;
@@ -67,20 +75,27 @@ struct TreeJoint {
     place: [u32; 2],
     /// Nodes of the body that hangs and of the one toward the root, or [`NONE`].
     nodes: [u32; 2],
-    size: usize,
-    /// J of both.
-    j: [[[f64; 3]; ROWS]; 2],
-    /// S⁻¹ and s
-    inverse: [[f64; ROWS]; ROWS],
-    s: [f64; ROWS],
+    rows: EliminatedRows,
+}
+
+/// Rows of a joint and what is left of them after elimination: J of the child and of the parent, S⁻¹ and s.
+#[derive(Clone, Copy, Debug)]
+enum EliminatedRows {
+    /// Rows ±(1 | p), the child's with `sign`.
+    Point { sign: f64, child: [f64; 2], parent: [f64; 2], inverse: [f64; 3], s: [f64; 2] },
+    /// Any.
+    Many { size: usize, j: [[[f64; 3]; ROWS]; 2], inverse: [[f64; ROWS]; ROWS], s: [f64; ROWS] },
 }
 
 /// A body of a tree.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     body: u32,
+    /// Velocity (m/s, m/s, rad/s).
+    v: [f64; 3],
     /// A, and then its inverse.
     a: Symmetric,
+    /// g, and then δv.
     g: [f64; 3],
 }
 
@@ -157,9 +172,9 @@ impl Trees {
             for (joint, nodes) in held.map(|&joint| (joint, [NONE, node])).chain([(toward, [node, parent])]) {
                 let place = found.places[joint as usize];
                 self.aside[place[0] as usize][place[1] as usize] = true;
-                self.joints.push(TreeJoint { place, nodes, ..TreeJoint::NONE });
+                self.joints.push(TreeJoint { place, nodes, rows: EliminatedRows::NONE });
             }
-            self.nodes.push(Node { body, a: [0.0; 6], g: [0.0; 3] });
+            self.nodes.push(Node { body, v: [0.0; 3], a: [0.0; 6], g: [0.0; 3] });
         }
     }
 
@@ -177,38 +192,37 @@ impl Trees {
 
     /// Changes velocities and impulses so that the rows hold at the end of the substep of `h` (s).
     pub fn solve(&mut self, types: &mut [Joined], rows: &mut [BodyRow], poses: &[PoseRow], h: f32) {
-        for node in &mut self.nodes {
-            let row = &rows[node.body as usize];
-            let [mass, inertia] = [row.velocity[3], row.delta[3]].map(|inverse| {
+        let Trees { joints, nodes, .. } = self;
+        for node in nodes.iter_mut() {
+            let BodyRow { velocity: [x, y, w, inv_mass], delta: [.., inv_inertia] } =
+                rows[node.body as usize];
+            let [mass, inertia] = [inv_mass, inv_inertia].map(|inverse| {
                 // What does not turn has an inertia beyond all others.
                 if inverse > 0.0 { 1.0 / f64::from(inverse) } else { 1e30 }
             });
+            node.v = [x, y, w].map(f64::from);
             (node.a, node.g) = ([mass, 0.0, mass, 0.0, 0.0, inertia], [0.0; 3]);
         }
         let inv_h = 1.0 / f64::from(h);
-        for joint in &mut self.joints {
+        for joint in joints.iter_mut() {
             let [t, i] = joint.place;
             let found = types[t as usize].kind.rigid_rows(i as usize, Placed { rows, poses });
-            joint.size = found.size;
-            match found.size {
-                1 => joint.eliminate::<1>(&found, &mut self.nodes, rows, inv_h),
-                2 => joint.eliminate::<2>(&found, &mut self.nodes, rows, inv_h),
-                _ => joint.eliminate::<3>(&found, &mut self.nodes, rows, inv_h),
-            }
-        }
-        for joint in self.joints.iter().rev() {
-            let increments = match joint.size {
-                1 => joint.substitute::<1>(&mut self.nodes),
-                2 => joint.substitute::<2>(&mut self.nodes),
-                _ => joint.substitute::<3>(&mut self.nodes),
+            joint.rows = match found.size {
+                1 => eliminate::<1>(joint.nodes, &found, nodes, rows, inv_h),
+                2 if found.is_point() => eliminate_point(joint.nodes, &found, nodes, rows, inv_h),
+                2 => eliminate::<2>(joint.nodes, &found, nodes, rows, inv_h),
+                _ => eliminate::<3>(joint.nodes, &found, nodes, rows, inv_h),
             };
+        }
+        for joint in joints.iter().rev() {
+            let increments = joint.substitute(nodes);
             let [t, i] = joint.place;
             types[t as usize].kind.add_to_rigid(i as usize, increments);
         }
-        for node in &self.nodes {
+        for node in nodes.iter() {
             let velocity = &mut rows[node.body as usize].velocity;
-            for (v, more) in velocity.iter_mut().zip(node.g) {
-                *v = (f64::from(*v) + more) as f32;
+            for (k, v) in velocity[..3].iter_mut().enumerate() {
+                *v = (node.v[k] + node.g[k]) as f32;
             }
         }
     }
@@ -311,124 +325,212 @@ impl Finding {
     }
 }
 
-impl TreeJoint {
-    const NONE: TreeJoint = TreeJoint {
-        place: [0; 2],
-        nodes: [NONE; 2],
-        size: 0,
-        j: [[[0.0; 3]; ROWS]; 2],
-        inverse: [[0.0; ROWS]; ROWS],
-        s: [0.0; ROWS],
+impl EliminatedRows {
+    const NONE: Self = EliminatedRows::Point {
+        sign: 0.0,
+        child: [0.0; 2],
+        parent: [0.0; 2],
+        inverse: [0.0; 3],
+        s: [0.0; 2],
     };
+}
 
-    /// Eliminates its child and itself.
-    #[inline(always)]
-    fn eliminate<const N: usize>(
-        &mut self,
-        found: &RigidRows,
-        nodes: &mut [Node],
-        rows: &[BodyRow],
-        inv_h: f64,
-    ) {
-        let [child, parent] = self.nodes.map(|node| node as usize);
-        // Body b is the child or a is: J_b = (d, s_b), J_a = −(d, s_a).
-        let child_is_b = match nodes.get(child) {
-            Some(node) => node.body == found.bodies[1],
-            None => nodes[parent].body != found.bodies[1],
-        };
-        let ends = found.bodies.map(|body| &rows[body as usize]);
-        let (mut j, mut lacking) = ([[[0.0; 3]; N]; 2], [0.0; N]);
-        for r in 0..N {
-            let of = &found.jacobians[r];
-            let [x, y] = of.axis.map(f64::from);
-            let [of_a, of_b] = of.arms.map(f64::from);
-            (j[0][r], j[1][r]) = ([-x, -y, -of_a], [x, y, of_b]);
-            for (j, row) in j.iter().zip(ends) {
-                lacking[r] += (0..3).map(|k| j[r][k] * f64::from(row.velocity[k])).sum::<f64>();
+/// Whether the child is body b, which J has positive.
+#[inline(always)]
+fn child_is_b([child, parent]: [u32; 2], bodies: [u32; 2], nodes: &[Node]) -> bool {
+    match nodes.get(child as usize) {
+        Some(node) => node.body == bodies[1],
+        None => nodes[parent as usize].body != bodies[1],
+    }
+}
+
+/// Velocity of a node, or of a body that is none.
+#[inline(always)]
+fn velocity(node: u32, body: u32, nodes: &[Node], rows: &[BodyRow]) -> [f64; 3] {
+    nodes.get(node as usize).map_or_else(
+        || {
+            let [x, y, w, _] = rows[body as usize].velocity;
+            [x, y, w].map(f64::from)
+        },
+        |node| node.v,
+    )
+}
+
+/// Rate at which the errors of a block are removed (1/s).
+#[inline(always)]
+fn rate_of(errors: &[f32], inv_h: f64) -> f64 {
+    let square = errors.iter().map(|&c| f64::from(c) * f64::from(c)).sum::<f64>() * inv_h * inv_h;
+    if square > MOST_SPEED * MOST_SPEED { inv_h * MOST_SPEED / square.sqrt() } else { inv_h }
+}
+
+/// Eliminates a hinge and the body that hangs from it.
+#[inline(always)]
+fn eliminate_point(
+    at: [u32; 2],
+    found: &RigidRows,
+    nodes: &mut [Node],
+    rows: &[BodyRow],
+    inv_h: f64,
+) -> EliminatedRows {
+    let is_b = child_is_b(at, found.bodies, nodes);
+    let (sign, [body_p, body_c]) =
+        if is_b { (1.0, found.bodies) } else { (-1.0, [found.bodies[1], found.bodies[0]]) };
+    let arms = |k: usize| [f64::from(found.jacobians[0].arms[k]), f64::from(found.jacobians[1].arms[k])];
+    let (p, q) = if is_b { (arms(1), arms(0)) } else { (arms(0), arms(1)) };
+    let (vc, vp) = (velocity(at[0], body_c, nodes, rows), velocity(at[1], body_p, nodes, rows));
+    let rate = sign * rate_of(&found.errors[..2], inv_h);
+    let mut s =
+        [0, 1].map(|k| (vp[k] + q[k] * vp[2]) - (vc[k] + p[k] * vc[2]) - rate * f64::from(found.errors[k]));
+    let inverse = match nodes.get_mut(at[0] as usize) {
+        Some(node) => {
+            let [xx, xy, yy, xw, yw, ww] = cofactors(&node.a);
+            let a = node.a[0] * xx + node.a[1] * xy + node.a[3] * xw;
+            let first = [xx + p[0] * xw, xy + p[0] * yw, xw + p[0] * ww];
+            let second = [yy + p[1] * yw, yw + p[1] * ww];
+            let t = [first[0] + p[0] * first[2], first[1] + p[1] * first[2], second[0] + p[1] * second[1]];
+            let scale = a / (t[0] * t[2] - t[1] * t[1]);
+            let inv_a = 1.0 / a;
+            node.a = [xx, xy, yy, xw, yw, ww].map(|x| x * inv_a);
+            let moved = times(&node.a, node.g);
+            for k in 0..2 {
+                s[k] -= moved[k] + p[k] * moved[2];
             }
+            [t[2] * scale, -t[1] * scale, t[0] * scale]
         }
-        let speed = found.errors[..N].iter().map(|&c| f64::from(c).powi(2)).sum::<f64>().sqrt() * inv_h;
-        let rate = if speed > MOST_SPEED { inv_h * MOST_SPEED / speed } else { inv_h };
-        let mut s_matrix = [[0.0; N]; N];
-        for r in 0..N {
-            lacking[r] += rate * f64::from(found.errors[r]);
-            for c in 0..N {
-                for (j, row) in j.iter().zip(ends) {
-                    let [mass, inertia] = [row.velocity[3], row.delta[3]].map(f64::from);
-                    let along = j[r][0] * j[c][0] + j[r][1] * j[c][1];
-                    s_matrix[r][c] += GIVE * (mass * along + inertia * (j[r][2] * j[c][2]));
-                }
-                lacking[r] += s_matrix[r][c] * f64::from(found.impulses[c]);
-            }
+        None => {
+            let row = &rows[body_p as usize];
+            let [mass, inertia] = [row.velocity[3], row.delta[3]].map(f64::from);
+            let k = [mass + inertia * (q[0] * q[0]), inertia * (q[0] * q[1]), mass + inertia * (q[1] * q[1])];
+            let l = [0, 1].map(|k| sign * GIVE * f64::from(found.impulses[k]));
+            s = [s[0] - (k[0] * l[0] + k[1] * l[1]), s[1] - (k[1] * l[0] + k[2] * l[1])];
+            let scale = 1.0 / (GIVE * (k[0] * k[2] - k[1] * k[1]));
+            [k[2] * scale, -k[1] * scale, k[0] * scale]
         }
-        if !child_is_b {
-            j.swap(0, 1);
-        }
-        let [of_parent, of_child] = j;
-        let mut s = lacking.map(|x| -x);
-        if let Some(node) = nodes.get_mut(child) {
-            node.a = inverted(&node.a);
+    };
+    if let Some(node) = nodes.get_mut(at[1] as usize) {
+        let [xx, xy, yy] = inverse;
+        let force = [xx * s[0] + xy * s[1], xy * s[0] + yy * s[1]];
+        let turning = [xx * q[0] + xy * q[1], xy * q[0] + yy * q[1]];
+        let more = [xx, xy, yy, turning[0], turning[1], q[0] * turning[0] + q[1] * turning[1]];
+        node.a.iter_mut().zip(more).for_each(|(a, more)| *a += more);
+        let force = [force[0], force[1], q[0] * force[0] + q[1] * force[1]];
+        node.g.iter_mut().zip(force).for_each(|(g, force)| *g -= force);
+    }
+    EliminatedRows::Point { sign, child: p, parent: q, inverse, s }
+}
+
+/// Eliminates a joint of any rows and the body that hangs from it.
+#[inline(never)]
+fn eliminate<const N: usize>(
+    at: [u32; 2],
+    found: &RigidRows,
+    nodes: &mut [Node],
+    rows: &[BodyRow],
+    inv_h: f64,
+) -> EliminatedRows {
+    let mut j = [[[0.0; 3]; N]; 2];
+    for r in 0..N {
+        let of = &found.jacobians[r];
+        let [x, y] = of.axis.map(f64::from);
+        let [of_a, of_b] = of.arms.map(f64::from);
+        (j[0][r], j[1][r]) = ([-x, -y, -of_a], [x, y, of_b]);
+    }
+    let mut bodies = found.bodies;
+    if !child_is_b(at, bodies, nodes) {
+        j.swap(0, 1);
+        bodies.swap(0, 1);
+    }
+    let [of_parent, of_child] = j;
+    let (vc, vp) = (velocity(at[0], bodies[1], nodes, rows), velocity(at[1], bodies[0], nodes, rows));
+    let rate = rate_of(&found.errors[..N], inv_h);
+    let (mut s, mut s_matrix) = ([0.0; N], [[0.0; N]; N]);
+    for r in 0..N {
+        s[r] = -(dot(of_child[r], vc) + dot(of_parent[r], vp) + rate * f64::from(found.errors[r]));
+    }
+    match nodes.get_mut(at[0] as usize) {
+        Some(node) => {
+            let of = cofactors(&node.a);
+            let inv_a = 1.0 / (node.a[0] * of[0] + node.a[1] * of[1] + node.a[3] * of[3]);
+            node.a = of.map(|x| x * inv_a);
             let moved = times(&node.a, node.g);
             for r in 0..N {
                 let along = times(&node.a, of_child[r]);
                 s[r] -= dot(of_child[r], moved);
-                for c in 0..N {
-                    s_matrix[r][c] += dot(along, of_child[c]);
-                }
+                s_matrix[r] = of_child.map(|j| dot(along, j));
             }
         }
-        let inverse = inverse_of(s_matrix);
-        if let Some(node) = nodes.get_mut(parent) {
-            let force = product(&inverse, s);
+        None => {
+            let row = &rows[bodies[0] as usize];
+            let [mass, inertia] = [row.velocity[3], row.delta[3]].map(f64::from);
             for r in 0..N {
-                for k in 0..3 {
-                    node.g[k] += of_parent[r][k] * force[r];
-                }
-                let mut along = [0.0; 3];
                 for c in 0..N {
-                    for k in 0..3 {
-                        along[k] += inverse[r][c] * of_parent[c][k];
-                    }
+                    let (p, q) = (of_parent[r], of_parent[c]);
+                    let k = mass * (p[0] * q[0] + p[1] * q[1]) + inertia * (p[2] * q[2]);
+                    s_matrix[r][c] = GIVE * k;
+                    s[r] -= s_matrix[r][c] * f64::from(found.impulses[c]);
                 }
-                let of = of_parent[r];
-                node.a[0] += of[0] * along[0];
-                node.a[1] += of[0] * along[1];
-                node.a[2] += of[1] * along[1];
-                node.a[3] += of[0] * along[2];
-                node.a[4] += of[1] * along[2];
-                node.a[5] += of[2] * along[2];
             }
-        }
-        for r in 0..N {
-            (self.j[0][r], self.j[1][r], self.s[r]) = (of_child[r], of_parent[r], s[r]);
-            self.inverse[r][..N].copy_from_slice(&inverse[r]);
         }
     }
+    let inverse = inverse_of(s_matrix);
+    if let Some(node) = nodes.get_mut(at[1] as usize) {
+        let force = product(&inverse, s);
+        for r in 0..N {
+            let mut along = [0.0; 3];
+            for k in 0..3 {
+                node.g[k] += of_parent[r][k] * force[r];
+                along[k] = (0..N).map(|c| inverse[r][c] * of_parent[c][k]).sum();
+            }
+            let of = of_parent[r];
+            let more = [
+                of[0] * along[0],
+                of[0] * along[1],
+                of[1] * along[1],
+                of[0] * along[2],
+                of[1] * along[2],
+                of[2] * along[2],
+            ];
+            node.a.iter_mut().zip(more).for_each(|(a, more)| *a += more);
+        }
+    }
+    let (mut kept_j, mut kept_inverse, mut kept_s) =
+        ([[[0.0; 3]; ROWS]; 2], [[0.0; ROWS]; ROWS], [0.0; ROWS]);
+    for r in 0..N {
+        (kept_j[0][r], kept_j[1][r], kept_s[r]) = (of_child[r], of_parent[r], s[r]);
+        kept_inverse[r][..N].copy_from_slice(&inverse[r]);
+    }
+    EliminatedRows::Many { size: N, j: kept_j, inverse: kept_inverse, s: kept_s }
+}
 
+impl TreeJoint {
     /// Its impulses, once the parent's change of velocity stands in its g; the child's comes to stand there.
     #[inline(always)]
-    fn substitute<const N: usize>(&self, nodes: &mut [Node]) -> [f32; ROWS] {
+    fn substitute(&self, nodes: &mut [Node]) -> [f32; ROWS] {
         let [child, parent] = self.nodes.map(|node| node as usize);
-        let mut s = [0.0; N];
-        for r in 0..N {
-            s[r] = self.s[r] - nodes.get(parent).map_or(0.0, |node| dot(self.j[1][r], node.g));
-        }
-        let mut increments = [0.0; N];
-        for r in 0..N {
-            increments[r] = (0..N).map(|c| self.inverse[r][c] * s[c]).sum();
-        }
-        if let Some(node) = nodes.get_mut(child) {
-            let mut pushed = node.g;
-            for r in 0..N {
-                for k in 0..3 {
-                    pushed[k] += self.j[0][r][k] * increments[r];
-                }
+        let of_parent = nodes.get(parent).map_or([0.0; 3], |node| node.g);
+        let (force, increments) = match &self.rows {
+            EliminatedRows::Point { sign, child: p, parent: q, inverse: [xx, xy, yy], s } => {
+                let s = [0, 1].map(|k| s[k] + (of_parent[k] + q[k] * of_parent[2]));
+                let [x, y] = [xx * s[0] + xy * s[1], xy * s[0] + yy * s[1]];
+                ([x, y, p[0] * x + p[1] * y], [(sign * x) as f32, (sign * y) as f32, 0.0])
             }
-            node.g = times(&node.a, pushed);
+            EliminatedRows::Many { size, j, inverse, s } => {
+                let (mut force, mut increments) = ([0.0; 3], [0.0; ROWS]);
+                let lacking = [0, 1, 2].map(|r| s[r] - dot(j[1][r], of_parent));
+                for r in 0..*size {
+                    let impulse = dot(inverse[r], lacking);
+                    increments[r] = impulse as f32;
+                    for k in 0..3 {
+                        force[k] += j[0][r][k] * impulse;
+                    }
+                }
+                (force, increments)
+            }
+        };
+        if let Some(node) = nodes.get_mut(child) {
+            node.g = times(&node.a, [node.g[0] + force[0], node.g[1] + force[1], node.g[2] + force[2]]);
         }
-        let mut single = [0.0; ROWS];
-        single.iter_mut().zip(increments).for_each(|(to, from)| *to = from as f32);
-        single
+        increments
     }
 }
 
@@ -442,18 +544,16 @@ fn times(&[xx, xy, yy, xw, yw, ww]: &Symmetric, [x, y, w]: [f64; 3]) -> [f64; 3]
     [xx * x + xy * y + xw * w, xy * x + yy * y + yw * w, xw * x + yw * y + ww * w]
 }
 
-/// The inverse by cofactors.
+/// The determinant times the inverse.
 #[inline(always)]
-fn inverted(&[xx, xy, yy, xw, yw, ww]: &Symmetric) -> Symmetric {
-    let (of_xx, of_xy, of_xw) = (yy * ww - yw * yw, xw * yw - xy * ww, xy * yw - xw * yy);
-    let scale = 1.0 / (xx * of_xx + xy * of_xy + xw * of_xw);
+fn cofactors(&[xx, xy, yy, xw, yw, ww]: &Symmetric) -> Symmetric {
     [
-        of_xx * scale,
-        of_xy * scale,
-        (xx * ww - xw * xw) * scale,
-        of_xw * scale,
-        (xy * xw - xx * yw) * scale,
-        (xx * yy - xy * xy) * scale,
+        yy * ww - yw * yw,
+        xw * yw - xy * ww,
+        xx * ww - xw * xw,
+        xy * yw - xw * yy,
+        xy * xw - xx * yw,
+        xx * yy - xy * xy,
     ]
 }
 
@@ -470,8 +570,10 @@ fn inverse_of<const N: usize>(m: [[f64; N]; N]) -> [[f64; N]; N] {
             inverse[1][0] = inverse[0][1];
         }
         _ => {
-            let [xx, xy, yy, xw, yw, ww] =
-                inverted(&[m[0][0], m[0][1], m[1][1], m[0][2], m[1][2], m[2][2]]);
+            let of = [m[0][0], m[0][1], m[1][1], m[0][2], m[1][2], m[2][2]];
+            let [xx, xy, yy, xw, yw, ww] = cofactors(&of);
+            let scale = 1.0 / (of[0] * xx + of[1] * xy + of[3] * xw);
+            let [xx, xy, yy, xw, yw, ww] = [xx, xy, yy, xw, yw, ww].map(|x| x * scale);
             let full = [[xx, xy, xw], [xy, yy, yw], [xw, yw, ww]];
             for (to, from) in inverse.iter_mut().zip(full) {
                 to.copy_from_slice(&from[..N]);

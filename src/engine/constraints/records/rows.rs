@@ -113,6 +113,11 @@ impl RigidRows {
         let none = Jacobian { axis: [0.0; 2], arms: [0.0; 2] };
         RigidRows { bodies, size: 0, jacobians: [none; ROWS], errors: [0.0; ROWS], impulses: [0.0; ROWS] }
     }
+
+    /// Whether they hold two points together, along x and y.
+    pub fn is_point(&self) -> bool {
+        self.size == 2 && [self.jacobians[0].axis, self.jacobians[1].axis] == [[1.0, 0.0], [0.0, 1.0]]
+    }
 }
 
 /// Rows of the largest block.
