@@ -9,13 +9,14 @@
 //! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
 //! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
+//! * joints that hang from what does not move are solved at once (`constraints/joints/trees`);
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them.
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
-//! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes,
-//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
+//! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes, 1 elimination
+//! along trees of joints, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
 //! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.

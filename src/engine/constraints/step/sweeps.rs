@@ -63,7 +63,8 @@ impl Passes<'_> {
         if !trees.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
             let Workspace { rows, types, poses, .. } = &mut *self.work;
             trees.solve(types, rows, poses, self.input.h);
-            self.over_types_alone(Phase::Solve, PassMode::TakeUp);
+            // Types of the caller's own take it for what it is to them, storing.
+            self.over_types_alone(Phase::Store, PassMode::TakeUp);
             self.clock.lap(Phase::Solve);
         }
     }
