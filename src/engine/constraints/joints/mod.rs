@@ -16,8 +16,8 @@ use crate::engine::constraints::records::rows::ROWS;
 use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
 use rows::{
-    Besides, Blocks, Collected, DisplacementRule, Displacements, Found, JointPair, JointPass, JointWarmStart,
-    Places, RigidRows, RowBlock, Vectors, Velocities, VelocityRule,
+    Besides, Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart,
+    Places, RigidFinder, RigidRows, RowBlock, Vectors, Velocities, VelocityRule,
 };
 use std::f32::consts::TAU;
 use std::fmt;
@@ -118,7 +118,7 @@ impl<T: JointType> Joints<T> {
         let numbers = vec![0.0; T::numbers(form)];
         let mut kept: Vec<f32> = (0..T::kept(form)).map(|i| i as f32).collect();
         let pair = JointPair::new([[0.0; 8]; 2], &[0.0; ANCHORS]);
-        let mut found = Found { pair, rows: RigidRows::none([0; 2]), blocks: 0 };
+        let mut found = RigidFinder { pair, rows: RigidRows::none([0; 2]), blocks: 0 };
         rows_once::<T, f32>(form, &numbers, &mut kept, &mut found);
         (found.blocks == 1).then_some([found.rows.impulses[0] as usize, found.rows.size])
     }
@@ -544,7 +544,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         let (pair, names) = self.pair(constraint, on);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let numbers = &self.numbers[constraint * numbers..][..numbers];
-        let mut found = Found { pair, rows: RigidRows::none(names), blocks: 0 };
+        let mut found = RigidFinder { pair, rows: RigidRows::none(names), blocks: 0 };
         T::rows(self.form, numbers, &mut self.kept[constraint * kept..][..kept], &mut found);
         found.rows
     }

@@ -109,7 +109,7 @@ impl<L> Deref for Besides<L> {
     }
 }
 
-impl Deref for Found {
+impl Deref for RigidFinder {
     type Target = JointPair<f32>;
     fn deref(&self) -> &JointPair<f32> {
         &self.pair
@@ -546,14 +546,14 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
 
 /// Finds the rigid rows of one joint.
 #[derive(Debug)]
-pub(super) struct Found {
+pub(super) struct RigidFinder {
     pub pair: JointPair<f32>,
     pub rows: RigidRows,
     /// Blocks of them.
     pub blocks: usize,
 }
 
-impl JointPass<f32> for Found {
+impl JointPass<f32> for RigidFinder {
     #[inline(always)]
     fn block<const N: usize>(
         &mut self,

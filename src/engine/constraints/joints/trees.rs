@@ -23,7 +23,7 @@
 //! ```
 //!
 //! and back from the root, δv_c = A⁻¹ (g + J_cᵀ δλ). This is Featherstone's articulated-body algorithm in the coordinates of
-//! bodies. Of hinges, whose rows are J = ±(1 | p) with p = (−r_y, r_x), most products are with 0 and 1, and are left out; and
+//! bodies (`featherstone1987`). Of hinges, whose rows are J = ±(1 | p) with p = (−r_y, r_x), most products are with 0 and 1, and are left out; and
 //! with A⁻¹ = B/a, S = T/a and T⁻¹ = U/t, where B and U are of cofactors, S⁻¹ = (a/t) U takes one division.
 //!
 //! A second joint to what does not move closes a loop through it: rows may contradict each other, as those of a straight bridge,
@@ -64,8 +64,8 @@ pub struct Trees {
     aside: Vec<Vec<bool>>,
     /// From the leaves to the roots.
     joints: Vec<TreeJoint>,
-    nodes: Vec<Node>,
-    found: Finding,
+    nodes: Vec<TreeBody>,
+    found: TreeSearch,
 }
 
 /// A joint of a tree.
@@ -89,7 +89,7 @@ enum EliminatedRows {
 
 /// A body of a tree.
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct TreeBody {
     body: u32,
     /// Velocity (m/s, m/s, rad/s).
     v: [f64; 3],
@@ -101,7 +101,7 @@ struct Node {
 
 /// Room to find trees.
 #[derive(Clone, Debug, Default)]
-struct Finding {
+struct TreeSearch {
     /// Where joints of a body begin in `joined`. `[bodies + 1]`
     starts: Vec<u32>,
     /// Joints by body.
@@ -114,7 +114,7 @@ struct Finding {
     visited: Vec<bool>,
     /// Bodies of a component from its root on, and the joint toward the root.
     order: Vec<[u32; 2]>,
-    /// Node of each body.
+    /// TreeBody of each body.
     nodes: Vec<u32>,
 }
 
@@ -174,7 +174,7 @@ impl Trees {
                 self.aside[place[0] as usize][place[1] as usize] = true;
                 self.joints.push(TreeJoint { place, nodes, rows: EliminatedRows::NONE });
             }
-            self.nodes.push(Node { body, v: [0.0; 3], a: [0.0; 6], g: [0.0; 3] });
+            self.nodes.push(TreeBody { body, v: [0.0; 3], a: [0.0; 6], g: [0.0; 3] });
         }
     }
 
@@ -229,7 +229,7 @@ impl Trees {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let Finding { starts, joined, places, ends, visited, order, nodes } = &self.found;
+        let TreeSearch { starts, joined, places, ends, visited, order, nodes } = &self.found;
         held(&self.ends)
             + held(&self.moves)
             + self.aside.iter().map(held).sum::<usize>()
@@ -249,7 +249,7 @@ fn moves_by_impulses(row: &BodyRow) -> bool {
     row.velocity[3] > 0.0
 }
 
-impl Finding {
+impl TreeSearch {
     fn joints_of(&self, body: u32) -> &[u32] {
         let [from, to] = [self.starts[body as usize], self.starts[body as usize + 1]].map(|i| i as usize);
         &self.joined[from..to]
@@ -289,7 +289,7 @@ impl Finding {
 
     /// Lists the joints of each body.
     fn list(&mut self, types: &[Joined], moves: &[bool]) {
-        let Finding { starts, joined, places, ends, visited, nodes, .. } = self;
+        let TreeSearch { starts, joined, places, ends, visited, nodes, .. } = self;
         places.clear();
         ends.clear();
         starts.clear();
@@ -337,7 +337,7 @@ impl EliminatedRows {
 
 /// Whether the child is body b, which J has positive.
 #[inline(always)]
-fn child_is_b([child, parent]: [u32; 2], bodies: [u32; 2], nodes: &[Node]) -> bool {
+fn child_is_b([child, parent]: [u32; 2], bodies: [u32; 2], nodes: &[TreeBody]) -> bool {
     match nodes.get(child as usize) {
         Some(node) => node.body == bodies[1],
         None => nodes[parent as usize].body != bodies[1],
@@ -346,7 +346,7 @@ fn child_is_b([child, parent]: [u32; 2], bodies: [u32; 2], nodes: &[Node]) -> bo
 
 /// Velocity of a node, or of a body that is none.
 #[inline(always)]
-fn velocity(node: u32, body: u32, nodes: &[Node], rows: &[BodyRow]) -> [f64; 3] {
+fn velocity(node: u32, body: u32, nodes: &[TreeBody], rows: &[BodyRow]) -> [f64; 3] {
     nodes.get(node as usize).map_or_else(
         || {
             let [x, y, w, _] = rows[body as usize].velocity;
@@ -368,7 +368,7 @@ fn rate_of(errors: &[f32], inv_h: f64) -> f64 {
 fn eliminate_point(
     at: [u32; 2],
     found: &RigidRows,
-    nodes: &mut [Node],
+    nodes: &mut [TreeBody],
     rows: &[BodyRow],
     inv_h: f64,
 ) -> EliminatedRows {
@@ -424,7 +424,7 @@ fn eliminate_point(
 fn eliminate<const N: usize>(
     at: [u32; 2],
     found: &RigidRows,
-    nodes: &mut [Node],
+    nodes: &mut [TreeBody],
     rows: &[BodyRow],
     inv_h: f64,
 ) -> EliminatedRows {
@@ -505,7 +505,7 @@ fn eliminate<const N: usize>(
 impl TreeJoint {
     /// Its impulses, once the parent's change of velocity stands in its g; the child's comes to stand there.
     #[inline(always)]
-    fn substitute(&self, nodes: &mut [Node]) -> [f32; ROWS] {
+    fn substitute(&self, nodes: &mut [TreeBody]) -> [f32; ROWS] {
         let [child, parent] = self.nodes.map(|node| node as usize);
         let of_parent = nodes.get(parent).map_or([0.0; 3], |node| node.g);
         let (force, increments) = match &self.rows {
