@@ -266,6 +266,79 @@ fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     assert!(read.joint(joints[4]).is_err() && read.joint(joints[3]).is_ok());
 }
 
+/// A heavy chain, which `shim` solves at once, beside a loop of rods and a free pair, which sweeps solve; all are plain hinges.
+fn chain_beside_loop(width: LaneWidth) -> (World, Vec<JointHandle>) {
+    let mut world = World::new(Settings::new(find("shim").unwrap()).exactly(width));
+    let ground = world.add_body(&BodyDef::fixed([0.0, 0.0])).unwrap();
+    let heavy = chain(&mut world, ground, 12, 6.0);
+    let rod = |x: f64, y: f64| {
+        BodyDef::dynamic([x, y]).with(ShapeDef::rectangle(0.5, 0.02).unwrap().with_density(10.0))
+    };
+    let rods = [(0.5, 0.0), (1.5, 0.0), (10.5, 0.0), (11.5, 0.0)].map(|(x, y)| {
+        let body = BodyDef { group: -7, ..rod(x - 40.0, y) };
+        world.add_body(&body).unwrap()
+    });
+    for (a, b, x) in [(0, 1, 1.0), (2, 3, 11.0)] {
+        world.add_joint(&Joint::revolute(rods[a], rods[b]).anchor([x - 40.0, 0.0])).unwrap();
+    }
+    // Two hinges of one body to the ground, and one between: a loop that cannot move.
+    for (body, x) in [(0, 0.0), (1, 2.0)] {
+        world.add_joint(&Joint::revolute(ground, rods[body]).anchor([x - 40.0, 0.0])).unwrap();
+    }
+    world.add_joint(&Joint::revolute(rods[0], rods[1]).anchor([1.5 - 40.0, 0.0])).unwrap();
+    (world, heavy)
+}
+
+#[test]
+fn a_heavy_chain_hangs_together_beside_what_sweeps_solve_with_the_same_bits_at_every_width() {
+    let run = |width| {
+        let (mut world, heavy) = chain_beside_loop(width);
+        let mut worst = 0.0_f64;
+        for _ in 0..120 {
+            world.step().unwrap();
+            worst = heavy.iter().map(|&j| world.joint_state(j).unwrap().gap).fold(worst, f64::max);
+        }
+        (world.state_hash(), worst)
+    };
+    let (hash, worst) = run(LaneWidth::W1);
+    // The ball weighs 378 links.
+    assert!(worst < 2e-4, "{worst} m");
+    for width in LaneWidth::ALL {
+        assert_eq!(run(width).0, hash, "{width:?}");
+    }
+}
+
+#[test]
+fn a_bridge_between_two_pins_bears_its_weight_and_a_load() {
+    let (mut world, ground) = empty(find("shim").unwrap());
+    let (mut before, mut joints) = (ground, vec![]);
+    for i in 0..30 {
+        let plank = ShapeDef::rectangle(0.5, 0.1).unwrap().with_density(10.0);
+        let body = world.add_body(&BodyDef::dynamic([f64::from(i) + 0.5, 5.0]).with(plank)).unwrap();
+        joints.push(world.add_joint(&Joint::revolute(before, body).anchor([f64::from(i), 5.0])).unwrap());
+        before = body;
+    }
+    joints.push(world.add_joint(&Joint::revolute(before, ground).anchor([30.0, 5.0])).unwrap());
+    let load = ShapeDef::rectangle(1.0, 1.0).unwrap().with_density(10.0);
+    world.add_body(&BodyDef::dynamic([15.0, 6.2]).with(load)).unwrap();
+    // Of 30 planks of 2 kg and a load of 40 kg the ends bear all, by the slope of their tension.
+    let (mut borne, mut gap) = (0.0, 0.0_f64);
+    for step in 0..360 {
+        world.step().unwrap();
+        let states = joints.iter().map(|&joint| world.joint_state(joint).unwrap());
+        gap = states.map(|state| state.gap).fold(gap, f64::max);
+        for (joint, plank) in [(joints[0], 1), (joints[30], 30)] {
+            let load = world.joint_state(joint).unwrap().load[0];
+            if step >= 240 {
+                borne += f64::from(world.bodies.angle(plank)).sin().abs() * load / 120.0;
+            }
+        }
+    }
+    assert!(gap < 1e-3, "{gap} m");
+    let weight = (30.0 * 2.0 + 40.0) * 10.0;
+    assert!((borne - weight).abs() < 0.1 * weight, "{borne} of {weight} N");
+}
+
 /// A type of joint from outside: a gear, b turns `ratio` times as far as a.
 #[derive(Clone, Debug)]
 struct Gear {

@@ -144,6 +144,10 @@ fn scenes_have_as_many_bodies_and_shapes_as_they_should() {
         ("crane", 1, 13),
         ("joint_grid:100", 7, 9993),
         ("ragdolls", 2, 66),
+        ("far_chain", 1, 40),
+        ("spinner:6076", 1, 6077),
+        ("falling_hinges", 1, 80),
+        ("rain:40", 5, 11_000),
     ];
     for (name, held, free) in counts {
         let scene = scene(name);

@@ -91,10 +91,7 @@ unsafe fn add_shape(body: b2BodyId, shape: &SceneShape, group: i32) -> Result<()
         def.material.friction = shape.friction as f32;
         def.material.restitution = shape.restitution as f32;
         // Shapes of one negative group never collide, those of one positive group always.
-        if group < 0 {
-            return Err(format!("group {group} is negative"));
-        }
-        def.filter.groupIndex = -group;
+        def.filter.groupIndex = -(2 * group.abs() + i32::from(group < 0));
         match &shape.geometry {
             Geometry::Circle(c) => {
                 let circle = b2Circle { center: vector(c.center), radius: c.radius as f32 };

@@ -41,6 +41,8 @@ pub struct Errors {
     pub top: f64,
     /// Farthest that a dynamic body is from where it started (m).
     pub moved: f64,
+    /// Gaps of joints over the last second, root mean square and largest (m); none without joints.
+    pub gap: Option<[f64; 2]>,
     /// What is known about the scene: the quantity, its unit, its error.
     pub truth: Option<(&'static str, &'static str, f64)>,
 }
@@ -58,6 +60,8 @@ pub struct Checker {
     observed: u32,
     /// Sum of overlaps (m), pairs, and those of them past the middle of a body.
     overlaps: (f64, usize, usize),
+    /// Sum of squares of gaps (m²), their number, and the largest (m).
+    gaps: (f64, usize, f64),
     errors: Errors,
 }
 
@@ -90,6 +94,7 @@ impl Checker {
             squares: 0.0,
             observed: 0,
             overlaps: (0.0, 0, 0),
+            gaps: (0.0, 0, 0.0),
             errors: Errors::default(),
         })
     }
@@ -104,6 +109,8 @@ impl Checker {
                 return Err(format!("body {i} has a number that is none"));
             }
             [bodies.position_x[i], bodies.position_y[i]] = state.position;
+            // Other engines have one float for a coordinate.
+            [bodies.position_x_lo[i], bodies.position_y_lo[i]] = [0.0; 2];
             [bodies.rotation_cos[i], bodies.rotation_sin[i]] = state.rotation;
             [bodies.velocity_x[i], bodies.velocity_y[i]] = state.velocity;
             bodies.angular_velocity[i] = state.angular_velocity;
@@ -121,6 +128,10 @@ impl Checker {
         }
         self.squares += 2.0 * energy / mass;
         self.observed += 1;
+        for (handle, _) in self.mirror.joints() {
+            let gap = self.mirror.joint_state(handle).map_or(f64::INFINITY, |state| state.gap);
+            self.gaps = (self.gaps.0 + gap * gap, self.gaps.1 + 1, self.gaps.2.max(gap));
+        }
         if left.is_multiple_of(STRIDE) {
             self.add_overlaps();
         }
@@ -169,6 +180,7 @@ impl Checker {
             rms_velocity: (self.squares / f64::from(self.observed.max(1))).sqrt(),
             top,
             moved: moves.fold(0.0, f64::max),
+            gap: (self.gaps.1 > 0).then(|| [(self.gaps.0 / self.gaps.1 as f64).sqrt(), self.gaps.2]),
             truth,
             ..self.errors
         }

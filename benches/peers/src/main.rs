@@ -40,6 +40,10 @@ const SCENES: &[(&str, u32, bool)] = &[
     ("junkyard", 800, false),
     ("compounds", 500, false),
     ("stack:20", 2000, true),
+    ("joint_grid:100", 500, false),
+    ("spinner:6076", 500, false),
+    ("falling_hinges:30", 500, false),
+    ("rain:10", 500, false),
 ];
 
 /// Steps of a `--quick` run: two seconds and the second of the check.

@@ -14,7 +14,7 @@ pub struct Rapier {
 }
 
 impl Rapier {
-    /// Errors: more groups than rapier has, or a shape that it refuses.
+    /// Errors: a shape or a joint that it refuses.
     pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
         let mut world = PhysicsWorld { gravity: vector(scene.gravity), ..PhysicsWorld::default() };
         let p = &mut world.integration_parameters;
@@ -43,7 +43,7 @@ impl Rapier {
                 .ccd_enabled(contender.continuous)
                 .can_sleep(false);
             let handle = world.bodies.insert(rigid);
-            let filter = groups_of(body.group, &mut groups)?;
+            let filter = groups_of(body.group, &mut groups);
             for shape in &body.shapes {
                 let collider = collider(shape)?.collision_groups(filter);
                 world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
@@ -58,9 +58,12 @@ impl Rapier {
     }
 }
 
+/// Rate at which a motor nears its speed (1/s): at once, within its greatest force.
+const MOTOR: f32 = 1e6;
+
 fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
     match &joint.kind {
-        JointKind::Revolute(of) if of.reference_angle == 0.0 && of.spring.is_none() => {
+        JointKind::Revolute(of) if of.reference_angle == 0.0 => {
             let mut builder = RevoluteJointBuilder::new()
                 .local_anchor1(vector(of.anchor_a))
                 .local_anchor2(vector(of.anchor_b))
@@ -68,8 +71,13 @@ fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
             if let Some([lower, upper]) = of.limits {
                 builder = builder.limits([lower as f32, upper as f32]);
             }
-            if let Some(motor) = of.motor {
-                builder = builder.motor_velocity(motor.speed as f32, 1.0).motor_max_force(motor.max as f32);
+            // It has one motor: a spring takes the place of a second one, which here is friction of the hinge.
+            if let Some(spring) = of.spring {
+                let omega = std::f64::consts::TAU * spring.hertz;
+                let gains = [omega * omega, 2.0 * spring.damping_ratio * omega].map(|gain| gain as f32);
+                builder = builder.motor_position(spring.rest as f32, gains[0], gains[1]);
+            } else if let Some(motor) = of.motor {
+                builder = builder.motor_velocity(motor.speed as f32, MOTOR).motor_max_force(motor.max as f32);
             }
             Ok(builder.build().into())
         }
@@ -84,19 +92,19 @@ fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
     }
 }
 
-/// Bodies of the same non-zero group do not collide: each group is a bit that filters itself out.
-fn groups_of(group: i32, known: &mut Vec<i32>) -> Result<InteractionGroups, String> {
+/// Bodies of the same non-zero group do not collide: each group is a bit that filters itself out. From the thirty-first on, groups
+/// share bits; in scenes with so many they are in other places.
+fn groups_of(group: i32, known: &mut Vec<i32>) -> InteractionGroups {
     if group == 0 {
-        return Ok(InteractionGroups::default());
+        return InteractionGroups::default();
     }
     let index = known.iter().position(|&g| g == group).unwrap_or_else(|| {
         known.push(group);
         known.len() - 1
     });
     // Bit 0 is that of bodies without a group.
-    let bit = 1_u32.checked_shl(index as u32 + 1).ok_or("more than 31 groups")?;
-    let own = Group::from_bits_truncate(bit);
-    Ok(InteractionGroups::new(own, Group::ALL.difference(own), InteractionTestMode::And))
+    let own = Group::from_bits_truncate(1 << (index % 31 + 1));
+    InteractionGroups::new(own, Group::ALL.difference(own), InteractionTestMode::And)
 }
 
 fn collider(shape: &SceneShape) -> Result<ColliderBuilder, String> {

@@ -26,6 +26,7 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
         "pen. max mm",
         "lost %",
         "rms v mm/s",
+        "gap rms, max mm",
         "top m",
         "pairs",
         "points",
@@ -51,6 +52,7 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
                 significant(e.penetration_max * 1e3),
                 significant(e.lost * 1e2),
                 significant(e.rms_velocity * 1e3),
+                e.gap.map_or(NONE.into(), |gap| gap.map(|gap| significant(gap * 1e3)).join(", ")),
                 format!("{:.3}", e.top),
                 e.pairs.to_string(),
                 o.counts.1.to_string(),
@@ -88,7 +90,7 @@ pub fn stages(outcomes: &[Outcome]) -> Table {
 }
 
 /// The fastest setting of every engine whose errors are no larger than those of Box2D at its
-/// defaults: the mean overlap, and where things rest also the velocity that is left.
+/// defaults: the mean overlap, the gap of joints, and where things rest also the velocity that is left.
 pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     let default = |o: &&Outcome| {
         let c = &o.contender;
@@ -104,6 +106,7 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
                 && o.failed.is_none()
                 && o.errors.as_ref().is_some_and(|e| {
                     e.penetration_mean <= ALLOWED * bound.penetration_mean
+                        && e.gap.zip(bound.gap).is_none_or(|(gap, bound)| gap[0] <= ALLOWED * bound[0])
                         && (!stands || e.rms_velocity <= ALLOWED * bound.rms_velocity)
                 })
         };
@@ -149,14 +152,15 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
         errors(|e| e.penetration_mean),
         errors(|e| e.penetration_max),
         errors(|e| e.rms_velocity),
+        errors(|e| e.gap.map_or(f64::NAN, |gap| gap[0])),
     ];
     format!("| {} |", cells.join(" | "))
 }
 
 /// Head of the summary.
 pub const SUMMARY: &str = "\
-| scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r |
-|---|---|---|---|---|---|---|---|---|";
+| scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r | gap of joints mm s / B / r |
+|---|---|---|---|---|---|---|---|---|---|";
 
 /// A row of `peers.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -193,6 +197,10 @@ pub struct Row {
     penetration_max_m: Option<f64>,
     lost_pairs: Option<f64>,
     rms_velocity_m_s: Option<f64>,
+    #[serde(default)]
+    gap_rms_m: Option<f64>,
+    #[serde(default)]
+    gap_max_m: Option<f64>,
     top_m: Option<f64>,
     reference: String,
     reference_unit: String,
@@ -239,6 +247,8 @@ impl Row {
             penetration_max_m: e.map(|e| e.penetration_max),
             lost_pairs: e.map(|e| e.lost),
             rms_velocity_m_s: e.map(|e| e.rms_velocity),
+            gap_rms_m: e.and_then(|e| Some(e.gap?[0])),
+            gap_max_m: e.and_then(|e| Some(e.gap?[1])),
             top_m: e.map(|e| e.top),
             reference: truth.map_or("", |t| t.0).into(),
             reference_unit: truth.map_or("", |t| t.1).into(),
@@ -258,8 +268,11 @@ fn ms(o: &Outcome, of: fn(&Steps) -> f64) -> String {
     o.step.as_ref().map_or(NONE.into(), |steps| significant(of(steps)))
 }
 
-/// Three digits.
+/// Three digits; of what there is none, a dash.
 fn significant(x: f64) -> String {
+    if x.is_nan() {
+        return NONE.into();
+    }
     let digits = if x == 0.0 { 0 } else { (2 - x.abs().log10().floor() as i32).clamp(0, 5) };
     format!("{x:.*}", digits as usize)
 }

@@ -520,7 +520,8 @@ impl Problem {
                     argument.max(-bound).min(bound)
                 }
             };
-            let by = impulses[i] - self.start[i] - std::mem::replace(&mut change[i], impulses[i] - self.start[i]);
+            let by =
+                impulses[i] - self.start[i] - std::mem::replace(&mut change[i], impulses[i] - self.start[i]);
             self.rows[i].push(&mut moved, by);
         }
     }

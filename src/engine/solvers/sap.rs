@@ -71,9 +71,8 @@ fn step(passes: &mut Passes<'_>) {
     let [softness, millions] = [1, 2].map(|i| f64::from(passes.parameter(i)));
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
-        let mut problem = passes.with_system(Phase::Solve, |system| {
-            Convex::new(system, &rule, softness, h, 1e6 * millions)
-        });
+        let mut problem = passes
+            .with_system(Phase::Solve, |system| Convex::new(system, &rule, softness, h, 1e6 * millions));
         passes.warm_start();
         passes.with_system(Phase::Solve, |system| problem.begin(system.rows()));
         for _ in 0..budget.velocity_iterations {

@@ -10,6 +10,7 @@
 //! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses, and gets no
 //!   faster than the piston can make it;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
+//! * joints that hang from what does not move are solved at once (`constraints/joints/trees`);
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them.
@@ -20,8 +21,8 @@
 //! `simpulse agree --solvers shim`.
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
-//! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes,
-//! `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
+//! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes, 1 elimination
+//! along trees of joints, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
 //! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.
@@ -32,6 +33,7 @@ mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::joints::trees::Trees;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -100,10 +102,11 @@ mod part {
     pub const RELEASE: usize = 8;
     pub const JAMS: usize = 9;
     pub const HELD: usize = 10;
+    pub const TREES: usize = 11;
 }
 
 /// What a run can leave out, and what fails then.
-const MECHANISMS: [Mechanism; 11] = [
+const MECHANISMS: [Mechanism; 12] = [
     Mechanism {
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
@@ -177,6 +180,12 @@ const MECHANISMS: [Mechanism; 11] = [
         case: "rest::a_pile_of_discs_hardly_breathes",
         lines: 0,
     },
+    Mechanism {
+        name: "trees",
+        meaning: "joints that hang from what does not move are solved at once",
+        case: "B17.ratio",
+        lines: lines_of(include_str!("../constraints/joints/trees.rs")),
+    },
 ];
 
 /// What it keeps.
@@ -184,6 +193,7 @@ const MECHANISMS: [Mechanism; 11] = [
 struct Shim {
     hand_down: HandDown,
     jams: Jams,
+    trees: Trees,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -233,6 +243,11 @@ impl Solver for Shim {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
+        if passes.has(part::TREES) {
+            passes.find_trees(&mut self.trees);
+        } else {
+            self.trees = Trees::default();
+        }
         for substep in 0..budget.substeps {
             if substep == 0 {
                 passes.integrate_velocities();
@@ -240,6 +255,7 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
+            passes.solve_trees(&mut self.trees);
             for _ in 0..budget.velocity_iterations {
                 if passes.has(part::BEARING) {
                     passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
@@ -256,6 +272,7 @@ impl Solver for Shim {
             self.jams.bound(passes);
             passes.end_substep(substep);
         }
+        passes.rejoin_trees();
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 
@@ -264,7 +281,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + self.jams.held_bytes() + held(&self.fields)
+        self.hand_down.held_bytes() + self.trees.held_bytes() + self.jams.held_bytes() + held(&self.fields)
     }
 }
 

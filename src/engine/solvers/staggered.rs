@@ -52,7 +52,10 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     breaks: &[
-        (Law::Converges, "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations"),
+        (
+            Law::Converges,
+            "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations",
+        ),
         (Law::Rest, "gradients spread a load more slowly than sweeps"),
     ],
     impacts: ImpactLaw::None,

@@ -58,9 +58,8 @@ pub fn interior_point(problem: &ContactProblem) -> Option<Vec<DPair>> {
     let mut pairs: Vec<Pairs> = vec![[unit, unit, speed, speed, speed, speed]; problem.contacts.len()];
     let mut length = 1.0;
     for _ in 0..STEPS {
-        let product = |x: &Pairs| {
-            (x[0] * x[2] + x[1] * x[3]) / (unit * speed) + x[4] * x[5] / (speed * speed)
-        };
+        let product =
+            |x: &Pairs| (x[0] * x[2] + x[1] * x[3]) / (unit * speed) + x[4] * x[5] / (speed * speed);
         let mean = pairs.iter().map(product).sum::<f64>() / (3 * pairs.len()).max(1) as f64;
         if mean <= GOAL {
             break;
@@ -107,7 +106,8 @@ fn newton_step(
         [body.inv_mass, body.inv_mass, body.inv_inertia][k] > 0.0
     };
     let mut locals = Vec::new();
-    for ((contact, &[more, less, w_more, w_less, p, q]), bias) in problem.contacts.iter().zip(pairs).zip(target)
+    for ((contact, &[more, less, w_more, w_less, p, q]), bias) in
+        problem.contacts.iter().zip(pairs).zip(target)
     {
         let ([vn, ut], mu) = (contact.velocity(velocities), contact.friction);
         let un = vn + bias;
@@ -120,8 +120,7 @@ fn newton_step(
         let k = [more / w_more, less / w_less];
         let w = [w_more, w_less];
         let change = [0, 1].map(|s| goals[s] / w[s] - k[s] * (2.0 * mu * constant[s] - rest[s]));
-        let impulse =
-            [more + less + change[0] + change[1], mu * (more - less + change[0] - change[1])];
+        let impulse = [more + less + change[0] + change[1], mu * (more - less + change[0] - change[1])];
         let g = [
             [k[0] + k[1], 2.0 * mu * (k[0] * factor[0] + k[1] * factor[1])],
             [mu * (k[0] - k[1]), 2.0 * mu * mu * (k[0] * factor[0] - k[1] * factor[1])],
@@ -162,8 +161,13 @@ mod tests {
 
     #[test]
     fn the_path_ends_near_a_solution_and_newton_s_method_at_it() {
-        for p in [sliding_box(), block_on_incline(0.25, 0.24), heavy_on_light(1e3), box_pyramid(8, 0.6), disc_column(30)]
-        {
+        for p in [
+            sliding_box(),
+            block_on_incline(0.25, 0.24),
+            heavy_on_light(1e3),
+            box_pyramid(8, 0.6),
+            disc_column(30),
+        ] {
             let near = interior_point(&p).unwrap();
             let residual = certify(&p, &near);
             assert!(residual < 1e-4, "{}: {residual:e}", p.name);

@@ -65,6 +65,24 @@ pub(super) const STRETCHED: Entry =
     .known(|scene, _| rests_at(scene, 40, 0.0))
     .within(|scene, _| Tolerances::standard(scene).truth(0.04, "1 mm at each of 40 joints"));
 
+/// Solver2D's far chain: where it is, floats are 4 mm apart.
+pub(super) const FAR: Entry =
+    Entry::new("far_chain", "a chain of 40 links of 0.2 m, 53 km from the origin", |_| {
+        let (x, y) = (4e4, -3.5e4 + 4.0);
+        let mut bodies = vec![SceneBody { group: -1, ..SceneBody::fixed([x, y], SceneShape::disc(0.02)) }];
+        let mut joints = vec![];
+        for i in 0..40 {
+            let shape = link(0.1, 0.025).density(20.0);
+            bodies.push(damped(SceneBody::dynamic([x + 0.2 * f64::from(i) + 0.1, y], shape)));
+            let anchor = if i == 0 { [0.0, 0.0] } else { [0.1, 0.0] };
+            joints.push(SceneJoint::revolute(i as usize, i as usize + 1, anchor, [-0.1, 0.0]));
+        }
+        Scene::new("far_chain", bodies).joined(joints).steps(600)
+    })
+    .known(|scene, _| gaps(scene, 0.2))
+    .holds(&[Demand::GainsNoEnergy])
+    .within(|scene, _| Tolerances::standard(scene).truth(0.001, "half a percent of a link of 0.2 m"));
+
 /// A beam of welds that do not give way.
 pub(super) const CANTILEVER: Entry =
     Entry::new("cantilever", "eight planks welded to a wall and to each other", |_| {

@@ -4,9 +4,11 @@ use super::holds::{Demand, Outside};
 use super::linked::{gaps, link};
 use super::parts::{below_floor, ground_line};
 use super::tolerance::Tolerances;
-use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
+use super::truth::{Truth, View, Worst};
+use super::{Capsule, Entry, Geometry, Rectangle, Scene, SceneBody, SceneJoint, SceneShape};
 use crate::engine::bodies::BodyKind;
-use crate::engine::joints::{JointKind, Motor, Prismatic, Spring, Weld, Wheel};
+use crate::engine::joints::{JointKind, Motor, Prismatic, Revolute, Spring, Weld, Wheel};
+use std::f64::consts::{PI, TAU};
 
 /// Box2D's joint grid: discs that do not collide, hinged to the one above and the one on the left.
 pub(super) const GRID: Entry =
@@ -95,3 +97,98 @@ pub(super) const CRANE: Entry =
     })
     .known(|scene, _| gaps(scene, 0.2))
     .within(|scene, _| Tolerances::standard(scene).truth(0.005, "1 % of a link of half a meter"));
+
+/// Ring: height of its middle, its inner radius (m), and its pieces.
+const RING: (f64, f64, u32) = (32.0, 40.0, 360);
+
+/// Speed of the paddle's motor (rad/s).
+const PADDLE: f64 = 5.0;
+
+/// Box2D's spinner: capsules, discs and squares in turn in a ring, where a motor of any torque turns a paddle. Its ring is a chain
+/// of edges; here they are capsules, so that it has an inside and an outside.
+pub(super) const SPINNER: Entry =
+    Entry::new("spinner", "a ring full of small bodies, stirred by a paddle on a motor", |count| {
+        let (middle, inner, pieces) = RING;
+        let thick = 0.5;
+        let at = |i: u32| {
+            let (sin, cos) = (TAU * f64::from(i) / f64::from(pieces)).sin_cos();
+            [(inner + thick) * cos, (inner + thick) * sin]
+        };
+        let piece = |i| {
+            let capsule = Capsule { a: at(i), b: at(i + 1), radius: thick };
+            SceneShape::new(Geometry::Capsule(capsule)).friction(0.1)
+        };
+        let mut ring = SceneBody::fixed([0.0, middle], SceneShape::line(1.0));
+        ring.shapes = (0..pieces).map(piece).collect();
+        let blade = Rectangle { half: [0.4, 20.0], center: [0.0, 0.0], angle: 0.0, radius: 0.2 };
+        let blade = SceneShape::new(Geometry::Box(blade)).friction(0.0);
+        let mut bodies = vec![ring, SceneBody::dynamic([0.0, 12.0], blade)];
+        let hinge = Revolute {
+            anchor_a: [0.0, 12.0 - middle],
+            motor: Some(Motor { speed: PADDLE, max: 1e9 }),
+            ..Revolute::default()
+        };
+        for i in 0..count {
+            let shape = match i % 3 {
+                0 => link(0.25, 0.25),
+                1 => SceneShape::disc(0.35),
+                _ => SceneShape::rectangle(0.35, 0.35),
+            };
+            let shape = shape.density(0.25).friction(0.1).restitution(0.1);
+            let (row, column) = (i / 92, i % 92);
+            let place = [0.5 * f64::from(column) - 23.0, 2.0 + 0.5 * f64::from(row)];
+            bodies.push(SceneBody::dynamic(place, shape));
+        }
+        let joints = vec![SceneJoint::new(0, 1, JointKind::Revolute(hinge))];
+        Scene::new("spinner", bodies).joined(joints).steps(500)
+    })
+    .sized(600, 1, 6076, "small bodies")
+    .known(|scene, _| {
+        let off = |view: &View| Some(f64::from(view.bodies.angular_velocity[1]) - PADDLE);
+        Truth::new("speed of the paddle, last second", "rad/s", PADDLE, Worst::last_second(scene, off))
+    })
+    .holds(&[Demand::Contains(Outside(|view| {
+        let inside = |&i: &usize| {
+            let [x, y] = view.center(i);
+            x.hypot(y - RING.0) <= RING.1 + 1.0
+        };
+        view.bodies.len() - (0..view.bodies.len()).filter(inside).count()
+    }))])
+    .within(|scene, speed| Tolerances::impacts(scene).percent(speed));
+
+/// Box2D's scene for determinism: columns of boxes that lean to and fro, hinged in pairs, come down.
+pub(super) const HINGES: Entry =
+    Entry::new("falling_hinges", "four columns of boxes, hinged in pairs, that fall over", |rows| {
+        // At ±0.1 rad a box is 0.5475 m high.
+        let (half, pitch, lean) = (0.25, 0.55, 0.1_f64);
+        let mut bodies = vec![SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(40.0, 1.0))];
+        let mut joints = vec![];
+        for (column, row) in (0..4).flat_map(|column| (0..rows).map(move |row| (column, row))) {
+            let x = 2.5 * (f64::from(column) - 1.5) + 0.1 * f64::from(row);
+            let body = SceneBody::dynamic(
+                [x, pitch * (0.5 + f64::from(row))],
+                SceneShape::rectangle(half, half).friction(0.3),
+            );
+            let this = bodies.len();
+            bodies.push(body.turned(if row % 2 == 0 { -lean } else { lean }));
+            if row % 2 == 1 {
+                let (sin, cos) = lean.sin_cos();
+                // From the middle of the upper box to the left upper corner of the lower one, and that in the upper one's frame.
+                let [x, y] = [-half * (cos - sin) - 0.1, half * (cos + sin) - pitch];
+                let hinge = Revolute {
+                    anchor_a: [-half, half],
+                    anchor_b: [cos * x + sin * y, cos * y - sin * x],
+                    limits: Some([-0.1 * PI, 0.2 * PI]),
+                    spring: Some(Spring { hertz: 1.0, damping_ratio: 1.0, rest: 0.0 }),
+                    motor: Some(Motor { speed: 0.0, max: 0.25 }),
+                    ..Revolute::default()
+                };
+                joints.push(SceneJoint::new(this - 1, this, JointKind::Revolute(hinge)));
+            }
+        }
+        Scene::new("falling_hinges", bodies).joined(joints).steps(500)
+    })
+    .sized(20, 2, 200, "boxes in a column")
+    .known(|scene, _| gaps(scene, 0.0))
+    .holds(&[Demand::Contains(Outside(below_floor))])
+    .within(|scene, _| Tolerances::impacts(scene).truth(0.0025, "half a percent of a box"));

@@ -97,6 +97,7 @@ pub static CATALOG: &[Entry] = &[
     chains::BRIDGE,
     chains::BALL,
     chains::STRETCHED,
+    chains::FAR,
     chains::CANTILEVER,
     chains::HANGING_CHAIN,
     pendulums::PENDULUM,
@@ -106,7 +107,10 @@ pub static CATALOG: &[Entry] = &[
     machines::VEHICLE,
     machines::CRANE,
     machines::GRID,
+    machines::SPINNER,
+    machines::HINGES,
     ragdolls::PILE,
+    ragdolls::RAIN,
 ];
 
 /// A row of [`CATALOG`].

@@ -3,16 +3,29 @@
 use super::holds::{Demand, Outside};
 use super::linked::gaps;
 use super::tolerance::Tolerances;
+use super::truth::View;
 use super::{Capsule, Entry, Geometry, Scene, SceneBody, SceneJoint, SceneShape};
-use crate::engine::joints::{JointKind, Motor, Revolute};
+use crate::engine::joints::{JointKind, Motor, Revolute, Spring};
 use std::f64::consts::PI;
 
 /// A bone: its parent, height of its middle (m), lower and upper end (m from there), radius (m), height of the hinge to
-/// the parent (m), limits of the angle (π), friction of the hinge (of [`FRICTION`]).
+/// the parent (m), limits of the angle (π), friction of the hinge (of [`Muscles::friction`]).
 type Bone = (usize, f64, [f64; 2], f64, f64, [f64; 2], f64);
 
-/// Friction of a hinge (N·m).
-const FRICTION: f64 = 0.025;
+/// What moves the hinges of a human.
+#[derive(Clone, Copy)]
+struct Muscles {
+    /// Friction of a hinge (N·m).
+    friction: f64,
+    spring: Option<Spring>,
+}
+
+/// Solver2D's.
+const LIMP: Muscles = Muscles { friction: 0.025, spring: None };
+
+/// Those of Box2D's rain.
+const TENSE: Muscles =
+    Muscles { friction: 0.05, spring: Some(Spring { hertz: 5.0, damping_ratio: 0.5, rest: 0.0 }) };
 
 #[rustfmt::skip]
 const BONES: [Bone; 11] = [
@@ -34,7 +47,13 @@ fn capsule(a: [f64; 2], b: [f64; 2], radius: f64) -> SceneShape {
 }
 
 /// Adds a human with its feet at `at` (m), whose bones do not collide with each other.
-fn add_human(bodies: &mut Vec<SceneBody>, joints: &mut Vec<SceneJoint>, at: [f64; 2], group: i32) {
+fn add_human(
+    bodies: &mut Vec<SceneBody>,
+    joints: &mut Vec<SceneJoint>,
+    at: [f64; 2],
+    group: i32,
+    muscles: Muscles,
+) {
     let first = bodies.len();
     for (i, &(parent, y, [low, high], radius, pivot, limits, friction)) in BONES.iter().enumerate() {
         let mut body = SceneBody::dynamic([at[0], at[1] + y], capsule([0.0, low], [0.0, high], radius));
@@ -49,7 +68,8 @@ fn add_human(bodies: &mut Vec<SceneBody>, joints: &mut Vec<SceneJoint>, at: [f64
                 anchor_a: [0.0, pivot - BONES[parent].1],
                 anchor_b: [0.0, pivot - y],
                 limits: Some(limits.map(|x| x * PI)),
-                motor: Some(Motor { speed: 0.0, max: FRICTION * friction }),
+                spring: muscles.spring,
+                motor: Some(Motor { speed: 0.0, max: muscles.friction * friction }),
                 ..Revolute::default()
             };
             joints.push(SceneJoint::new(first + parent, first + i, JointKind::Revolute(hinge)));
@@ -64,13 +84,52 @@ pub(super) const PILE: Entry = Entry::new("ragdolls", "humans that fall into a t
     let mut joints = vec![];
     for i in 0..count {
         let x = if i % 2 == 0 { -0.5 } else { 0.5 };
-        add_human(&mut bodies, &mut joints, [x, 4.0 + 1.8 * f64::from(i)], -1 - i as i32);
+        add_human(&mut bodies, &mut joints, [x, 4.0 + 1.8 * f64::from(i)], -1 - i as i32, LIMP);
     }
     Scene::new("ragdolls", bodies).joined(joints).steps(500)
 })
 .sized(6, 1, 200, "humans")
 .known(|scene, _| gaps(scene, 0.5))
-.holds(&[Demand::Contains(Outside(|view| {
-    (0..view.bodies.len()).filter(|&i| view.center(i)[1].is_nan() || view.center(i)[1] < -5.0).count()
-}))])
-.within(|scene, _| Tolerances::impacts(scene).truth(0.005, "a centimeter between two bones is seen"));
+.holds(&[Demand::Contains(Outside(|view| below(view, -5.0)))])
+.within(|scene, _| Tolerances::impacts(scene).truth(0.005, SEEN));
+
+const SEEN: &str = "a centimeter between two bones is seen";
+
+/// Bodies whose center is below `height` (m); NaN counts.
+fn below(view: &View, height: f64) -> usize {
+    view.bodies.len() - (0..view.bodies.len()).filter(|&i| view.center(i)[1] >= height).count()
+}
+
+/// Floors, and the distance from one to the next (m).
+const FLOORS: (u32, f64) = (5, 45.0);
+
+/// Box2D's rain: groups of five humans fall on five floors. There they come one group after the other; here all are in the
+/// air from the start, so that the groups land one after the other: group c on a floor has its feet 2 + 1.5 c m above it, at most
+/// 40 m as there. Its floors are 125 m wide at either side.
+pub(super) const RAIN: Entry = Entry::new("rain", "humans that rain on five floors", |columns| {
+    let (mut bodies, mut joints) = (vec![], vec![]);
+    for row in 0..FLOORS.0 {
+        let mut floor = SceneBody::fixed([0.0, FLOORS.1 * f64::from(row)], SceneShape::line(1.0));
+        floor.shapes = (0..501)
+            .map(|i| SceneShape::rectangle_at([0.25, 0.25], [0.5 * f64::from(i) - 125.0, 0.0]))
+            .collect();
+        bodies.push(floor);
+    }
+    for (column, row) in (0..columns).flat_map(|column| (0..FLOORS.0).map(move |row| (column, row))) {
+        // Columns are spread over the floor whatever their number.
+        let step = 250.0 / f64::from(columns);
+        let left = step * (f64::from(column) + 0.5) - 125.0;
+        let height = FLOORS.1 * f64::from(row) + (2.0 + 1.5 * f64::from(column)).min(40.0);
+        for i in 0..5 {
+            let human = (column * FLOORS.0 + row) * 5 + i;
+            let at = [left + 0.5 * f64::from(i), height];
+            add_human(&mut bodies, &mut joints, at, -1 - human as i32, TENSE);
+        }
+    }
+    Scene::new("rain", bodies).joined(joints).steps(500)
+})
+.sized(2, 1, 40, "groups of humans on each floor")
+.known(|scene, _| gaps(scene, 0.5))
+// The lowest floor is at 0.
+.holds(&[Demand::Contains(Outside(|view| below(view, -5.0)))])
+.within(|scene, _| Tolerances::impacts(scene).truth(0.005, SEEN));

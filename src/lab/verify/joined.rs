@@ -109,6 +109,30 @@ pub(super) static CASES: &[Case] = &[
         No(SWEEPS),
     ),
     Case::new(
+        "B17.beam",
+        "drop of the tip of eight planks welded to a wall and to each other, worst",
+        "m",
+        "8 cm: 1 % of its length",
+        beam,
+        No(SWEEPS),
+    ),
+    Case::new(
+        "B17.crane",
+        "gap of a crane that takes the load of 1000 links along its jib, rms",
+        "m",
+        "5 mm: 1 % of a link",
+        crane,
+        No(SWEEPS),
+    ),
+    Case::new(
+        "B17.far",
+        "gap of a chain 53 km from the origin, rms",
+        "m",
+        "1 mm: half a percent of a link",
+        far_chain,
+        No("in 32 bits without more, places are 4 mm apart there"),
+    ),
+    Case::new(
         "B20.bridge",
         "gap of a bridge of 160 links over 160 m, rms",
         "m",
@@ -319,6 +343,21 @@ fn ratio(lab: &Lab) -> Result<Finding, Failure> {
         let rms = f64::sqrt(sum / count);
         Ok((rms, rms <= 0.005))
     })
+}
+
+/// B17.
+fn beam(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("cantilever", 0.08)
+}
+
+/// B17.
+fn crane(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("crane", 0.005)
+}
+
+/// B17.
+fn far_chain(lab: &Lab) -> Result<Finding, Failure> {
+    lab.catalog("far_chain", 0.001)
 }
 
 /// B20.

@@ -5,17 +5,19 @@
 //! sweeps in any order, Jacobi sweeps, split masses, position sweeps.
 
 pub mod rows;
+pub mod trees;
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
+use crate::engine::constraints::records::rows::ROWS;
 use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
 use glam::Vec2;
 use rows::{
-    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart, Places,
-    RowBlock, Vectors, Velocities, VelocityRule,
+    Besides, Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart,
+    Places, RigidFinder, RigidRows, RowBlock, Vectors, Velocities, VelocityRule,
 };
 use std::f32::consts::TAU;
 use std::fmt;
@@ -98,6 +100,10 @@ pub struct Joints<T: JointType> {
     summed: Vec<f32>,
     /// Substep that the impulses belong to (s).
     h: f32,
+    /// Rigid rows that sweeps leave alone; empty if there are none. `[joints]`
+    aside: Vec<bool>,
+    /// Where the impulses of the rigid block are among the kept numbers, and how many; none unless there is one block.
+    rigid: Option<[usize; 2]>,
 }
 
 impl<T: JointType> Joints<T> {
@@ -105,8 +111,32 @@ impl<T: JointType> Joints<T> {
     /// to (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        let (booked, summed) = (vec![], vec![]);
-        Joints { joints, form, swapped, ends, anchors, numbers, kept, angles, booked, summed, h }
+        let (booked, summed, aside, rigid) = (vec![], vec![], vec![], Self::rigid_block(form));
+        Joints {
+            joints,
+            form,
+            swapped,
+            ends,
+            anchors,
+            numbers,
+            kept,
+            angles,
+            booked,
+            summed,
+            h,
+            aside,
+            rigid,
+        }
+    }
+
+    /// Where the rigid block is: kept numbers that are their own places tell.
+    fn rigid_block(form: T::Form) -> Option<[usize; 2]> {
+        let numbers = vec![0.0; T::numbers(form)];
+        let mut kept: Vec<f32> = (0..T::kept(form)).map(|i| i as f32).collect();
+        let pair = JointPair::new([[0.0; 8]; 2], &[0.0; ANCHORS]);
+        let mut found = RigidFinder { pair, rows: RigidRows::none([0; 2]), blocks: 0 };
+        rows_once::<T, f32>(form, &numbers, &mut kept, &mut found);
+        (found.blocks == 1).then_some([found.rows.impulses[0] as usize, found.rows.size])
     }
 
     /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
@@ -290,6 +320,71 @@ impl<T: JointType> Joints<T> {
         self.pass::<L, _>(on, false, |pair| Velocities { pair, by });
     }
 
+    /// As [`Self::sweep`], without the rigid rows that are set aside.
+    #[inline(never)]
+    fn sweep_besides<L: Lanes>(&self, by: VelocityRule, mut on: TypeInput<'_>) {
+        let (first_kept, stride) = (self.first_kept(), self.stride());
+        let rigid_alone = self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form));
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let [rows_a, rows_b] =
+                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
+            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
+            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
+            for (record, (batch, (joints, (row_a, row_b)))) in
+                parts.records.chunks_exact_mut(stride).zip(indices)
+            {
+                let joints = &joints.entries()[..segment.filled(batch, L::WIDTH)];
+                if rigid_alone && joints.iter().all(|&joint| self.aside[joint as usize]) {
+                    continue;
+                }
+                let mut solved = [L::splat(1.0)];
+                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut solved);
+                for (lane, &joint) in lanes.iter_mut().zip(joints) {
+                    *lane = if self.aside[joint as usize] { 0.0 } else { 1.0 };
+                }
+                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
+                let (numbers, kept) = record.split_at_mut(first_kept);
+                let (anchors, numbers) = numbers.split_at(ANCHORS);
+                let pair = JointPair::new(bodies, anchors);
+                let mut pass = Besides { of: Velocities { pair, by }, solved: solved[0] };
+                T::rows(self.form, numbers, kept, &mut pass);
+                let [a, b] = pass.bodies;
+                if pushes[1] {
+                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+                }
+                if pushes[0] {
+                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+                }
+            }
+        }
+    }
+
+    /// Records take up impulses of the rigid rows that are set aside.
+    fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
+        let Some([place, rows]) = self.rigid.filter(|_| !self.aside.is_empty()) else { return };
+        let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let lists = parts.contact.batches::<L::Index>();
+            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut record[first..][..rows]);
+                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+                    let joint = joint as usize;
+                    if self.aside[joint] {
+                        let values = &self.kept[joint * kept + place..][..rows];
+                        for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
+                            to[lane] = value;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     fn displace<L: Lanes>(&self, by: DisplacementRule, on: TypeInput<'_>) {
         let moves = matches!(by, DisplacementRule::Position { .. });
         self.pass::<L, _>(on, moves, |pair| Displacements { pair, by });
@@ -338,8 +433,9 @@ impl<T: JointType> Joints<T> {
 }
 
 impl<T: JointType> Joints<T> {
-    /// States the rows of one joint, in one lane, to a pass over `blocks`; `booked`: with the impulses of the step.
-    fn state(&mut self, joint: usize, Placed { rows, poses }: Placed<'_>, blocks: Blocks<'_>, booked: bool) {
+    /// The two bodies of one joint, in one lane, and their names.
+    #[inline]
+    fn pair(&self, joint: usize, Placed { rows, poses }: Placed<'_>) -> (JointPair<f32>, [u32; 2]) {
         let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
         let [a, b] = names.map(|body| body as usize);
@@ -352,7 +448,12 @@ impl<T: JointType> Joints<T> {
             (turned(a, [ax, ay]), turned(b, [bx, by]), poses[a].position, poses[b].position);
         let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
         let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
-        let pair = JointPair::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]);
+        (JointPair::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]), names)
+    }
+
+    /// States the rows of one joint, in one lane, to a pass over `blocks`; `booked`: with the impulses of the step.
+    fn state(&mut self, joint: usize, on: Placed<'_>, blocks: Blocks<'_>, booked: bool) {
+        let (pair, names) = self.pair(joint, on);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let numbers = &self.numbers[joint * numbers..][..numbers];
         let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
@@ -411,6 +512,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         match (on.phase, on.mode) {
             (_, PassMode::Masses) => {}
             (_, PassMode::Vector(of)) => at_width!(width, Self::vector_pass(self, of, on)),
+            (_, PassMode::TakeUp) => at_width!(width, Self::take_up(self, on)),
             (_, PassMode::Forget) => at_width!(width, Self::forget(self, on)),
             (_, PassMode::Book) => {
                 self.booked.resize(self.joints.len(), Booked::default());
@@ -439,7 +541,11 @@ impl<T: JointType> ConstraintType for Joints<T> {
                     relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
                     inv_h,
                 };
-                at_width!(width, Self::sweep(self, by, on))
+                if self.aside.is_empty() {
+                    at_width!(width, Self::sweep(self, by, on))
+                } else {
+                    at_width!(width, Self::sweep_besides(self, by, on))
+                }
             }
             _ => {}
         }
@@ -456,6 +562,31 @@ impl<T: JointType> ConstraintType for Joints<T> {
     fn collect_booked(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
         self.summed.resize(self.kept.len(), 0.0);
         self.state(constraint, on, Blocks::To(to), true);
+    }
+
+    fn is_rigid(&self) -> bool {
+        self.rigid.is_some()
+    }
+
+    fn rigid_rows(&mut self, constraint: usize, on: Placed<'_>) -> RigidRows {
+        let (pair, names) = self.pair(constraint, on);
+        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
+        let numbers = &self.numbers[constraint * numbers..][..numbers];
+        let mut found = RigidFinder { pair, rows: RigidRows::none(names), blocks: 0 };
+        T::rows(self.form, numbers, &mut self.kept[constraint * kept..][..kept], &mut found);
+        found.rows
+    }
+
+    fn add_to_rigid(&mut self, constraint: usize, increments: [f32; ROWS]) {
+        let Some([place, rows]) = self.rigid else { return };
+        let kept = T::kept(self.form);
+        let impulses = &mut self.kept[constraint * kept + place..][..rows];
+        impulses.iter_mut().zip(increments).for_each(|(impulse, more)| *impulse += more);
+    }
+
+    fn set_aside(&mut self, which: &[bool]) {
+        self.aside.clear();
+        self.aside.extend_from_slice(which);
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {
@@ -479,6 +610,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
             + held(&self.kept)
             + held(&self.summed)
             + held(&self.angles)
+            + held(&self.aside)
     }
 
     fn boxed(&self) -> Box<dyn ConstraintType> {

@@ -48,7 +48,7 @@ use crate::engine::constraints::kernels::pass::VectorTask;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::numerics::small::solve;
 use crate::engine::constraints::records::rows::ROWS;
-pub use crate::engine::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
+pub use crate::engine::constraints::records::rows::{Jacobian, RigidRows, RowBlock, RowLaw, cross};
 use crate::engine::lanes::Lanes;
 use std::f32::consts::TAU;
 use std::ops::Deref;
@@ -100,6 +100,21 @@ macro_rules! is_pair {
     )*};
 }
 is_pair! { JointWarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
+
+impl<L> Deref for Besides<L> {
+    type Target = JointPair<L>;
+    #[inline(always)]
+    fn deref(&self) -> &JointPair<L> {
+        &self.of.pair
+    }
+}
+
+impl Deref for RigidFinder {
+    type Target = JointPair<f32>;
+    fn deref(&self) -> &JointPair<f32> {
+        &self.pair
+    }
+}
 
 impl Deref for Collected<'_> {
     type Target = JointPair<f32>;
@@ -248,6 +263,34 @@ impl<L: Lanes> JointPass<L> for JointWarmStart<L> {
 pub(super) struct Velocities<L> {
     pub pair: JointPair<L>,
     pub by: VelocityRule,
+}
+
+/// Solves velocities of all rows but the rigid ones of some joints.
+#[derive(Debug)]
+pub(super) struct Besides<L> {
+    pub of: Velocities<L>,
+    /// 1 where rigid rows are solved, 0 where they are left alone.
+    pub solved: L,
+}
+
+impl<L: Lanes> JointPass<L> for Besides<L> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        if !matches!(law, RowLaw::Rigid) {
+            return self.of.block(j, error, law, kept);
+        }
+        let (mut before, bodies) = ([L::zero(); N], self.of.pair.bodies);
+        before.copy_from_slice(&kept[..N]);
+        self.of.block(j, error, law, kept);
+        for (new, old) in kept.iter_mut().zip(before) {
+            *new = self.solved.select_positive(*new, old);
+        }
+        for (body, old) in self.of.pair.bodies.iter_mut().zip(bodies) {
+            for k in VELOCITY {
+                body[k] = self.solved.select_positive(body[k], old[k]);
+            }
+        }
+    }
 }
 
 /// How velocities are solved.
@@ -515,6 +558,34 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
             }
         }
         places.next += N;
+    }
+}
+
+/// Finds the rigid rows of one joint.
+#[derive(Debug)]
+pub(super) struct RigidFinder {
+    pub pair: JointPair<f32>,
+    pub rows: RigidRows,
+    /// Blocks of them.
+    pub blocks: usize,
+}
+
+impl JointPass<f32> for RigidFinder {
+    #[inline(always)]
+    fn block<const N: usize>(
+        &mut self,
+        j: [Jacobian<f32>; N],
+        error: [f32; N],
+        law: RowLaw<f32>,
+        impulse: &mut [f32],
+    ) {
+        if matches!(law, RowLaw::Rigid) {
+            self.blocks += 1;
+            self.rows.size = N;
+            self.rows.jacobians[..N].copy_from_slice(&j);
+            self.rows.errors[..N].copy_from_slice(&error);
+            self.rows.impulses[..N].copy_from_slice(&impulse[..N]);
+        }
     }
 }
 

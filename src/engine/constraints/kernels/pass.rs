@@ -86,6 +86,8 @@ pub enum PassMode {
     Drive,
     /// Accumulated impulses are added to those of the step, for metrics.
     Book,
+    /// Records take up the impulses of rigid rows that sweeps leave alone.
+    TakeUp,
     /// The solver does not start warm: only accumulated impulses are set to zero.
     Forget,
 }

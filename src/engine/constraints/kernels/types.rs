@@ -17,7 +17,7 @@ use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::constraints::records::rows::RowBlock;
+use crate::engine::constraints::records::rows::{ROWS, RigidRows, RowBlock};
 use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
@@ -168,6 +168,22 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
 
     /// Takes over the impulses of its `blocks`, which are those of [`Self::collect`].
     fn replace(&mut self, _constraint: usize, _on: Placed<'_>, _blocks: &[RowBlock]) {}
+
+    /// Whether a constraint has one block of rigid rows, so that [`Self::rigid_rows`] has some.
+    fn is_rigid(&self) -> bool {
+        false
+    }
+
+    /// The rigid rows of a constraint as bodies are now: for solvers that solve those of many at once.
+    fn rigid_rows(&mut self, constraint: usize, _on: Placed<'_>) -> RigidRows {
+        RigidRows::none(self.ends()[constraint])
+    }
+
+    /// Adds to the accumulated impulses of the rigid rows; records take them up in [`PassMode::TakeUp`].
+    fn add_to_rigid(&mut self, _constraint: usize, _increments: [f32; ROWS]) {}
+
+    /// Velocity sweeps leave rigid rows of these constraints alone; empty: of none. `[constraints]`
+    fn set_aside(&mut self, _which: &[bool]) {}
 
     /// Accumulated impulses of a constraint (N·s or N·m·s), for those who ask.
     fn impulses(&self, _constraint: usize) -> &[f32] {

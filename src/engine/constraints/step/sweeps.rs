@@ -1,7 +1,8 @@
 //! Passes over constraints: warm starts, velocity sweeps and position sweeps.
 
-use super::{Passes, ROW};
+use super::{Passes, ROW, Workspace};
 use crate::engine::clock::Phase;
+use crate::engine::constraints::joints::trees::Trees;
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
@@ -47,6 +48,30 @@ impl Passes<'_> {
             self.over_types_alone(Phase::Prepare, PassMode::Forget);
             self.clock.lap(Phase::Solve);
         }
+    }
+
+    /// Finds the joints that [`Self::solve_trees`] solves, which sweeps leave alone until [`Self::rejoin_trees`].
+    pub fn find_trees(&mut self, trees: &mut Trees) {
+        if !self.work.types.is_empty() {
+            trees.find(&self.work.types, &self.work.rows);
+            trees.set_aside(&mut self.work.types);
+        }
+    }
+
+    /// Pass over joints alone: solves the rigid rows of trees of joints at once.
+    pub fn solve_trees(&mut self, trees: &mut Trees) {
+        if !trees.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            let Workspace { rows, types, poses, .. } = &mut *self.work;
+            trees.solve(types, rows, poses, self.input.h);
+            // Types of the caller's own take it for what it is to them, storing.
+            self.over_types_alone(Phase::Store, PassMode::TakeUp);
+            self.clock.lap(Phase::Solve);
+        }
+    }
+
+    /// Sweeps solve all joints again.
+    pub fn rejoin_trees(&mut self) {
+        self.work.types.iter_mut().for_each(|joined| joined.kind.set_aside(&[]));
     }
 
     /// Pass over joints alone: their records take up what [`ConstraintType::replace`] has changed.

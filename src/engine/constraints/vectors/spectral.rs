@@ -80,7 +80,9 @@ impl ImpulseProblem {
             Axes::Tangent => [0.0, 1.0].map(Wide::splat),
         };
         // Rows of joints, where µ is below zero, always change.
-        update([to], [&self.bias], |[g], [b]| [[0, 1].map(|k| (-b[1]).select_positive(g[k], keeps[k] * g[k]))]);
+        update([to], [&self.bias], |[g], [b]| {
+            [[0, 1].map(|k| (-b[1]).select_positive(g[k], keeps[k] * g[k]))]
+        });
     }
 }
 
