@@ -336,6 +336,7 @@ fn every_csv_header_is_documented() {
     };
     run(&["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "o"]);
     run(&["converge", "stack:3", "--step", "20", "--solvers", "pgs", "--repeats", "0", "--out", "o"]);
+    run(&["agree", "--solvers", "pgs", "--out", "o"]);
     run(&["growth", "--contacts", "1e2,3e2", "--settle", "2", "--repeats", "1", "--out", "o"]);
     run(&["run", "stack:2", "--steps", "3", "--state", "o/state.csv", "--contacts", "o/contacts.csv"]);
     run(&["run", "four_bar", "--steps", "3", "--joints", "o/joints.csv"]);

@@ -28,7 +28,7 @@ use model::Model;
 pub use picture::svg;
 use schedules::Run;
 use serde::Serialize;
-use table::{Against, Entry};
+use table::{Against, AgreementEntry};
 
 /// Iterations, or substeps, that are compared.
 pub const COUNT: u32 = 10;
@@ -86,7 +86,7 @@ pub struct AgreementCurve {
 }
 
 /// Velocities, places and impulses.
-struct State {
+struct ModelState {
     v: Vec<Velocity>,
     x: Vec<Velocity>,
     l: Vec<DPair>,
@@ -117,7 +117,7 @@ fn problems() -> [ContactProblem; 3] {
 /// Compares one solver.
 pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
     let entry = table::find(variant.name);
-    let Entry { against, best, bound, why, .. } = entry;
+    let AgreementEntry { against, best, bound, why, .. } = entry;
     let in_substeps = variant.budget.substeps > 1;
     let mut result = Agreement {
         solver: variant.name,
@@ -157,22 +157,22 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         let there = |k: u32, undo: Option<usize>| {
             let mut model = Model::new(&problem, warm);
             method(&mut model, &Run { variant, budget: budget(k), undo });
-            State { v: model.v, x: model.x, l: model.l }
+            ModelState { v: model.v, x: model.x, l: model.l }
         };
         let [mut ours, mut theirs, mut apart] = [(); 3].map(|_| Vec::new());
         for &k in &counts {
             let here = replay.run(variant, budget(k), if warm { Start::Warm } else { Start::Cold });
-            let here = State { v: here.velocities, x: here.moves, l: here.impulses };
+            let here = ModelState { v: here.velocities, x: here.moves, l: here.impulses };
             let (source, time) = (there(k, None), problem.h * f64::from(budget(k).substeps));
             for (place, most) in departs.iter_mut().enumerate() {
                 *most = most.max(distance(&problem, time, &there(k, Some(place)), &source));
             }
             let residual =
-                |s: &State| natural_map(&problem, Target::Rigid, &s.v, &s.l) / problem.impulse_unit();
+                |s: &ModelState| natural_map(&problem, Target::Rigid, &s.v, &s.l) / problem.impulse_unit();
             ours.push(residual(&here));
             theirs.push(residual(&source));
             // Multipliers of redundant contacts are not determined at the solution.
-            let here = State {
+            let here = ModelState {
                 l: if matches!(against, Against::Solution(_)) { source.l.clone() } else { here.l },
                 ..here
             };
@@ -214,7 +214,7 @@ fn worse(a: f64, b: f64) -> f64 {
 }
 
 /// The distance of two states after `time` (s), see the [module](self).
-fn distance(problem: &ContactProblem, time: f64, one: &State, other: &State) -> f64 {
+fn distance(problem: &ContactProblem, time: f64, one: &ModelState, other: &ModelState) -> f64 {
     let difference = |a: &[Velocity], b: &[Velocity]| {
         a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect::<Vec<_>>()
     };

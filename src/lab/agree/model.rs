@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Rows of both sides of a contact point that are not static.
-pub type PointRows = Vec<(usize, SideRows)>;
+pub type SidesOfPoint = Vec<(usize, SideRows)>;
 
 /// Bodies, impulses and time of a run.
 #[derive(Clone, Debug)]
@@ -40,16 +40,16 @@ pub struct Model<'a> {
 
 /// How a normal row treats the gap s; `[between dynamic bodies, against others]` where both differ.
 #[derive(Clone, Copy, Debug)]
-pub enum Rule {
+pub enum ScalarRule {
     /// A gap may close, overlap is left alone.
     Rigid,
-    /// As [`Rule::Rigid`], and a gap counts as none: the rows of sources without speculative contacts.
+    /// As [`ScalarRule::Rigid`], and a gap counts as none: the rows of sources without speculative contacts.
     Closed,
     /// b = max(β (s + slop)/h, −cap) (`baumgarte1972`): β (1), slop (m), cap (m/s).
     Baumgarte(f64, f64, f64),
     /// Springs (`catto2011`).
-    Soft(Spring),
-    /// As [`Rule::Rigid`], and the share β of an overlap that is less than a limit (m) is pushed apart (`coumans2015`).
+    Soft(ScalarSpring),
+    /// As [`ScalarRule::Rigid`], and the share β of an overlap that is less than a limit (m) is pushed apart (`coumans2015`).
     Shallow(f64, f64),
     /// The share β of an overlap beyond a limit (m); points that are less deep have no row.
     Deep(f64, f64),
@@ -59,7 +59,7 @@ pub enum Rule {
 
 /// Springs of contacts.
 #[derive(Clone, Copy, Debug)]
-pub struct Spring {
+pub struct ScalarSpring {
     /// ω (rad/s) between dynamic bodies; twice that against others.
     pub omega: f64,
     /// ζ (1)
@@ -72,25 +72,25 @@ pub struct Spring {
     pub carries: bool,
 }
 
-impl Spring {
+impl ScalarSpring {
     /// Of `hertz` (Hz), at most `share` of the rate of substeps of `h` (s).
     pub fn new(hertz: f64, share: f64, damping: f64, cap: f64, h: f64) -> Self {
-        Spring { omega: TAU * hertz.min(share / h), damping, cap, scaled: true, carries: false }
+        ScalarSpring { omega: TAU * hertz.min(share / h), damping, cap, scaled: true, carries: false }
     }
 }
 
 /// Order of the rows of a manifold, and which are solved together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Rows {
+pub enum RowOrder {
     /// All normal rows, then all friction rows.
     NormalsFirst,
     /// Normal and friction of one point, then of the other.
     PointByPoint,
     /// All friction rows, then all normal rows.
     FrictionFirst,
-    /// As [`Rows::FrictionFirst`], both normal rows at once; pairs with a determinant below this part of k₁₁ k₂₂ are not.
+    /// As [`RowOrder::FrictionFirst`], both normal rows at once; pairs with a determinant below this part of k₁₁ k₂₂ are not.
     BlockLast(f64),
-    /// As [`Rows::NormalsFirst`], both normal rows at once.
+    /// As [`RowOrder::NormalsFirst`], both normal rows at once.
     BlockFirst(f64),
     /// Normal and friction row of a point at once, exactly.
     Cone,
@@ -98,11 +98,11 @@ pub enum Rows {
 
 /// A velocity sweep.
 #[derive(Clone, Copy, Debug)]
-pub struct Sweep {
+pub struct ScalarSweep {
     /// Of normal rows.
-    pub rule: Rule,
+    pub rule: ScalarRule,
     /// Their order.
-    pub rows: Rows,
+    pub rows: RowOrder,
     /// ω: factor on every increment.
     pub relax: f64,
     /// Whether friction rows are solved.
@@ -113,10 +113,17 @@ pub struct Sweep {
     pub reversed: bool,
 }
 
-impl Sweep {
+impl ScalarSweep {
     /// Normal rows first, on fixed arms.
-    pub fn new(rule: Rule) -> Self {
-        Sweep { rule, rows: Rows::NormalsFirst, relax: 1.0, friction: true, turned: false, reversed: false }
+    pub fn new(rule: ScalarRule) -> Self {
+        ScalarSweep {
+            rule,
+            rows: RowOrder::NormalsFirst,
+            relax: 1.0,
+            friction: true,
+            turned: false,
+            reversed: false,
+        }
     }
 }
 
@@ -181,7 +188,7 @@ impl<'a> Model<'a> {
     }
 
     /// Rows of point `i`.
-    pub fn rows(&self, i: usize, turned: bool) -> PointRows {
+    pub fn rows(&self, i: usize, turned: bool) -> SidesOfPoint {
         let turn = |(body, [n, t]): (usize, SideRows)| {
             let (sin, cos) = if turned { self.x[body][2].sin_cos() } else { (0.0, 1.0) };
             let arms = [n[2] * cos + t[2] * sin, t[2] * cos - n[2] * sin];
@@ -191,12 +198,12 @@ impl<'a> Model<'a> {
     }
 
     /// J v
-    pub fn speed(&self, rows: &PointRows, axis: usize) -> f64 {
+    pub fn speed(&self, rows: &SidesOfPoint, axis: usize) -> f64 {
         rows.iter().map(|(b, j)| (0..3).map(|k| j[axis][k] * self.v[*b][k]).sum::<f64>()).sum()
     }
 
     /// k = J₁ M⁻¹ J₂ᵀ of rows of two points of one manifold (1/kg).
-    pub fn coupling(&self, one: (&PointRows, usize), other: (&PointRows, usize)) -> f64 {
+    pub fn coupling(&self, one: (&SidesOfPoint, usize), other: (&SidesOfPoint, usize)) -> f64 {
         let product = |((b, p), (_, q)): (&(usize, SideRows), &(usize, SideRows))| {
             (0..3).map(|k| self.inverse[*b][k] * p[one.1][k] * q[other.1][k]).sum::<f64>()
         };
@@ -204,19 +211,19 @@ impl<'a> Model<'a> {
     }
 
     /// Effective mass of a row (kg).
-    pub fn mass(&self, rows: &PointRows, axis: usize) -> f64 {
+    pub fn mass(&self, rows: &SidesOfPoint, axis: usize) -> f64 {
         1.0 / self.coupling((rows, axis), (rows, axis))
     }
 
     /// v ← v + M⁻¹ Jᵀ λ
-    pub fn push(&mut self, rows: &PointRows, axis: usize, impulse: f64) {
+    pub fn push(&mut self, rows: &SidesOfPoint, axis: usize, impulse: f64) {
         for (b, j) in rows {
             (0..3).for_each(|k| self.v[*b][k] += self.inverse[*b][k] * j[axis][k] * impulse);
         }
     }
 
     /// x ← x + M⁻¹ Jᵀ p
-    pub fn displace(&mut self, rows: &PointRows, axis: usize, by: f64) {
+    pub fn displace(&mut self, rows: &SidesOfPoint, axis: usize, by: f64) {
         for (b, j) in rows {
             (0..3).for_each(|k| self.x[*b][k] += self.inverse[*b][k] * j[axis][k] * by);
         }
@@ -245,19 +252,21 @@ impl<'a> Model<'a> {
         !(dynamic(&c.body_a) && dynamic(&c.body_b))
     }
 
-    fn line(&self, i: usize, rule: Rule) -> Line {
+    fn line(&self, i: usize, rule: ScalarRule) -> Line {
         let s = self.place(i)[0];
         let rigid = |push: f64| Line { push, scale: 1.0, keep: 1.0 };
         match rule {
-            Rule::Closed => rigid(0.0),
-            Rule::Touching(slop) => Line { scale: if s < slop { 1.0 } else { 0.0 }, ..rigid(0.0) },
-            Rule::Deep(share, limit) if s < -limit => rigid(share * s / self.h),
-            Rule::Deep(..) => Line { scale: 0.0, ..rigid(0.0) },
+            ScalarRule::Closed => rigid(0.0),
+            ScalarRule::Touching(slop) => Line { scale: if s < slop { 1.0 } else { 0.0 }, ..rigid(0.0) },
+            ScalarRule::Deep(share, limit) if s < -limit => rigid(share * s / self.h),
+            ScalarRule::Deep(..) => Line { scale: 0.0, ..rigid(0.0) },
             _ if s > 0.0 => rigid(s / self.h),
-            Rule::Shallow(share, limit) => rigid(if s > -limit { share * s / self.h } else { 0.0 }),
-            Rule::Rigid => rigid(0.0),
-            Rule::Baumgarte(share, slop, cap) => rigid((share * (s + slop).min(0.0) / self.h).max(-cap)),
-            Rule::Soft(Spring { omega, damping, cap, scaled, carries }) => {
+            ScalarRule::Shallow(share, limit) => rigid(if s > -limit { share * s / self.h } else { 0.0 }),
+            ScalarRule::Rigid => rigid(0.0),
+            ScalarRule::Baumgarte(share, slop, cap) => {
+                rigid((share * (s + slop).min(0.0) / self.h).max(-cap))
+            }
+            ScalarRule::Soft(ScalarSpring { omega, damping, cap, scaled, carries }) => {
                 let omega = if self.against_static(i) { 2.0 * omega } else { omega };
                 let rate = omega / (2.0 * damping + self.h * omega);
                 let a = self.h * omega * (2.0 * damping + self.h * omega);
@@ -271,26 +280,26 @@ impl<'a> Model<'a> {
     }
 
     /// c and s of a normal row: its impulse alone is max(0, c − s v_n).
-    fn normal_line(&self, i: usize, sweep: &Sweep) -> DPair {
+    fn normal_line(&self, i: usize, sweep: &ScalarSweep) -> DPair {
         let Line { push, scale, keep } = self.line(i, sweep.rule);
         let (m, old) = (self.mass(&self.rows(i, false), 0), self.l[i][0]);
         let c = keep * old - m * push;
         [old + sweep.relax * (c - old), sweep.relax * m * scale]
     }
 
-    fn set(&mut self, i: usize, axis: usize, rows: &PointRows, new: f64) {
+    fn set(&mut self, i: usize, axis: usize, rows: &SidesOfPoint, new: f64) {
         let old = std::mem::replace(&mut self.l[i][axis], new);
         self.push(rows, axis, new - old);
     }
 
-    fn normal_row(&mut self, i: usize, sweep: &Sweep) {
+    fn normal_row(&mut self, i: usize, sweep: &ScalarSweep) {
         let rows = self.rows(i, sweep.turned);
         let [c, s] = self.normal_line(i, sweep);
         let new = (c - s * self.speed(&rows, 0)).max(0.0);
         self.set(i, 0, &rows, new);
     }
 
-    fn friction_row(&mut self, i: usize, sweep: &Sweep) {
+    fn friction_row(&mut self, i: usize, sweep: &ScalarSweep) {
         let bound = self.problem.contacts[i].friction * self.l[i][0];
         let (rows, m) = (self.rows(i, sweep.turned), self.mass(&self.rows(i, false), 1));
         let new = (self.l[i][1] - sweep.relax * m * self.speed(&rows, 1)).clamp(-bound, bound);
@@ -298,18 +307,18 @@ impl<'a> Model<'a> {
     }
 
     /// The rows of one manifold.
-    pub fn contact(&mut self, m: Range<usize>, sweep: &Sweep) {
+    pub fn contact(&mut self, m: Range<usize>, sweep: &ScalarSweep) {
         let mut points: Vec<usize> = m.collect();
         if sweep.reversed {
             points.reverse();
         }
         let (normals_last, block) = match sweep.rows {
-            Rows::NormalsFirst => (sweep.reversed, None),
-            Rows::FrictionFirst => (true, None),
-            Rows::BlockFirst(singular) => (false, Some(singular)),
-            Rows::BlockLast(singular) => (true, Some(singular)),
-            Rows::Cone => return points.iter().for_each(|&i| self.cone(i, sweep)),
-            Rows::PointByPoint => {
+            RowOrder::NormalsFirst => (sweep.reversed, None),
+            RowOrder::FrictionFirst => (true, None),
+            RowOrder::BlockFirst(singular) => (false, Some(singular)),
+            RowOrder::BlockLast(singular) => (true, Some(singular)),
+            RowOrder::Cone => return points.iter().for_each(|&i| self.cone(i, sweep)),
+            RowOrder::PointByPoint => {
                 return points.iter().for_each(|&i| {
                     self.normal_row(i, sweep);
                     self.friction_row(i, sweep);
@@ -327,7 +336,7 @@ impl<'a> Model<'a> {
     }
 
     /// Both normal rows: whichever of the four cases has no pull and no approach.
-    fn block(&mut self, points: &[usize], sweep: &Sweep, singular: f64) {
+    fn block(&mut self, points: &[usize], sweep: &ScalarSweep, singular: f64) {
         let &[i, j] = points else { return self.normal_row(points[0], sweep) };
         let rows = [i, j].map(|i| self.rows(i, sweep.turned));
         let [[c1, s1], [c2, s2]] = [i, j].map(|i| self.normal_line(i, sweep));
@@ -351,7 +360,7 @@ impl<'a> Model<'a> {
     }
 
     /// Both rows of a point: whichever of open, sticking and slipping either way holds.
-    fn cone(&mut self, i: usize, sweep: &Sweep) {
+    fn cone(&mut self, i: usize, sweep: &ScalarSweep) {
         let rows = self.rows(i, false);
         let Line { push, .. } = self.line(i, sweep.rule);
         let (l, mu) = (self.l[i], self.problem.contacts[i].friction);
@@ -378,19 +387,19 @@ impl<'a> Model<'a> {
     }
 
     /// Gauss–Seidel over the manifolds in this order.
-    pub fn sweep_in(&mut self, sweep: &Sweep, order: impl Iterator<Item = usize>) {
+    pub fn sweep_in(&mut self, sweep: &ScalarSweep, order: impl Iterator<Item = usize>) {
         order.for_each(|m| self.contact(self.manifolds[m].clone(), sweep));
     }
 
     /// Gauss–Seidel over all manifolds.
-    pub fn sweep(&mut self, sweep: &Sweep) {
+    pub fn sweep(&mut self, sweep: &ScalarSweep) {
         self.sweep_in(sweep, 0..self.manifolds.len());
     }
 
     /// All manifolds from the same velocities. If bodies are `split`, each has as many copies as manifolds, of an equal part
     /// of its mass each, and the copies' mean velocity in the end. `whole`: no row sees what another row of its
     /// manifold does, either, and rows are counted instead of manifolds.
-    pub fn jacobi(&mut self, sweep: &Sweep, split: bool, by_rows: bool) {
+    pub fn jacobi(&mut self, sweep: &ScalarSweep, split: bool, by_rows: bool) {
         let mut copies = vec![0.0; self.v.len()];
         for m in &self.manifolds {
             let count = if by_rows { 2.0 * m.len() as f64 } else { 1.0 };
@@ -437,7 +446,7 @@ impl<'a> Model<'a> {
     }
 
     /// b of every normal row under a rule without springs (m/s).
-    pub fn bias(&self, rule: Rule) -> Vec<f64> {
+    pub fn bias(&self, rule: ScalarRule) -> Vec<f64> {
         (0..self.l.len()).map(|i| self.line(i, rule).push).collect()
     }
 
@@ -460,7 +469,7 @@ impl<'a> Model<'a> {
     pub fn positions_in_pairs(&mut self, share: f64, slop: f64, most: f64) {
         for m in self.manifolds.clone() {
             let error = |model: &Self, i: usize| (share * (model.place(i)[0] + slop)).clamp(-most, 0.0);
-            let rows: Vec<PointRows> = m.clone().map(|i| self.rows(i, true)).collect();
+            let rows: Vec<SidesOfPoint> = m.clone().map(|i| self.rows(i, true)).collect();
             let c: Vec<f64> = m.clone().map(|i| error(self, i)).collect();
             let k = |a: usize, b: usize| self.coupling((&rows[a], 0), (&rows[b], 0));
             let p = match c[..] {

@@ -1,7 +1,7 @@
 //! The methods as their sources write them, a function each. What a source has otherwise than the solver here is done its way
 //! where [`Run::undo`] names the place of that departure in the [table](super::table).
 
-use super::model::{Model, Rows, Rule, Spring, Sweep};
+use super::model::{Model, RowOrder, ScalarRule, ScalarSpring, ScalarSweep};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{Variant, xpbd as positions};
 use crate::lab::reference::DPair;
@@ -39,14 +39,14 @@ impl Run {
         self.undo == Some(place)
     }
 
-    fn baumgarte(&self) -> Rule {
-        Rule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
+    fn baumgarte(&self) -> ScalarRule {
+        ScalarRule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
     }
 
     /// Springs at most at this share of the rate of substeps.
-    fn spring(&self, share: f64, h: f64) -> Spring {
+    fn spring(&self, share: f64, h: f64) -> ScalarSpring {
         let damping = self.find("damping_ratio").unwrap_or(10.0);
-        Spring::new(self.get("contact_hertz"), share, damping, self.get("push_speed"), h)
+        ScalarSpring::new(self.get("contact_hertz"), share, damping, self.get("push_speed"), h)
     }
 }
 
@@ -68,28 +68,28 @@ fn substeps(
 }
 
 /// Sweeps alone.
-fn sweeps(model: &mut Model, run: &Run, sweep: Sweep) {
+fn sweeps(model: &mut Model, run: &Run, sweep: ScalarSweep) {
     substeps(model, run, false, |m| m.sweep(&sweep), |_| ());
 }
 
 /// Sweeps, and after motion those of a relaxing rule.
-fn relaxed(model: &mut Model, run: &Run, sweep: Sweep, relax: Sweep) {
+fn relaxed(model: &mut Model, run: &Run, sweep: ScalarSweep, relax: ScalarSweep) {
     let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.sweep(&relax));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
 /// Sweeps, and after motion position sweeps.
-fn placed(model: &mut Model, run: &Run, sweep: Sweep, position: impl Fn(&mut Model)) {
+fn placed(model: &mut Model, run: &Run, sweep: ScalarSweep, position: impl Fn(&mut Model)) {
     let after = |m: &mut Model| (0..run.budget.position_iterations).for_each(|_| position(m));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
 pub(super) fn pgs(model: &mut Model, run: &Run) {
-    let mut sweep = Sweep::new(run.baumgarte());
+    let mut sweep = ScalarSweep::new(run.baumgarte());
     match run.undo {
-        Some(0) => sweep.rows = Rows::PointByPoint,
-        Some(1) => sweep.rule = Rule::Baumgarte(0.2, 0.01, CAP),
-        Some(2) => sweep.rule = Rule::Baumgarte(run.get("baumgarte"), SLOP, f64::INFINITY),
+        Some(0) => sweep.rows = RowOrder::PointByPoint,
+        Some(1) => sweep.rule = ScalarRule::Baumgarte(0.2, 0.01, CAP),
+        Some(2) => sweep.rule = ScalarRule::Baumgarte(run.get("baumgarte"), SLOP, f64::INFINITY),
         _ => {}
     }
     sweeps(model, run, sweep);
@@ -111,17 +111,21 @@ pub(super) fn pgs_substeps(model: &mut Model, run: &Run) {
 }
 
 pub(super) fn sor(model: &mut Model, run: &Run) {
-    let rows = if run.undoes(0) { Rows::PointByPoint } else { Rows::NormalsFirst };
-    sweeps(model, run, Sweep { relax: run.get("relaxation"), rows, ..Sweep::new(run.baumgarte()) });
+    let rows = if run.undoes(0) { RowOrder::PointByPoint } else { RowOrder::NormalsFirst };
+    sweeps(
+        model,
+        run,
+        ScalarSweep { relax: run.get("relaxation"), rows, ..ScalarSweep::new(run.baumgarte()) },
+    );
 }
 
 pub(super) fn nsgs(model: &mut Model, run: &Run) {
-    sweeps(model, run, Sweep { rows: Rows::Cone, ..Sweep::new(run.baumgarte()) });
+    sweeps(model, run, ScalarSweep { rows: RowOrder::Cone, ..ScalarSweep::new(run.baumgarte()) });
 }
 
 pub(super) fn symmetric(model: &mut Model, run: &Run) {
-    let sweep = Sweep::new(run.baumgarte());
-    let back = Sweep { reversed: run.undoes(0), ..sweep };
+    let sweep = ScalarSweep::new(run.baumgarte());
+    let back = ScalarSweep { reversed: run.undoes(0), ..sweep };
     let pair = |m: &mut Model| {
         m.sweep(&sweep);
         m.sweep_in(&back, (0..m.manifolds.len()).rev());
@@ -131,7 +135,7 @@ pub(super) fn symmetric(model: &mut Model, run: &Run) {
 
 pub(super) fn local(model: &mut Model, run: &Run) {
     let times = if run.undoes(0) { 1000 } else { run.get("local_iterations") as usize };
-    let sweep = Sweep::new(run.baumgarte());
+    let sweep = ScalarSweep::new(run.baumgarte());
     let solve = |m: &mut Model| {
         m.sweep_in(&sweep, (0..m.manifolds.len()).flat_map(|i| std::iter::repeat_n(i, times)));
     };
@@ -165,7 +169,7 @@ pub(super) fn shock(model: &mut Model, run: &Run) {
     let of: Vec<usize> = model.manifolds.iter().map(of).collect();
     let mut order: Vec<usize> = (0..of.len()).collect();
     order.sort_by_key(|&i| of[i]);
-    let (inverse, sweep) = (model.inverse.clone(), Sweep::new(run.baumgarte()));
+    let (inverse, sweep) = (model.inverse.clone(), ScalarSweep::new(run.baumgarte()));
     for _ in 0..run.budget.substeps {
         model.accelerate();
         model.warm_start(false);
@@ -192,25 +196,26 @@ pub(super) fn mass_splitting(model: &mut Model, run: &Run) {
     all_at_once(model, run, run.spring(1.0 / 3.0, model.h), true, run.undoes(0));
 }
 
-fn all_at_once(model: &mut Model, run: &Run, spring: Spring, split: bool, by_rows: bool) {
+fn all_at_once(model: &mut Model, run: &Run, spring: ScalarSpring, split: bool, by_rows: bool) {
     let relax = run.find("relaxation").unwrap_or(1.0);
-    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { relax, ..Sweep::new(rule) });
+    let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
+        .map(|rule| ScalarSweep { relax, ..ScalarSweep::new(rule) });
     let after =
         |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.jacobi(&rigid, split, by_rows));
     substeps(model, run, false, |m| m.jacobi(&soft, split, by_rows), after);
 }
 
 pub(super) fn pgs_ngs(model: &mut Model, run: &Run) {
-    let mut sweep = Sweep::new(if run.undoes(1) { Rule::Closed } else { Rule::Rigid });
+    let mut sweep = ScalarSweep::new(if run.undoes(1) { ScalarRule::Closed } else { ScalarRule::Rigid });
     if run.undoes(0) {
-        sweep.rows = Rows::FrictionFirst;
+        sweep.rows = RowOrder::FrictionFirst;
     }
     placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
 }
 
 pub(super) fn pgs_ngs_block(model: &mut Model, run: &Run) {
-    let rule = if run.undoes(0) { Rule::Closed } else { Rule::Rigid };
-    placed(model, run, Sweep { rows: Rows::BlockLast(1e-3), ..Sweep::new(rule) }, |m| {
+    let rule = if run.undoes(0) { ScalarRule::Closed } else { ScalarRule::Rigid };
+    placed(model, run, ScalarSweep { rows: RowOrder::BlockLast(1e-3), ..ScalarSweep::new(rule) }, |m| {
         if run.undoes(1) {
             m.positions_in_pairs(run.get("correction"), SLOP, MOST);
         } else {
@@ -220,7 +225,7 @@ pub(super) fn pgs_ngs_block(model: &mut Model, run: &Run) {
 }
 
 pub(super) fn tgs_ngs(model: &mut Model, run: &Run) {
-    let sweep = Sweep { turned: run.undoes(0), ..Sweep::new(Rule::Rigid) };
+    let sweep = ScalarSweep { turned: run.undoes(0), ..ScalarSweep::new(ScalarRule::Rigid) };
     placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
 }
 
@@ -229,9 +234,10 @@ fn soft(model: &mut Model, run: &Run, share: f64, turned: bool) {
     let mut spring = run.spring(share, model.h);
     spring.scaled = !run.undoes(0);
     if run.undoes(1) {
-        (spring.omega, spring.cap) = (Spring::new(30.0, 0.25, 10.0, 0.0, model.h).omega, 2.0);
+        (spring.omega, spring.cap) = (ScalarSpring::new(30.0, 0.25, 10.0, 0.0, model.h).omega, 2.0);
     }
-    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid].map(|rule| Sweep { turned, ..Sweep::new(rule) });
+    let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
+        .map(|rule| ScalarSweep { turned, ..ScalarSweep::new(rule) });
     relaxed(model, run, soft, rigid);
 }
 
@@ -248,30 +254,35 @@ pub(super) fn tgs_soft(model: &mut Model, run: &Run) {
 }
 
 pub(super) fn box2d(model: &mut Model, run: &Run) {
-    let soft = Sweep { friction: false, ..Sweep::new(Rule::Soft(run.spring(0.125, model.h))) };
-    relaxed(model, run, soft, Sweep::new(Rule::Rigid));
+    let soft =
+        ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Soft(run.spring(0.125, model.h))) };
+    relaxed(model, run, soft, ScalarSweep::new(ScalarRule::Rigid));
 }
 
 pub(super) fn rapier(model: &mut Model, run: &Run) {
-    let rows = Rows::BlockFirst(if run.undoes(0) { 1e-2 } else { 1e-3 });
-    let soft = Sweep { friction: false, rows, ..Sweep::new(Rule::Soft(run.spring(0.125, model.h))) };
-    relaxed(model, run, soft, Sweep { rows, ..Sweep::new(Rule::Rigid) });
+    let rows = RowOrder::BlockFirst(if run.undoes(0) { 1e-2 } else { 1e-3 });
+    let soft = ScalarSweep {
+        friction: false,
+        rows,
+        ..ScalarSweep::new(ScalarRule::Soft(run.spring(0.125, model.h)))
+    };
+    relaxed(model, run, soft, ScalarSweep { rows, ..ScalarSweep::new(ScalarRule::Rigid) });
 }
 
 /// What is left of it without its statics, frames, impacts and jams.
 pub(super) fn shim(model: &mut Model, run: &Run) {
     let rate = run.get("stiffness") / model.h;
-    let spring = Spring {
+    let spring = ScalarSpring {
         carries: true,
-        ..Spring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h)
+        ..ScalarSpring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h)
     };
-    let [soft, rigid] = [Rule::Soft(spring), Rule::Rigid]
-        .map(|rule| Sweep { rows: Rows::BlockFirst(1e-3), ..Sweep::new(rule) });
+    let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
+        .map(|rule| ScalarSweep { rows: RowOrder::BlockFirst(1e-3), ..ScalarSweep::new(rule) });
     relaxed(model, run, soft, rigid);
 }
 
 pub(super) fn projection(model: &mut Model, run: &Run) {
-    let touching = Sweep { friction: false, ..Sweep::new(Rule::Touching(SLOP)) };
+    let touching = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Touching(SLOP)) };
     for _ in 0..run.budget.substeps {
         model.l.fill([0.0; 2]);
         model.accelerate();
@@ -284,15 +295,15 @@ pub(super) fn projection(model: &mut Model, run: &Run) {
 pub(super) fn split_impulse(model: &mut Model, run: &Run) {
     let share = run.get("correction");
     let (rigid, push) = match run.undoes(0) {
-        true => (Rule::Shallow(share, 0.04), Rule::Deep(share, 0.04)),
-        false => (Rule::Rigid, Rule::Baumgarte(share, 0.0, CAP)),
+        true => (ScalarRule::Shallow(share, 0.04), ScalarRule::Deep(share, 0.04)),
+        false => (ScalarRule::Rigid, ScalarRule::Baumgarte(share, 0.0, CAP)),
     };
-    let push = Sweep { friction: false, ..Sweep::new(push) };
+    let push = ScalarSweep { friction: false, ..ScalarSweep::new(push) };
     substeps(
         model,
         run,
         false,
-        |m| m.sweep(&Sweep::new(rigid)),
+        |m| m.sweep(&ScalarSweep::new(rigid)),
         |m| {
             let kept = (m.v.clone(), m.l.clone());
             m.v.fill([0.0; 3]);
@@ -311,11 +322,11 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
     let turned = run.undoes(2);
     let mut sweep = |m: &mut Model, fraction: f64, stick: f64| {
         let rule = match run.undoes(1) && fraction == 0.0 {
-            true => Rule::Closed,
-            false => Rule::Baumgarte(fraction, 0.0, run.get("push_speed")),
+            true => ScalarRule::Closed,
+            false => ScalarRule::Baumgarte(fraction, 0.0, run.get("push_speed")),
         };
         for range in m.manifolds.clone() {
-            m.contact(range.clone(), &Sweep { friction: false, turned, ..Sweep::new(rule) });
+            m.contact(range.clone(), &ScalarSweep { friction: false, turned, ..ScalarSweep::new(rule) });
             let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
             let share = if run.undoes(0) { 2.0 } else { range.len() as f64 };
             for i in range {
@@ -521,7 +532,7 @@ fn plus(a: &[DPair], s: f64, b: &[DPair]) -> Vec<DPair> {
 }
 
 pub(super) fn nncg(model: &mut Model, run: &Run) {
-    let sweep = Sweep::new(run.baumgarte());
+    let sweep = ScalarSweep::new(run.baumgarte());
     let count = run.budget.velocity_iterations;
     model.accelerate();
     model.warm_start(false);
@@ -543,7 +554,7 @@ pub(super) fn nncg(model: &mut Model, run: &Run) {
 }
 
 pub(super) fn anderson(model: &mut Model, run: &Run) {
-    let sweep = Sweep::new(run.baumgarte());
+    let sweep = ScalarSweep::new(run.baumgarte());
     let (count, depth) = (run.budget.velocity_iterations, run.get("depth") as usize);
     model.accelerate();
     model.warm_start(false);
@@ -595,17 +606,17 @@ fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
 }
 
 /// u = J v(λ) + b, and the effective masses of normal rows.
-struct Law {
+struct VectorLaw {
     bias: Vec<f64>,
     mass: Vec<f64>,
     friction: Vec<f64>,
 }
 
-impl Law {
-    fn new(model: &Model, rule: Rule) -> Self {
+impl VectorLaw {
+    fn new(model: &Model, rule: ScalarRule) -> Self {
         let friction = model.problem.contacts.iter().map(|c| c.friction).collect();
         let mass = (0..model.l.len()).map(|i| model.mass(&model.rows(i, false), 0)).collect();
-        Law { bias: model.bias(rule), mass, friction }
+        VectorLaw { bias: model.bias(rule), mass, friction }
     }
 
     fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
@@ -626,7 +637,7 @@ impl Law {
 pub(super) fn apgd(model: &mut Model, run: &Run) {
     model.accelerate();
     model.warm_start(false);
-    let mut law = Law::new(model, run.baumgarte());
+    let mut law = VectorLaw::new(model, run.baumgarte());
     let (mut theta, mut steepness, mut now) = (1.0_f64, 1.0, model.l.clone());
     if run.undoes(0) {
         law.mass.fill(1.0);
@@ -669,7 +680,7 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
 pub(super) fn admm(model: &mut Model, run: &Run) {
     model.accelerate();
     model.warm_start(false);
-    let law = Law::new(model, run.baumgarte());
+    let law = VectorLaw::new(model, run.baumgarte());
     let rho = run.get("penalty");
     let mut lambda = model.l.clone();
     let mut z = lambda.clone();

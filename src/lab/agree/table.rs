@@ -16,7 +16,7 @@ pub enum Against {
 
 /// An entry of the table.
 #[derive(Clone, Copy, Debug)]
-pub struct Entry {
+pub struct AgreementEntry {
     /// The solver.
     pub solver: &'static str,
     /// What it is compared with.
@@ -36,24 +36,24 @@ pub struct Entry {
 /// adds up.
 pub const ROUNDING: f64 = 6e-5;
 
-const fn entry(solver: &'static str, against: Against, best: &'static str) -> Entry {
-    Entry { solver, against, best, departs: &[], bound: ROUNDING, why: "", without: &[] }
+const fn entry(solver: &'static str, against: Against, best: &'static str) -> AgreementEntry {
+    AgreementEntry { solver, against, best, departs: &[], bound: ROUNDING, why: "", without: &[] }
 }
 
 /// The entry of a solver.
-pub fn find(solver: &str) -> Entry {
+pub fn find(solver: &str) -> AgreementEntry {
     let unknown = entry("", Against::Nothing("no entry has been written"), "");
     TABLE.iter().copied().find(|e| e.solver == solver).unwrap_or(unknown)
 }
 
 /// The table, in the order of [`crate::engine::solvers::VARIANTS`].
-pub const TABLE: &[Entry] = &[
+pub const TABLE: &[AgreementEntry] = &[
     entry(
         "projection",
         Against::Method(by::projection),
         "one push and one projection, bodies against the ground",
     ),
-    Entry {
+    AgreementEntry {
         departs: &[
             "both loads of a contact before both frictions (source: point by point)",
             "β 0.3 and a slop of 5 mm (source: 0.2 and 10 mm)",
@@ -61,7 +61,7 @@ pub const TABLE: &[Entry] = &[
         ],
         ..entry("pgs", Against::Method(by::pgs), "10 sweeps, β 0.2, slop 10 mm, warm start (box2d-lite)")
     },
-    Entry {
+    AgreementEntry {
         departs: &[
             "loads before frictions (source: after them)",
             "a gap may close and no more (source: has no approach)",
@@ -72,7 +72,7 @@ pub const TABLE: &[Entry] = &[
             "4 sweeps and 2 position sweeps, correction 0.2, slop 5 mm",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &[
             "a gap may close and no more (source: has no approach)",
             "position sweeps go point by point (source: in pairs)",
@@ -83,7 +83,7 @@ pub const TABLE: &[Entry] = &[
             "4 sweeps and 2 position sweeps, correction 0.2, slop 5 mm",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
         ..entry(
             "pgs_soft",
@@ -91,52 +91,52 @@ pub const TABLE: &[Entry] = &[
             "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 2 m/s",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["velocities are solved, with warm starts (source: positions, without, as `xpbd`)"],
         ..entry("pgs_substeps", Against::Method(by::pgs_substeps), "many substeps of 1 iteration")
     },
-    Entry {
+    AgreementEntry {
         departs: &["rows of a contact keep their order on the way back (source: reversed)"],
         ..entry("symmetric_gs", Against::Method(by::symmetric), "until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         departs: &["both loads of a contact before both frictions (source: in the order of rows)"],
         ..entry("sor", Against::Method(by::sor), "ω by problem, until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         why: "orders are drawn; what they come to is the solution of `pgs`",
         ..entry("random_order", Against::Solution(by::solution), "until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         departs: &["2 local iterations (source: until the contact is solved)"],
         ..entry("local_gs", Against::Method(by::local), "local solver exact, until a residual is reached")
     },
     entry("nsgs", Against::Method(by::nsgs), "local solver exact, until a residual is reached"),
-    Entry {
+    AgreementEntry {
         departs: &["the last iteration is a plain sweep (source: goes on beyond it)"],
         ..entry("nncg", Against::Method(by::nncg), "until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         departs: &["growth of |f| by two forgets all before it (source: keeps it)"],
         ..entry("anderson", Against::Method(by::anderson), "until a residual is reached, depth by problem")
     },
-    Entry {
+    AgreementEntry {
         departs: &["steps scaled by effective masses, L from 1 (source: no scale, L₀ = |K 1|/|1|)"],
         ..entry("apgd", Against::Method(by::apgd), "50 iterations (Chrono), until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         departs: &[
             "the multiplier starts at the law's −u (source: 0)",
             "3 conjugate-gradient steps (source: linear problem solved)",
         ],
         ..entry("admm", Against::Method(by::admm), "ρ by problem, until both residuals are reached")
     },
-    Entry {
+    AgreementEntry {
         why: "Newton's method ends at the solution of the same law, or with the sweeps that it began with",
         ..entry("direct", Against::Solution(by::solution), "until a residual is reached")
     },
     entry("shock", Against::Method(by::shock), "sweeps until contacts are resolved, then 1 upward"),
-    Entry {
+    AgreementEntry {
         departs: &["all overlap by pseudo-velocities (source: beyond 40 mm, by velocities before)"],
         ..entry(
             "split_impulse",
@@ -144,7 +144,7 @@ pub const TABLE: &[Entry] = &[
             "10 sweeps, 0.2 of an overlap per step, no slop",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
         ..entry(
             "jacobi",
@@ -152,11 +152,11 @@ pub const TABLE: &[Entry] = &[
             "4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 4 m/s",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["rows of a contact one after the other (otherwise: all at once, a copy for each)"],
         ..entry("mass_splitting", Against::Method(by::mass_splitting), "rigid, until a residual is reached")
     },
-    Entry {
+    AgreementEntry {
         departs: &["arms of velocity rows are those of the start of the step (source: turned)"],
         ..entry(
             "tgs_ngs",
@@ -164,11 +164,11 @@ pub const TABLE: &[Entry] = &[
             "4 substeps of 1 sweep and 1 position sweep, correction 0.2",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["the push cap is on γ_m β s (source: on β s)"],
         ..entry("tgs_soft", Against::Method(by::tgs_soft), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 4 m/s")
     },
-    Entry {
+    AgreementEntry {
         departs: &[
             "the cone of a point is of the mean load (source: of half the sum, also at one point)",
             "relaxing, a gap may close (source: has no approach)",
@@ -181,11 +181,11 @@ pub const TABLE: &[Entry] = &[
             "4 substeps, 2 relaxing sweeps, β 0.8, stick 0.5, 4 m/s",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &["velocities are corrected on arms of the start of the step (source: turned)"],
         ..entry("xpbd", Against::Method(by::xpbd), "4 to 20 substeps of 1 iteration, no compliance, 4 m/s")
     },
-    Entry {
+    AgreementEntry {
         departs: &["the cone is of the load of now (source: of the last iteration)"],
         ..entry(
             "avbd",
@@ -193,7 +193,7 @@ pub const TABLE: &[Entry] = &[
             "10 iterations and 1 of post-stabilization, β 1e5, γ 0.99, margin 0.5 mm",
         )
     },
-    Entry {
+    AgreementEntry {
         departs: &[
             "the push cap is on γ_m β s (source: on β s)",
             "an eighth of the substep rate, 3 m/s (source: a quarter, 2 m/s)",
@@ -204,12 +204,12 @@ pub const TABLE: &[Entry] = &[
             "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s",
         )
     },
-    Entry {
+    AgreementEntry {
         without: &["statics", "frames", "impacts", "jams"],
         ..entry("shim", Against::Method(by::shim), "14 substeps, stiffness 0.16, ζ 10, 3 m/s, 2 load sweeps")
     },
     entry("box2d", Against::Method(by::box2d), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s"),
-    Entry {
+    AgreementEntry {
         departs: &["pairs below 10⁻³ of k₁₁ k₂₂ go row by row (source: below 10⁻²)"],
         ..entry("rapier", Against::Method(by::rapier), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s")
     },

@@ -290,6 +290,7 @@ mod tests {
         assert_eq!(project_cone(0.5, [0.0, -5.0]), [2.0, -1.0]);
         assert_eq!(project_cone(0.0, [3.0, 7.0]), [3.0, 0.0]);
         assert_eq!(project_cone(0.0, [-3.0, 7.0]), [0.0, 0.0]);
+        assert_eq!(project_cone(0.0, [-3.0, 0.0]), [0.0, 0.0]);
     }
 
     #[test]
