@@ -10,7 +10,7 @@
 //! of joints are in the same vectors, each scaled by its own mass and projected on its bounds.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
-//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 1 B per contact.
+//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. And when
 //! iterations are few: the first ten are no better than Jacobi's.
