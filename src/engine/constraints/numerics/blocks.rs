@@ -181,8 +181,7 @@ mod tests {
             let mut b: Vec<[f64; 3]> = flat.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect();
             assert!(system.factor());
             system.solve(&mut b);
-            let worst =
-                b.iter().flatten().zip(&expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+            let worst = b.iter().flatten().zip(&expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12, "{worst}");
         }
         system.clear();

@@ -22,12 +22,12 @@
 //!
 //! In the plane γ is linear in pieces, and so is ∇ℓ where nothing has the third bound: Newton's method ends after finitely many steps.
 
+use crate::engine::constraints::System;
 use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::engine::constraints::numerics::blocks::{Block3, BlockEnvelope};
 use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
 use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::constraints::System;
 use crate::engine::lanes::BodyRow;
 
 /// Norm of the gradient, relative to that of momenta and impulses, at which the problem is solved: below what f32 resolves.
@@ -141,7 +141,13 @@ impl ConvexBlock {
         let open = ([0.0; 3], [[0.0; 3]; 3]);
         match self.bound {
             ImpulseBound::Free => sticks,
-            ImpulseBound::NotNegative => if y[0] > 0.0 { sticks } else { open },
+            ImpulseBound::NotNegative => {
+                if y[0] > 0.0 {
+                    sticks
+                } else {
+                    open
+                }
+            }
             ImpulseBound::Cone(friction) => {
                 if y[0] > 0.0 && y[1].abs() < friction * y[0] {
                     return sticks;
@@ -261,7 +267,8 @@ impl Convex {
             let jacobian = [0, 1].map(|side| [on(side, 0), on(side, 1), [0.0; 3]]);
             let target = [-f64::from(rule.bias(gap)), 0.0, 0.0];
             let bound = ImpulseBound::Cone(f64::from(friction));
-            let mut block = problem.placed(system.rows(), &numbers, (point.bodies, 2), jacobian, target, bound);
+            let mut block =
+                problem.placed(system.rows(), &numbers, (point.bodies, 2), jacobian, target, bound);
             let response = [0, 1].map(|r| {
                 let of = |side: usize| {
                     problem.bodies.get(block.bodies[side]).map_or(0.0, |body| {
@@ -465,7 +472,9 @@ impl Convex {
         for block in &self.blocks {
             for sides in block.couplings().filter(|[row, column]| row == column) {
                 let more = block.curvature(sides);
-                for (to, more) in diagonal[block.bodies[sides[0]]].iter_mut().flatten().zip(more.iter().flatten()) {
+                for (to, more) in
+                    diagonal[block.bodies[sides[0]]].iter_mut().flatten().zip(more.iter().flatten())
+                {
                     *to += more;
                 }
             }
@@ -537,7 +546,11 @@ impl Convex {
             if slope.abs() <= flat {
                 break;
             }
-            if slope < 0.0 { least = s } else { greatest = s }
+            if slope < 0.0 {
+                least = s
+            } else {
+                greatest = s
+            }
             s -= slope / curve;
             if !(s > least && s < greatest) {
                 s = if greatest.is_finite() { 0.5 * (least + greatest) } else { 2.0 * least };
@@ -676,7 +689,10 @@ mod tests {
                 stiffness: zero,
             };
             let errors: Vec<[f64; 3]> = (0..60)
-                .map(|i| [0, 1, 2].map(|k| if k < size { (1.7 * f64::from(i * (k as i32 + 2))).sin() } else { 0.0 }))
+                .map(|i| {
+                    [0, 1, 2]
+                        .map(|k| if k < size { (1.7 * f64::from(i * (k as i32 + 2))).sin() } else { 0.0 })
+                })
                 .collect();
             for e in &errors {
                 let (impulse, stiffness) = block.at(*e);
