@@ -13,7 +13,7 @@
 //! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. And when
-//! iterations are few: the first ten are no better than Jacobi's.
+//! iterations are few for the height of a pile.
 //!
 //! # The method
 //!

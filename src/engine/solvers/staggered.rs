@@ -10,8 +10,8 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
 //! over vectors in lanes. Sweeps of a step request 44059 B per contact.
 //!
-//! **Fails when** loads and friction need each other (arches, cards that lean, rods that jam): rounds then go back and forth.
-//! And when `inner` is too small for the height of a pile.
+//! **Fails when** load and friction of a point need each other, as under a rod that leans: a round is then worth no more than a
+//! sweep. And when `inner` is too small for the height of a pile.
 //!
 //! # The method
 //!
