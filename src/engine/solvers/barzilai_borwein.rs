@@ -10,10 +10,10 @@
 //! of joints are in the same vectors, each scaled by its own mass and projected on its bounds.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
-//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 1 B per contact.
+//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. And when
-//! iterations are few: the first ten are no better than Jacobi's.
+//! iterations are few for the height of a pile.
 //!
 //! # The method
 //!
@@ -22,7 +22,7 @@
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::vectors::spectral::{Axes, Descent, ImpulseProblem};
+use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
 use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
 
@@ -33,10 +33,7 @@ pub static SOLVER: Variant = Variant {
     summary: "projected gradients of spectral length on the convex relaxation: lifts off while sliding",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[
-        (Law::Converges, "to the convex relaxation, which is another law"),
-        (Law::Rest, "gradients spread a load more slowly than sweeps"),
-    ],
+    breaks: &[(Law::Converges, "to the convex relaxation, which is another law")],
     impacts: ImpactLaw::None,
     make: || Schedule::boxed(step),
     ..Variant::BASE
@@ -49,7 +46,7 @@ fn step(passes: &mut Passes<'_>) {
         passes.integrate_velocities();
         passes.warm_start();
         let mut problem = ImpulseProblem { bias: passes.vector(), mass: passes.vector() };
-        let mut descent = Descent::new([(); 6].map(|_| passes.vector()));
+        let mut descent = SpectralDescent::new([(); 6].map(|_| passes.vector()));
         passes.with_system(Phase::Solve, |system| {
             problem.begin(system, &rule, true);
             descent.begin(system, &problem, Axes::Both, cone::project_point);

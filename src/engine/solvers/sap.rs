@@ -13,7 +13,7 @@
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
 //! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two. Sweeps of a
-//! step request 1 B per contact.
+//! step request 103653 B per contact.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. When bands are wide. When
 //! iterations end early: impulses are velocities over `softness`, and have nothing to say before velocities do.
@@ -75,11 +75,14 @@ fn step(passes: &mut Passes<'_>) {
             .with_system(Phase::Solve, |system| Convex::new(system, &rule, softness, h, 1e6 * millions));
         passes.warm_start();
         passes.with_system(Phase::Solve, |system| problem.begin(system.rows()));
-        for _ in 0..budget.velocity_iterations {
-            if passes.with_system(Phase::Solve, |_| problem.step()) {
+        for k in 0..budget.velocity_iterations {
+            let steps = passes.with_system(Phase::Solve, |_| problem.step());
+            if steps {
                 passes.count_sweep(2);
             }
-            passes.with_system(Phase::Solve, |system| problem.write(system));
+            if steps || k == 0 {
+                passes.with_system(Phase::Solve, |system| problem.write(system));
+            }
             passes.iteration_done();
         }
         passes.integrate_positions();

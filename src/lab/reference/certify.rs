@@ -9,9 +9,8 @@
 //! decides whether a solution is right. So [`Reference::compare`] never compares single impulses, and [`Uniqueness`]
 //! tells whether a distance is meaningful.
 
-use super::interior::interior_point;
 use super::joints::impulse_sizes;
-use super::newton::{newton, newton_after};
+use super::newton::newton;
 use super::nncg::nncg;
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
@@ -43,8 +42,6 @@ pub enum Method {
     Nncg,
     /// Converged projected Gauss–Seidel.
     Pgs,
-    /// An interior-point path, and semi-smooth Newton from its end.
-    InteriorPoint,
 }
 
 impl fmt::Display for Method {
@@ -54,7 +51,6 @@ impl fmt::Display for Method {
             Method::Newton => "Newton",
             Method::Nncg => "NNCG",
             Method::Pgs => "PGS",
-            Method::InteriorPoint => "interior point",
         })
     }
 }
@@ -203,9 +199,6 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
         Method::Newton => newton(problem, Target::Rigid, &cold, stop(60)).impulses,
         Method::Nncg => nncg(problem, Target::Rigid, &cold, stop(5_000)).impulses,
         Method::Pgs => pgs(problem, Target::Rigid, &cold, SweepDirection::Symmetric, stop(5_000)).impulses,
-        Method::InteriorPoint => {
-            newton_after(problem, Target::Rigid, &interior_point(problem)?, 0, stop(60)).impulses
-        }
     };
     let natural_map = certify(problem, &impulses);
     let velocities = problem.velocities(&impulses);
@@ -214,15 +207,12 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
 
 /// A solution of the rigid contact law, with its certificate.
 ///
-/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, interior point, until two are
+/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, until two are
 /// certified or all are spent; the first certified one is the reference and the other its witness.
 pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     let fail = |why| NoReference { problem: problem.name.clone(), why };
     problem.validate().map_err(|e| fail(e.to_string()))?;
     let mut methods = vec![Method::Nncg, Method::Newton, Method::Pgs];
-    if problem.joints.is_empty() {
-        methods.push(Method::InteriorPoint);
-    }
     if problem.contacts.len() <= LEMKE_CONTACTS && problem.joint_rows() <= LEMKE_ROWS {
         methods.insert(0, Method::StewartTrinkle);
     }

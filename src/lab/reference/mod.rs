@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`problem`] states the problem, [`residual`] the law and its residual, [`joints`] those of joints. [`stewart_trinkle`] solves
 //! small problems exactly by Lemke's method ([`crate::engine::constraints::numerics::lemke`]); [`sweeps`], [`nncg`]
-//! and [`newton`], through [`sparse`], solve large ones, and [`interior`] what these leave. [`certify`] accepts a solution only with a certificate.
+//! and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts a solution only with a certificate.
 //! [`statics`] decides without a time step whether rest is possible, through [`nnls`]. [`frozen`] stores problems in
 //! files, [`gallery`] has problems solved by hand, [`rates`] measures convergence in iterations and in the step size,
 //! [`baseline`] that of Gauss–Seidel.
@@ -14,7 +14,6 @@ pub mod baseline;
 pub mod certify;
 pub mod frozen;
 pub mod gallery;
-pub mod interior;
 pub mod joints;
 pub mod newton;
 pub mod nncg;

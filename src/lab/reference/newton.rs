@@ -64,17 +64,6 @@ enum IterateState {
 
 /// Newton's method from `start`; one iteration is one proximal problem, or a bout of sweeps.
 pub fn newton(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
-    newton_after(problem, target, start, SWEEPS, stop)
-}
-
-/// The same after so many sweeps; without any, none are made later on.
-pub fn newton_after(
-    problem: &ContactProblem,
-    target: Target,
-    start: &[DPair],
-    mut sweeps: usize,
-    stop: Stop,
-) -> IterativeRun {
     let sweep = |from: &[DPair], n: usize| {
         pgs(
             problem,
@@ -84,7 +73,7 @@ pub fn newton_after(
             Stop { tolerance: stop.tolerance, iterations: n },
         )
     };
-    let mut shift = FIRST_SHIFT;
+    let (mut sweeps, mut shift) = (SWEEPS, FIRST_SHIFT);
     let mut run = sweep(start, sweeps);
     run.history = vec![run.history[0], run.history[run.history.len() - 1]];
     while run.status == Status::Limit && run.history.len() <= stop.iterations {

@@ -21,7 +21,7 @@
 
 use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::engine::constraints::records::point_vector::{
-    PointEntry, PointVector, Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
+    PointEntry, PointVector, Wide, difference, dot, plus_scaled, quotient, sum_of_products, update,
 };
 use crate::engine::constraints::vectors::system::System;
 use crate::engine::lanes::Lanes;
@@ -101,7 +101,7 @@ const STILL: f64 = 1e-7;
 
 /// A descent on its way.
 #[derive(Debug)]
-pub struct Descent {
+pub struct SpectralDescent {
     /// λ
     pub now: PointVector,
     gradient: PointVector,
@@ -119,11 +119,11 @@ pub struct Descent {
     axes: Axes,
 }
 
-impl Descent {
+impl SpectralDescent {
     /// A descent that works in these vectors.
     pub fn new([now, gradient, next, next_gradient, direction, best]: [PointVector; 6]) -> Self {
         let values = [f64::NEG_INFINITY; REMEMBERED];
-        Descent {
+        SpectralDescent {
             now,
             gradient,
             next,
@@ -175,7 +175,7 @@ impl Descent {
         problem: &ImpulseProblem,
         project: impl Fn(PointEntry, Wide) -> PointEntry,
     ) -> bool {
-        let Descent { now, gradient, next, next_gradient, direction, axes, .. } = self;
+        let SpectralDescent { now, gradient, next, next_gradient, direction, axes, .. } = self;
         let length = Wide::splat(self.length as f32);
         update(
             [next, direction],
@@ -216,14 +216,12 @@ impl Descent {
             let part = s as f32;
             update(
                 [next, next_gradient, direction],
-                [now, gradient],
-                |[next, next_gradient, d], [now, gradient]| {
+                [now, gradient, &problem.bias],
+                |[next, next_gradient, _], [now, gradient, bias]| {
                     let change = difference(next_gradient, gradient);
-                    [
-                        plus_scaled(now, part, difference(next, now)),
-                        plus_scaled(gradient, part, change),
-                        scaled(part - 1.0, d),
-                    ]
+                    // Between two allowed points, but for rounding.
+                    let between = project(plus_scaled(now, part, difference(next, now)), bias[1]);
+                    [between, plus_scaled(gradient, part, change), difference(between, next)]
                 },
             );
             system.push_lanes(direction);

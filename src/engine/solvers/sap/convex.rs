@@ -652,7 +652,7 @@ mod tests {
     fn newton_s_method_ends_at_rounding_after_a_few_steps() {
         for base in [5, 10, 20] {
             let history = thrown_pyramid(base);
-            println!("pyramid of {base}: {history:.1e?}");
+            println!("pyramid of {base}: {history:?}");
             assert!(history.len() <= 14 && *history.last().unwrap() < 1e-9, "{base}: {history:?}");
         }
     }
@@ -661,7 +661,7 @@ mod tests {
     fn conjugate_gradients_come_to_the_same() {
         MOST_WORK.set(0.0);
         let history = thrown_pyramid(5);
-        println!("{history:.1e?}");
+        println!("{history:?}");
         assert!(*history.last().unwrap() < 1e-9, "{history:?}");
     }
 
