@@ -1,6 +1,7 @@
 //! Solver laws on contacts whose answer is known by hand.
 
 use simpulse::engine::constraints::{ImpactLaw, Impacts};
+use simpulse::engine::params::LINEAR_SLOP;
 use simpulse::engine::solvers::{self, VARIANTS};
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::Scene;
@@ -112,7 +113,9 @@ fn a_falling_disc_stops_at_the_ground() {
             world.step().unwrap();
         }
         let y = world.bodies.position_y[1];
-        assert!((y - 0.5).abs() < 0.006, "{}: {y}", variant.name);
+        // What falls by more than the look ahead in a step may end behind the surface, and overlap up to the slop is left alone.
+        let slop = variant.parameter("slop").map_or(LINEAR_SLOP, |place| variant.defaults()[place]);
+        assert!((y - 0.5).abs() < slop + 0.001, "{}: {y}", variant.name);
         assert!(world.bodies.velocity_y[1].abs() < 1e-3, "{}", variant.name);
     }
 }

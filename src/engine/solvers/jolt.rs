@@ -10,7 +10,7 @@
 //! again; the source reuses them. Sleeping is left out.
 //!
 //! **Cost.** Per step 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and `position_iterations` position
-//! sweeps. Sweeps of a step request 0 B per contact.
+//! sweeps. Sweeps of a step request 2459 B per contact.
 //!
 //! **Fails when** stacks are tall or heavy on light: ten sweeps carry a load up ten contacts. A slop of 2 cm is visible in small
 //! scenes.

@@ -9,7 +9,7 @@
 //! ground under them, contacts within a level and joints are left to the sweeps.
 //!
 //! **Cost.** Per substep 2 body passes and 1 warm start; `velocity_iterations` times 1 sweep, 3 passes over vectors, and 4
-//! passes over points in `f64` and in one lane, in which the coarse matrix is assembled and solved. Sweeps of a step request 0 B per contact.
+//! passes over points in `f64` and in one lane, in which the coarse matrix is assembled and solved. Sweeps of a step request 8182 B per contact.
 //!
 //! **Fails when** loads spread sideways: what levels carry as a whole says nothing of how wide pyramids share it. What
 //! friction switches is left to the sweeps as well.

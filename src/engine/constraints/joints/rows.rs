@@ -531,9 +531,9 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                     for r in 0..N {
                         let stiffness = y[at(r)].select_positive(one / y[at(r)], one);
                         right[r] = stiffness * x[at(r)];
-                        for c in 0..=r {
+                        for (c, k) in k[r][..=r].iter_mut().enumerate() {
                             let more = if r == c { stiffness } else { L::zero() };
-                            k[r][c] = scale.mul_add(k[r][c], more);
+                            *k = scale.mul_add(*k, more);
                         }
                     }
                     let solved = solve(k, right);

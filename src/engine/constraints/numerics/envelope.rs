@@ -79,15 +79,15 @@ impl Envelope {
     /// If the two do not couple.
     pub fn add_block<const B: usize>(&mut self, row: usize, column: usize, values: [[f64; B]; B]) {
         let [i, j] = [row, column].map(|block| self.place[B * block]);
-        for r in 0..B {
+        for (r, row) in values.iter().enumerate() {
             if i == j {
                 let at = self.start[i + r] + i - self.first[i];
-                (0..r).for_each(|c| self.lower[at + c] += values[r][c]);
-                self.diagonal[i + r] += values[r][r];
+                (0..r).for_each(|c| self.lower[at + c] += row[c]);
+                self.diagonal[i + r] += row[r];
             } else {
                 let (low, high) = (i.min(j), i.max(j));
                 let at = self.start[high + r] + low - self.first[high];
-                (0..B).for_each(|c| self.lower[at + c] += if i > j { values[r][c] } else { values[c][r] });
+                (0..B).for_each(|c| self.lower[at + c] += if i > j { row[c] } else { values[c][r] });
             }
         }
     }

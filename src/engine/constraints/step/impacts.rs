@@ -68,7 +68,7 @@ impl Passes<'_> {
         (self.bounces, self.biased) = (false, false);
         match self.law() {
             ImpactLaw::None | ImpactLaw::Solver { .. } => {}
-            ImpactLaw::Bias => self.begin_bias(true),
+            ImpactLaw::Bias => self.begin_bias(true, self.input.h),
             ImpactLaw::EndPass { threshold, only_new } => {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
@@ -97,9 +97,17 @@ impl Passes<'_> {
         self.bounces = begin.found > 0.0;
     }
 
-    /// Finds what bounces in the coming substep.
-    fn begin_bias(&mut self, is_first: bool) {
-        let mut begin = bias::FindBounces { h: self.input.h, is_first, fastest: 0.0 };
+    /// Finds what bounces in the whole step, for solvers whose impulses add up over its substeps: a rebound is to
+    /// stay one until the end. They call [`Self::bounce`] for the last substep alone.
+    pub(crate) fn find_bounces_of_step(&mut self) {
+        if self.law() == ImpactLaw::Bias && self.input.phases.runs(Phase::Prepare) {
+            self.begin_bias(false, self.dt());
+        }
+    }
+
+    /// Finds what bounces within `h` (s).
+    fn begin_bias(&mut self, is_first: bool, h: f32) {
+        let mut begin = bias::FindBounces { h, is_first, fastest: 0.0 };
         self.over_contacts(&mut begin);
         self.biased = begin.fastest > 0.0;
     }
@@ -122,7 +130,7 @@ impl Passes<'_> {
     pub fn bounce(&mut self, substep: u32) {
         let is_last = substep + 1 == self.input.budget.substeps;
         if self.law() == ImpactLaw::Bias && !is_last && self.input.phases.runs(Phase::Restitution) {
-            self.begin_bias(false);
+            self.begin_bias(false, self.input.h);
             self.clock.lap(Phase::Restitution);
         }
         if self.bounces && self.input.phases.runs(Phase::Restitution) {

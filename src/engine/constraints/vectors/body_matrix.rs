@@ -124,8 +124,9 @@ impl BodyMatrix {
                 lower[r][c] = if r == c { rest.sqrt() } else { rest / lower[c][c] };
             }
             for c in 0..r {
-                for side in 0..2 {
-                    (0..3).for_each(|i| rows[r][side][i] -= lower[r][c] * rows[c][side][i]);
+                let before = rows[c];
+                for (own, before) in rows[r].iter_mut().zip(before) {
+                    (0..3).for_each(|i| own[i] -= lower[r][c] * before[i]);
                 }
             }
             rows[r] = rows[r].map(|j| j.map(|x| x / lower[r][r]));

@@ -245,9 +245,8 @@ impl Levels {
             for axis in (0..2).filter(|&axis| works[axis]) {
                 let u = f64::from(self.velocities[point.rows.at][axis]);
                 let weights = point.weights[axis];
-                for m in 0..MODES {
-                    self.right[MODES * point.level + m] -= weights[m] * u;
-                }
+                let right = &mut self.right[MODES * point.level..][..MODES];
+                right.iter_mut().zip(weights).for_each(|(to, weight)| *to -= weight * u);
                 for side in 0..2 {
                     // A body above is pushed by the level below it.
                     let from = usize::from(side != point.above);

@@ -232,6 +232,14 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
             spin::<L, N, O>(&mut w, inertia, arm, delta);
         }
         if N::FRICTION {
+            if patch.is_some() {
+                // Points that bounce have no normal mass meanwhile.
+                points = zero;
+                for p in 0..N::POINTS {
+                    let mass = record[layout.at(p, layout.tangent_mass)];
+                    points = points + mass.select_positive(L::splat(1.0), zero);
+                }
+            }
             let bound = record[layout.friction] * total / points.max(L::splat(1.0));
             let mut slides = zero;
             for p in 0..N::POINTS {
