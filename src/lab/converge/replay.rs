@@ -352,6 +352,7 @@ impl<'a> Replay<'a> {
             let along = row.axis[0] * (b[0] - a[0]) + row.axis[1] * (b[1] - a[1]);
             let error = row.error + along + row.arm_b * b[2] - row.arm_a * a[2];
             match block.law {
+                BlockLaw::Motor { .. } | BlockLaw::Spring { .. } => OwnRow::default(),
                 BlockLaw::Limit if error > 0.0 => OwnRow { bias: error / self.problem.h, compliance: 0.0 },
                 _ => OwnRow {
                     bias: f64::from(bias_rate) * error,
