@@ -136,7 +136,8 @@ impl Trees {
         self.ends.extend(types.iter().flat_map(|t| t.kind.ends()));
         self.aside.clear();
         self.aside.extend(types.iter().map(|t| vec![false; t.kind.ends().len()]));
-        (self.joints.clear(), self.nodes.clear());
+        self.joints.clear();
+        self.nodes.clear();
         self.found.list(types, &self.moves);
         for body in 0..rows.len() as u32 {
             if self.moves[body as usize] && !self.found.visited[body as usize] {
@@ -428,19 +429,16 @@ fn eliminate<const N: usize>(
     rows: &[BodyRow],
     inv_h: f64,
 ) -> EliminatedRows {
-    let mut j = [[[0.0; 3]; N]; 2];
-    for r in 0..N {
-        let of = &found.jacobians[r];
-        let [x, y] = of.axis.map(f64::from);
-        let [of_a, of_b] = of.arms.map(f64::from);
-        (j[0][r], j[1][r]) = ([-x, -y, -of_a], [x, y, of_b]);
-    }
-    let mut bodies = found.bodies;
-    if !child_is_b(at, bodies, nodes) {
-        j.swap(0, 1);
-        bodies.swap(0, 1);
-    }
-    let [of_parent, of_child] = j;
+    let side = |k: usize, sign: f64| -> [[f64; 3]; N] {
+        std::array::from_fn(|r| {
+            let of = &found.jacobians[r];
+            [of.axis[0], of.axis[1], of.arms[k]].map(|x| sign * f64::from(x))
+        })
+    };
+    let (of_a, of_b, [a, b]) = (side(0, -1.0), side(1, 1.0), found.bodies);
+    let is_b = child_is_b(at, found.bodies, nodes);
+    let (of_parent, of_child) = if is_b { (of_a, of_b) } else { (of_b, of_a) };
+    let bodies = if is_b { [a, b] } else { [b, a] };
     let (vc, vp) = (velocity(at[0], bodies[1], nodes, rows), velocity(at[1], bodies[0], nodes, rows));
     let rate = rate_of(&found.errors[..N], inv_h);
     let (mut s, mut s_matrix) = ([0.0; N], [[0.0; N]; N]);
