@@ -320,7 +320,8 @@ fn a_bridge_between_two_pins_bears_its_weight_and_a_load() {
     }
     joints.push(world.add_joint(&Joint::revolute(before, ground).anchor([30.0, 5.0])).unwrap());
     let load = ShapeDef::rectangle(1.0, 1.0).unwrap().with_density(10.0);
-    world.add_body(&BodyDef::dynamic([15.0, 6.2]).with(load)).unwrap();
+    // It stands on the bridge from the start: a blow at v moves a plank by v h before joints know of it.
+    world.add_body(&BodyDef::dynamic([15.0, 6.1]).with(load)).unwrap();
     // Of 30 planks of 2 kg and a load of 40 kg the ends bear all, by the slope of their tension.
     let (mut borne, mut gap) = (0.0, 0.0_f64);
     for step in 0..360 {

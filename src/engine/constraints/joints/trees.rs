@@ -136,7 +136,8 @@ impl Trees {
         self.ends.extend(types.iter().flat_map(|t| t.kind.ends()));
         self.aside.clear();
         self.aside.extend(types.iter().map(|t| vec![false; t.kind.ends().len()]));
-        (self.joints.clear(), self.nodes.clear());
+        self.joints.clear();
+        self.nodes.clear();
         self.found.list(types, &self.moves);
         for body in 0..rows.len() as u32 {
             if self.moves[body as usize] && !self.found.visited[body as usize] {
@@ -388,7 +389,8 @@ fn eliminate_point(
             let first = [xx + p[0] * xw, xy + p[0] * yw, xw + p[0] * ww];
             let second = [yy + p[1] * yw, yw + p[1] * ww];
             let t = [first[0] + p[0] * first[2], first[1] + p[1] * first[2], second[0] + p[1] * second[1]];
-            let scale = a / (t[0] * t[2] - t[1] * t[1]);
+            let determinant = t[0] * t[2] - t[1] * t[1];
+            let scale = if determinant > 0.0 { a / determinant } else { 0.0 };
             let inv_a = 1.0 / a;
             node.a = [xx, xy, yy, xw, yw, ww].map(|x| x * inv_a);
             let moved = times(&node.a, node.g);
@@ -403,7 +405,7 @@ fn eliminate_point(
             let k = [mass + inertia * (q[0] * q[0]), inertia * (q[0] * q[1]), mass + inertia * (q[1] * q[1])];
             let l = [0, 1].map(|k| sign * GIVE * f64::from(found.impulses[k]));
             s = [s[0] - (k[0] * l[0] + k[1] * l[1]), s[1] - (k[1] * l[0] + k[2] * l[1])];
-            let scale = 1.0 / (GIVE * (k[0] * k[2] - k[1] * k[1]));
+            let scale = reciprocal(GIVE * (k[0] * k[2] - k[1] * k[1]));
             [k[2] * scale, -k[1] * scale, k[0] * scale]
         }
     };
@@ -428,19 +430,16 @@ fn eliminate<const N: usize>(
     rows: &[BodyRow],
     inv_h: f64,
 ) -> EliminatedRows {
-    let mut j = [[[0.0; 3]; N]; 2];
-    for r in 0..N {
-        let of = &found.jacobians[r];
-        let [x, y] = of.axis.map(f64::from);
-        let [of_a, of_b] = of.arms.map(f64::from);
-        (j[0][r], j[1][r]) = ([-x, -y, -of_a], [x, y, of_b]);
-    }
-    let mut bodies = found.bodies;
-    if !child_is_b(at, bodies, nodes) {
-        j.swap(0, 1);
-        bodies.swap(0, 1);
-    }
-    let [of_parent, of_child] = j;
+    let side = |k: usize, sign: f64| -> [[f64; 3]; N] {
+        std::array::from_fn(|r| {
+            let of = &found.jacobians[r];
+            [of.axis[0], of.axis[1], of.arms[k]].map(|x| sign * f64::from(x))
+        })
+    };
+    let (of_a, of_b, [a, b]) = (side(0, -1.0), side(1, 1.0), found.bodies);
+    let is_b = child_is_b(at, found.bodies, nodes);
+    let (of_parent, of_child) = if is_b { (of_a, of_b) } else { (of_b, of_a) };
+    let bodies = if is_b { [a, b] } else { [b, a] };
     let (vc, vp) = (velocity(at[0], bodies[1], nodes, rows), velocity(at[1], bodies[0], nodes, rows));
     let rate = rate_of(&found.errors[..N], inv_h);
     let (mut s, mut s_matrix) = ([0.0; N], [[0.0; N]; N]);
@@ -544,6 +543,12 @@ fn times(&[xx, xy, yy, xw, yw, ww]: &Symmetric, [x, y, w]: [f64; 3]) -> [f64; 3]
     [xx * x + xy * y + xw * w, xy * x + yy * y + yw * w, xw * x + yw * y + ww * w]
 }
 
+/// 1/x; 0 of rows that move nothing, such as that of a rod without length.
+#[inline(always)]
+fn reciprocal(x: f64) -> f64 {
+    if x > 0.0 { 1.0 / x } else { 0.0 }
+}
+
 /// The determinant times the inverse.
 #[inline(always)]
 fn cofactors(&[xx, xy, yy, xw, yw, ww]: &Symmetric) -> Symmetric {
@@ -562,9 +567,9 @@ fn cofactors(&[xx, xy, yy, xw, yw, ww]: &Symmetric) -> Symmetric {
 fn inverse_of<const N: usize>(m: [[f64; N]; N]) -> [[f64; N]; N] {
     let mut inverse = [[0.0; N]; N];
     match N {
-        1 => inverse[0][0] = 1.0 / m[0][0],
+        1 => inverse[0][0] = reciprocal(m[0][0]),
         2 => {
-            let scale = 1.0 / (m[0][0] * m[1][1] - m[0][1] * m[0][1]);
+            let scale = reciprocal(m[0][0] * m[1][1] - m[0][1] * m[0][1]);
             (inverse[0][0], inverse[1][1]) = (m[1][1] * scale, m[0][0] * scale);
             inverse[0][1] = -m[0][1] * scale;
             inverse[1][0] = inverse[0][1];
@@ -572,7 +577,7 @@ fn inverse_of<const N: usize>(m: [[f64; N]; N]) -> [[f64; N]; N] {
         _ => {
             let of = [m[0][0], m[0][1], m[1][1], m[0][2], m[1][2], m[2][2]];
             let [xx, xy, yy, xw, yw, ww] = cofactors(&of);
-            let scale = 1.0 / (of[0] * xx + of[1] * xy + of[3] * xw);
+            let scale = reciprocal(of[0] * xx + of[1] * xy + of[3] * xw);
             let [xx, xy, yy, xw, yw, ww] = [xx, xy, yy, xw, yw, ww].map(|x| x * scale);
             let full = [[xx, xy, xw], [xy, yy, yw], [xw, yw, ww]];
             for (to, from) in inverse.iter_mut().zip(full) {
