@@ -134,6 +134,7 @@ fn shorten<L: Lanes>(
             let mass = record[layout.at(p, layout.normal_mass)];
             let mass = mass.select_positive(mass, one);
             let load = loads[2 * p].max(zero);
+            let before = borne[p];
             if holds && p == 0 && is_single.any_positive() {
                 let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
                 let kept = borne[0].select_positive(kept, load);
@@ -145,7 +146,9 @@ fn shorten<L: Lanes>(
             }
             let sag = compliance * borne[p] / mass;
             let at = layout.at(p, layout.normal_impulse);
-            let impulse = borne[p].mul_add(h_lanes, record[at]).max(zero);
+            // What rises is in the impulse already: the spring gave way for it.
+            let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
+            let impulse = known.mul_add(h_lanes, record[at]).max(zero);
             record[at] = impulse;
             let depth = L::splat(EARNED).mul_add(per_impulse * impulse / mass, deepest);
             let at = layout.at(p, layout.separation);
