@@ -27,6 +27,10 @@ pub struct StepCounts {
     pub fast: usize,
     /// Bytes of prepared constraint records.
     pub constraint_bytes: usize,
+    /// Points solved by impacts before the step, counted as often as they were.
+    pub impact_visits: usize,
+    /// Islands whose impacts reached their bound of visits; sweeps stop what still approaches there.
+    pub cut_impacts: usize,
 }
 
 /// Which quantity of a body is out of bounds.

@@ -269,7 +269,8 @@ impl World {
         self.load_rows();
         clock.lap(Phase::Prepare);
         let count = self.run_solver(clock, PhaseFilter::ALL);
-        (self.counts.sweeps, self.counts.row_updates) = (count.sweeps, count.row_updates);
+        let WorkCount { sweeps, row_updates, impact_visits, cut_impacts } = count;
+        self.counts = StepCounts { sweeps, row_updates, impact_visits, cut_impacts, ..self.counts };
     }
 
     /// Fills the body rows and their forces from the bodies.

@@ -107,7 +107,8 @@ fn find<L: Lanes>(
         for p in 0..layout.points {
             let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
             let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
-            let fast = record[layout.at(p, layout.normal_mass)].select_positive(-threshold - v, zero);
+            let fast = (-threshold - v).select_positive(-v, zero);
+            let fast = record[layout.at(p, layout.normal_mass)].select_positive(fast, zero);
             any = any.max((-closes).select_positive(fast, zero));
         }
         if !any.any_positive() {
@@ -116,7 +117,7 @@ fn find<L: Lanes>(
         let first = batch * L::WIDTH;
         let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
         for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| of(&any, lane) > 0.0) {
-            let speed = of(&any, lane) + of(&threshold, lane);
+            let speed = of(&any, lane);
             let e =
                 if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
             let is_stopped = stops && speed > of(&stops_at, lane);
