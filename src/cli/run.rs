@@ -411,7 +411,7 @@ fn counts(world: &World) -> String {
     let c = &world.counts;
     format!(
         "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
-         {:.0} % of lanes filled, {} bytes of records\n",
+         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off\n",
         c.pairs,
         c.contacts,
         c.points,
@@ -420,7 +420,9 @@ fn counts(world: &World) -> String {
         c.colors,
         c.overflow,
         100.0 * c.contacts as f64 / c.lane_slots.max(1) as f64,
-        c.constraint_bytes
+        c.constraint_bytes,
+        c.impact_visits,
+        c.cut_impacts
     )
 }
 

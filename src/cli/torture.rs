@@ -11,7 +11,7 @@ use crate::lab::report::environment::Environment;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimize::minimize;
 use crate::lab::torture::table::{lines, text};
-use crate::lab::torture::{Campaign, TortureRow, family, run_solver};
+use crate::lab::torture::{Campaign, TortureRow, family, pace, run_solver};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
@@ -36,6 +36,7 @@ Examples:
   simpulse torture                                     a thousand scenes
   simpulse torture --scenes 10000 --log torture.jsonl  ten thousand; run again, it continues
   simpulse torture --families driven,fast --solvers soft_step,box2d,rapier --keep failed/
+  simpulse torture --pace 3 --solvers shim,soft_step   how long the longest step is, over the median
   simpulse torture --only driven:17 --keep failed/     one scene again, and its minimized file")]
 pub struct TortureArgs {
     /// Scenes, over all families
@@ -65,6 +66,10 @@ pub struct TortureArgs {
     /// Write one line of JSON per scene and solver; scenes already in the file are not run again
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
+    /// Also time the steps of each scene, N times: the longest over the median at as many contacts. On one thread unless
+    /// `--threads` says otherwise
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub pace: Option<u32>,
     /// Exit with code 1 if a solver fails more scenes than this
     #[arg(long, value_name = "N")]
     pub allow: Option<u32>,
@@ -189,6 +194,7 @@ fn opened(path: &Path) -> Result<(Vec<TortureRow>, Option<File>), Error> {
 /// Runs every job, on as many threads as there are cores; rows in the order of the jobs.
 fn run_all(args: &TortureArgs, jobs: &[TortureJob], log: Option<File>) -> Result<Vec<TortureRow>, Error> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let cores = if args.pace.is_some() { 1 } else { cores };
     let threads = args.threads.map_or(cores, usize::from).min(jobs.len()).max(1);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let (found, log, bar) = (Mutex::new(Vec::new()), Mutex::new(log), Bar::new());
@@ -229,7 +235,10 @@ fn one(
 ) -> Result<TortureRow, Error> {
     let case = family.case(args.seed, number);
     let settings = args.settings(solver)?;
-    let outcome = run_solver(&case, &settings)?;
+    let mut outcome = run_solver(&case, &settings)?;
+    if let Some(repeats) = args.pace {
+        outcome.pace = Some(pace(&case, &settings, repeats)?);
+    }
     if let (Some(folder), Some(fault)) = (&args.keep, outcome.faults.first()) {
         let mut least = minimize(&case, fault.verdict, |case| run_solver(case, &settings))?;
         let (verdict, name) = (fault.verdict.word(), solver.name);

@@ -5,6 +5,7 @@ use simpulse::engine::solvers;
 use simpulse::engine::world::World;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+use simpulse::lab::torture::families::FAMILIES;
 
 fn scene(name: &str) -> World {
     common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
@@ -187,4 +188,90 @@ fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
         let falls = if *then > 20.0 { 2.0 } else { 0.0 };
         assert!((now - then + falls).abs() < 0.1, "body {body} is at {now}, and was at {then}");
     }
+}
+
+/// Random scenes side by side: the first of a world moves as it does alone, to the bit, whatever the other one a kilometer
+/// away is. Scenes with steps, gravity or substeps of their own cannot share a world, and are left out.
+#[test]
+fn a_random_scene_moves_as_it_does_alone_beside_another() {
+    const SCENES: u32 = 6;
+    const STEPS: u32 = 100;
+    let settings = || common::settings(solvers::find("shim").unwrap());
+    let families: Vec<_> = FAMILIES.iter().filter(|family| family.name != "extremes").collect();
+    let state = |world: &World, body: usize| {
+        let b = &world.bodies;
+        let place = [b.position_x[body], b.position_y[body], b.position_x_lo[body], b.position_y_lo[body]];
+        let motion = [b.velocity_x[body], b.velocity_y[body], b.angular_velocity[body]];
+        (place.map(f32::to_bits), motion.map(f32::to_bits), b.rotation_cos[body].to_bits())
+    };
+    for (k, family) in families.iter().enumerate() {
+        for number in 0..SCENES {
+            let beside = families[(k + 1 + number as usize) % families.len()];
+            let alone = family.case(5, number).scene;
+            let mut both = alone.bodies.clone();
+            for mut body in beside.case(6, number).scene.bodies {
+                body.position[0] += 1e3;
+                both.push(body);
+            }
+            let build = |bodies| Scene { bodies, ..alone.clone() }.build(settings()).unwrap();
+            let (mut one, mut two) = (build(alone.bodies.clone()), build(both));
+            for step in 1..=STEPS {
+                one.step().unwrap();
+                two.step().unwrap();
+                for body in 0..alone.bodies.len() {
+                    let [p, q] = [&one, &two].map(|world| state(world, body));
+                    assert_eq!(
+                        p, q,
+                        "{} {number} beside {}: body {body}, step {step}",
+                        family.name, beside.name
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Impacts before the step have a bound: an island solves no more than 64 points and two for each of its points, one more
+/// wave, and the points of one body. So steps of random scenes with restitution and without do.
+#[test]
+fn impacts_of_a_step_stay_within_their_bound() {
+    let (mut most, mut cut) = (0, 0);
+    for family in FAMILIES {
+        for number in 0..10 {
+            let mut world =
+                family.case(9, number).scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
+            let dynamic = (0..world.bodies.len()).filter(|&body| world.bodies.is_dynamic(body)).count();
+            for _ in 0..60 {
+                if world.step().is_err() {
+                    break;
+                }
+                let counts = world.counts;
+                let bound = 64 * dynamic + 4 * counts.points;
+                assert!(counts.impact_visits <= bound, "{} {number}: {counts:?}", family.name);
+                most = most.max(counts.impact_visits);
+                cut += counts.cut_impacts;
+            }
+        }
+    }
+    assert!(most > 64 && cut > 0, "no scene needs a bound: {most} visits, {cut} islands cut off");
+}
+
+/// Restitution goes to zero continuously: what would leave slower than a tenth of what gravity adds in a step stops, so ten
+/// boxes that fall on each other move at e = 10⁻⁶ as they do at e = 0.
+#[test]
+fn a_little_restitution_is_none() {
+    let fallen = |e: f64| {
+        let boxed = |i: u32| {
+            let shape = SceneShape::rectangle(0.5, 0.5).restitution(e);
+            SceneBody::dynamic([0.02 * f64::from(i % 3), 0.6 + 1.2 * f64::from(i)], shape)
+        };
+        let mut scene = on_ground("");
+        scene.bodies.extend((0..10).map(boxed));
+        let mut world = scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
+        for _ in 0..180 {
+            world.step().unwrap();
+        }
+        world.state_hash()
+    };
+    assert_eq!(fallen(0.0), fallen(1e-6));
 }

@@ -27,6 +27,10 @@ pub struct StepCounts {
     pub fast: usize,
     /// Bytes of prepared constraint records.
     pub constraint_bytes: usize,
+    /// Points solved by impacts before the step, counted as often as they were.
+    pub impact_visits: usize,
+    /// Islands whose impacts reached their bound of visits; sweeps stop what still approaches there.
+    pub cut_impacts: usize,
     /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.
     pub unsolved: usize,
 }

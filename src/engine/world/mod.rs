@@ -271,8 +271,8 @@ impl World {
         self.load_rows();
         clock.lap(Phase::Prepare);
         let count = self.run_solver(clock, PhaseFilter::ALL);
-        let WorkCount { sweeps, row_updates, unsolved, .. } = count;
-        self.counts = StepCounts { sweeps, row_updates, unsolved, ..self.counts };
+        let WorkCount { sweeps, row_updates, impact_visits, cut_impacts, unsolved } = count;
+        self.counts = StepCounts { sweeps, row_updates, impact_visits, cut_impacts, unsolved, ..self.counts };
     }
 
     /// Fills the body rows and their forces from the bodies.

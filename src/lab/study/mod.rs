@@ -23,6 +23,7 @@ pub mod horizon;
 pub mod impacts;
 #[doc(hidden)]
 pub mod interleave;
+pub mod pace;
 #[doc(hidden)]
 pub mod pareto;
 pub mod plan;

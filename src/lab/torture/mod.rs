@@ -29,6 +29,7 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
+use crate::lab::study::pace::Pace;
 use families::{FAMILIES, Family};
 use judge::Judge;
 use std::time::Instant;
@@ -137,6 +138,9 @@ pub struct CaseOutcome {
     pub slowest_ms: f64,
     /// Steps that took longer than the time that they simulate.
     pub late: u32,
+    /// How evenly its steps are paced, where that is measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pace: Option<Pace>,
 }
 
 impl CaseOutcome {
@@ -216,6 +220,13 @@ pub fn run_solver(case: &TortureCase, settings: &Settings) -> Result<CaseOutcome
     let mut settings = settings.clone();
     settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
     run(case, &mut Own(case.scene.build(settings)?))
+}
+
+/// How evenly a case is paced under one of this crate's solvers. Errors: a scene that is not valid.
+pub fn pace(case: &TortureCase, settings: &Settings, repeats: u32) -> Result<Pace, Error> {
+    let mut settings = settings.clone();
+    settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
+    Pace::measure(|| case.scene.build(settings.clone()), case.scene.steps, repeats)
 }
 
 /// Substeps that a solver takes in a case; one that takes a single one by design keeps it.

@@ -3,6 +3,8 @@
 use super::families::FAMILIES;
 use super::{TortureRow, TortureVerdict};
 use crate::lab::report::table::{finish, table};
+use crate::lab::study::pace::Pace;
+use crate::lab::study::sample::quantile;
 
 /// Results of a family's scenes under one solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -25,6 +27,39 @@ pub struct FamilyLine {
     pub slowest_ms: f64,
     /// Steps that took longer than they simulate.
     pub late: u32,
+    /// How evenly its scenes are paced, where that is measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pace: Option<FamilyPace>,
+}
+
+/// Steps over the median of steps with as many contacts: of the scenes of a family (1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct FamilyPace {
+    /// First step: median and greatest of all scenes.
+    pub first: [f64; 2],
+    /// Longest other step: median, 99 % and greatest of all scenes.
+    pub longest: [f64; 3],
+    /// Scenes whose longest step is longer than [`LONGEST`].
+    pub too_long: u32,
+    /// Mean step: median and greatest.
+    pub mean: [f64; 2],
+}
+
+/// Longest step over the median of steps with as many contacts that a solver should have (1).
+pub const LONGEST: f64 = 4.0;
+
+impl FamilyPace {
+    /// None without scenes.
+    fn of(paces: &[Pace]) -> Option<Self> {
+        let of = |get: fn(&Pace) -> f64| paces.iter().map(get).collect::<Vec<_>>();
+        let (first, longest, mean) = (of(|p| p.first), of(|p| p.longest), of(|p| p.mean));
+        (!paces.is_empty()).then(|| FamilyPace {
+            first: [0.5, 1.0].map(|p| quantile(&first, p)),
+            longest: [0.5, 0.99, 1.0].map(|p| quantile(&longest, p)),
+            too_long: longest.iter().filter(|&&longest| longest > LONGEST).count() as u32,
+            mean: [0.5, 1.0].map(|p| quantile(&mean, p)),
+        })
+    }
 }
 
 /// Every family in order, each under every solver, and all families together.
@@ -34,6 +69,7 @@ pub fn lines(rows: &[TortureRow], solvers: &[String]) -> Vec<FamilyLine> {
         for solver in solvers {
             let mut line =
                 FamilyLine { family: family.into(), solver: solver.clone(), ..FamilyLine::default() };
+            let mut paces = Vec::new();
             let own = |row: &&TortureRow| row.solver == *solver && (row.family == family || family == "all");
             for TortureRow { outcome, .. } in rows.iter().filter(own) {
                 line.scenes += 1;
@@ -45,7 +81,9 @@ pub fn lines(rows: &[TortureRow], solvers: &[String]) -> Vec<FamilyLine> {
                 line.depth = line.depth.max(outcome.depth);
                 line.slowest_ms = line.slowest_ms.max(outcome.slowest_ms);
                 line.late += outcome.late;
+                paces.extend(outcome.pace);
             }
+            line.pace = FamilyPace::of(&paces);
             if line.scenes > 0 {
                 lines.push(line);
             }
@@ -76,7 +114,39 @@ pub fn text(lines: &[FamilyLine]) -> String {
         cells.extend([format!("{:.2}", line.depth), format!("{:.2}", line.slowest_ms), count(&line.late)]);
         table.add_row(cells);
     }
-    finish(table, 2)
+    finish(table, 2) + &pace_text(lines)
+}
+
+/// How evenly scenes are paced; empty where that was not measured.
+fn pace_text(lines: &[FamilyLine]) -> String {
+    if lines.iter().all(|line| line.pace.is_none()) {
+        return String::new();
+    }
+    let long = format!("over {LONGEST}");
+    let mut table = table(&[
+        "family",
+        "solver",
+        "first",
+        "most",
+        "longest",
+        "99 %",
+        "most",
+        long.as_str(),
+        "mean",
+        "most",
+    ]);
+    for FamilyLine { family, solver, pace, .. } in lines {
+        let Some(FamilyPace { first, longest, too_long, mean }) = pace else { continue };
+        let mut cells = vec![family.clone(), solver.clone()];
+        cells.extend(first.iter().chain(longest).map(|ratio| format!("{ratio:.2}")));
+        cells.push(too_long.to_string());
+        cells.extend(mean.map(|ratio| format!("{ratio:.2}")));
+        table.add_row(cells);
+    }
+    "\nSteps over the median of steps with as many contacts: the first one, the longest of the others, the mean; median and\n\
+     most of all scenes\n"
+        .to_string()
+        + &finish(table, 2)
 }
 
 #[cfg(test)]

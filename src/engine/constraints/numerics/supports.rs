@@ -9,16 +9,14 @@
 //!
 //! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
 //! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = W Aᵀ (A W Aᵀ + ε)⁻¹ b, with the weight of a
-//! friction as large as the load of its point: points with one normal reach their cones together. Points that would pull
-//! are left out; friction beyond its cone is cut off and joins b; both are done [`ROUNDS`] times. No point gets more than
-//! [`GREATEST`] times the force, as wedges would ask for.
+//! friction as large as the load of its point: points with one normal reach their cones together. A first solution finds
+//! which points bear and how they share the load, since those that would pull are left out; a second one has frictions
+//! in proportion to that, cut off at their cones. No point gets more than [`GREATEST`] times the force, as wedges would
+//! ask for.
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// Solutions per body, each for what the last one has left out.
-const ROUNDS: usize = 4;
-
-/// Greatest load of a point over the force on the body (1).
+/// Greatest load of a point over the force on the body (1): without it loads of wedges throw bricks of a wall that is hit.
 const GREATEST: f64 = 2.0;
 
 /// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
@@ -47,11 +45,6 @@ impl Support {
         -self.normal.perp()
     }
 
-    /// Friction is at its bound.
-    fn slides(&self) -> bool {
-        self.load[1].abs() >= self.friction * self.load[0]
-    }
-
     /// Its force on the body (N).
     pub fn force(&self) -> DVec2 {
         self.load[0] * self.normal + self.load[1] * self.tangent()
@@ -67,28 +60,21 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
     let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
     let greatest = GREATEST * force.length();
-    for round in 0..ROUNDS {
+    for is_last in [false, true] {
         let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
-        let (mut matrix, mut rest) = (DMat3::from_diagonal(DVec3::splat(RIDGE)), all);
+        let mut matrix = DMat3::from_diagonal(DVec3::splat(RIDGE));
         for support in supports.iter().filter(|s| s.load[0] > 0.0) {
             matrix += outer(column(support, support.normal));
-            let tangent = column(support, support.tangent());
-            match support.slides() {
-                true => rest -= support.load[1] * tangent,
-                false => matrix += support.load[0] / most * outer(tangent),
+            if support.friction > 0.0 {
+                matrix += support.load[0] / most * outer(column(support, support.tangent()));
             }
         }
-        let solution = matrix.inverse() * rest;
+        let solution = matrix.inverse() * all;
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
             let normal = column(support, support.normal).dot(solution).clamp(0.0, greatest);
-            let tangent = match support.slides() {
-                true => support.load[1],
-                false => support.load[0] / most * column(support, support.tangent()).dot(solution),
-            };
+            let tangent = support.load[0] / most * column(support, support.tangent()).dot(solution);
             let bound = support.friction * normal;
-            // Before the first round nothing is known of how points share a load.
-            let tangent = if round == 0 { 0.0 } else { tangent.clamp(-bound, bound) };
-            support.load = [normal, tangent];
+            support.load = [normal, if is_last { tangent.clamp(-bound, bound) } else { 0.0 }];
         }
     }
 }

@@ -41,7 +41,7 @@ impl Passes<'_> {
         let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
         let size = kept.size().per_contact;
         let leads = lead.map_or(Leads::NONE, |place| Leads { kept: kept.contacts(), size, place });
-        let cut = spread.run(&mut SpreadInput {
+        let done = spread.run(&mut SpreadInput {
             rows,
             batches: [lanes, serial],
             contacts: self.contacts,
@@ -55,7 +55,8 @@ impl Passes<'_> {
             record_impulses: self.input.record_impulses,
             bounces,
         });
-        if let Some(cut) = cut {
+        if let Some([visits, cut]) = done {
+            self.count.impact_visits += visits;
             self.count.cut_impacts += cut;
             motion.hide_turns(rows);
         }

@@ -91,6 +91,8 @@ pub struct WorkCount {
     /// Rows solved in all sweeps: a normal row per point, and a tangential one where the
     /// sweep has friction.
     pub row_updates: usize,
+    /// Points solved by impacts before the step.
+    pub impact_visits: usize,
     /// Islands whose impacts were not followed to their end.
     pub cut_impacts: usize,
     /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.

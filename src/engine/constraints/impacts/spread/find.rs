@@ -1,7 +1,8 @@
 //! Contacts that are hit in the coming step.
 //!
 //! A point is hit if it closes its gap within the step and approaches faster than resting bodies can. Forces alone give a speed of
-//! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|) and leave faster than a tenth of that. A
+//! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|), and than a hundredth of dt |a_b|, and
+//! leave faster than a tenth of that. A
 //! point that only stops has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
 //! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen.
 
@@ -48,8 +49,9 @@ impl Pass for Find<'_> {
 /// contacts, as loads are: a house of cards that is built with air below its cards comes down on them in its first steps.
 const FASTER: f32 = 2.0;
 
-/// Speed that no resting body has in any direction, as a multiple of the speed that forces give in a step (1).
-const SLOW: f32 = 0.01;
+/// Speed that no resting body has in any direction, as a multiple of the speed that forces give body b in a step (1): faces
+/// along gravity have no other threshold.
+pub(super) const SLOW: f32 = 0.01;
 
 #[inline(never)]
 fn find<L: Lanes>(
@@ -98,16 +100,17 @@ fn find<L: Lanes>(
         } else {
             (-of_b, positive(of_b), positive(of_b))
         };
-        let slow = L::splat(SLOW) * size(bx, by);
-        let stops_at = (per_step * L::splat(FASTER) * most).max(per_step * slow);
-        let bounces_at = per_step * along_n;
+        let slow = per_step * L::splat(SLOW) * size(bx, by);
+        let stops_at = (per_step * L::splat(FASTER) * most).max(slow);
+        let bounces_at = (per_step * along_n).max(slow);
         let threshold = if bounces { bounces_at } else { stops_at };
         let fall = gained * L::splat((0.5 * dt + 0.5 * h) / h);
         let mut any = zero;
         for p in 0..layout.points {
             let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
             let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
-            let fast = record[layout.at(p, layout.normal_mass)].select_positive(-threshold - v, zero);
+            let fast = (-threshold - v).select_positive(-v, zero);
+            let fast = record[layout.at(p, layout.normal_mass)].select_positive(fast, zero);
             any = any.max((-closes).select_positive(fast, zero));
         }
         if !any.any_positive() {
@@ -116,7 +119,7 @@ fn find<L: Lanes>(
         let first = batch * L::WIDTH;
         let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
         for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| of(&any, lane) > 0.0) {
-            let speed = of(&any, lane) + of(&threshold, lane);
+            let speed = of(&any, lane);
             let e =
                 if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
             let is_stopped = stops && speed > of(&stops_at, lane);
@@ -149,5 +152,6 @@ pub(crate) fn impact_speeds(rows: &[BodyRow], increments: &[[f32; 4]], h: f32, d
     let least = least.sqrt() * dt / h;
     // |v| + |ω| R ≤ √2 √(v² + ω² R²)
     let fastest = (2.0 * fastest).sqrt();
-    (fastest > SLOW * least).then_some([least, fastest])
+    // Two points approach at twice that at most: what is left out here, no contact lets pass.
+    (2.0 * fastest > SLOW * least).then_some([least, fastest])
 }

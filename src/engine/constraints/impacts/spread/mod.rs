@@ -35,8 +35,9 @@
 //! # A bound for each island
 //!
 //! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
-//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
+//! island has at most 8 waves, of which the last 2 only stop, and a number of visits that grows with its points ([`VISITS`]). The
 //! solver stops what still approaches then, and bodies of such an island are not moved: they might end up in a body that was not visited.
+//! So the time of a step has a bound: `simpulse torture --pace 3` measures how many times the median it is.
 
 mod find;
 mod law;
@@ -61,23 +62,14 @@ const FINER: f32 = 1e-2;
 /// How far a point is followed, as a multiple of its way in the step (1).
 const AHEAD: f32 = 1.1;
 
-/// Round shapes that touch within so many steps have the frame of that time (1).
-const TURNED: f32 = 2.0;
-
 /// Slowest rebound, as a multiple of the speed that forces give a resting body in a step (1).
 const BOUNCES: f32 = 0.1;
 
-/// Share of v⁺ that friction may gain by rounding (1).
-const ROUNDING: f32 = 1e-6;
-
 /// Greatest number of waves of an island, and how many of the last ones only stop.
-const WAVES: [u32; 2] = [32, 4];
+const WAVES: [u32; 2] = [8, 2];
 
-/// Greatest number of visits of an island: a constant, more for each of its first [`FEW`] points, and for each further point.
-const VISITS: [usize; 3] = [256, 8, 2];
-
-/// Impacts of so many points are followed to their end (1); those of more are finished by the sweeps of the step.
-const FEW: usize = 64;
+/// Greatest number of visits of an island: a constant, and more for each of its points.
+const VISITS: [usize; 2] = [64, 2];
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -125,9 +117,9 @@ impl Spread {
         &mut self.found
     }
 
-    /// Solves the impacts of the lanes that were found, island by island. Returns how many islands reached their bound; none
-    /// without impacts.
-    pub(crate) fn run(&mut self, on: &mut SpreadInput<'_>) -> Option<usize> {
+    /// Solves the impacts of the lanes that were found, island by island. Returns how many visits that
+    /// took and how many islands reached their bound; none without impacts.
+    pub(crate) fn run(&mut self, on: &mut SpreadInput<'_>) -> Option<[usize; 2]> {
         if self.found.iter().all(Vec::is_empty) {
             return None;
         }
@@ -143,11 +135,12 @@ impl Spread {
         }
         // Lanes of an island stay in order.
         self.hit.sort_unstable();
-        let (mut begin, mut cut) = (0, 0);
+        let (mut begin, mut cut, mut visits) = (0, 0, 0);
         while begin < self.hit.len() {
             let root = self.hit[begin].0;
             let end = begin + self.hit[begin..].partition_point(|&(other, _)| other == root);
             cut += usize::from(!self.island(on, begin..end));
+            visits += self.visits;
             begin = end;
         }
         for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
@@ -160,7 +153,7 @@ impl Spread {
                 *sum = [sum[0] + point.given[0], sum[1] + point.given[1]];
             }
         }
-        Some(cut)
+        Some([visits, cut])
     }
 
     /// Solves the impacts of an island; false if it reached its bound.
@@ -224,7 +217,7 @@ impl Spread {
             }
             if let Some(round) = point.round.filter(|_| on.timed) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
-                if let Some(frame) = round.frame(ends, [-AHEAD * on.dt, TURNED * on.dt]) {
+                if let Some(frame) = round.frame(ends, [-AHEAD * on.dt, on.dt]) {
                     let mut turned = *point;
                     turned.turn(&frame, on.rows);
                     on.fall(&mut turned);
@@ -238,7 +231,7 @@ impl Spread {
             }
             let [v, slip] = point.velocity(on.rows);
             (point.target, point.time) = (target[0], target[1]);
-            (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0) + ROUNDING * target[0]);
+            (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0));
             (point.role, point.impulse, point.begun) = (Role::Bounces, [0.0; 2], [0.0; 2]);
             any = true;
         }
@@ -305,9 +298,7 @@ impl Spread {
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
-            let points = self.points.len() - self.first;
-            let crowd = points.saturating_sub(FEW);
-            is_done = self.visits <= VISITS[0] + VISITS[1] * (points - crowd) + VISITS[2] * crowd;
+            is_done = self.visits <= VISITS[0] + VISITS[1] * (self.points.len() - self.first);
         }
         is_done
     }
@@ -327,7 +318,7 @@ impl Spread {
             }
             if let Some(round) = point.round.filter(|_| on.timed) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
-                touch = round.frame(ends, [-on.dt, TURNED * on.dt]);
+                touch = round.frame(ends, [-on.dt, on.dt]);
             }
             if let Some(frame) = &touch {
                 let mut turned = *point;
@@ -372,7 +363,7 @@ impl Spread {
     /// Pushes both bodies of a point with an impulse (N·s) up to `time` (s), in the mean at `at` (s), and has their points
     /// looked at.
     fn push(&mut self, on: &mut SpreadInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
-        let point = self.points[place];
+        let point = &self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
                 continue;
@@ -461,8 +452,12 @@ fn root(parent: &mut [u32], mut body: u32) -> u32 {
 
 /// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
 fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> {
-    let ([vn, _], gap) = (point.velocity(on.rows), point.gap(on.rows));
-    (vn < -slowest && vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
+    let [vn, _] = point.velocity(on.rows);
+    if vn >= -slowest {
+        return None;
+    }
+    let gap = point.gap(on.rows);
+    (vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
 }
 
 /// Whether it approaches fast enough to bounce.

@@ -1,6 +1,7 @@
 //! Contact points that may be hit, with their rows and records.
 
 use super::NONE;
+use super::find::SLOW;
 use crate::engine::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
 use crate::engine::constraints::kernels::frame::turn;
 use crate::engine::constraints::records::batches::Batches;
@@ -208,7 +209,9 @@ impl SpreadInput<'_> {
             let [x, y, ..] = self.increments[row as usize];
             (point.normal[0].mul_add(x, point.normal[1] * y)) / self.h
         });
-        (point.falls, point.slow) = (a - b, self.dt * (a.abs() + b.abs()));
+        let [x, y, ..] = self.increments[point.rows[1] as usize];
+        let least = SLOW * x.mul_add(x, y * y).sqrt() / self.h;
+        (point.falls, point.slow) = (a - b, self.dt * (a.abs() + b.abs()).max(least));
     }
 
     /// The points of a lane.

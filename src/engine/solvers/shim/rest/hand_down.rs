@@ -20,9 +20,8 @@ use glam::{DVec2, Vec2};
 /// Smallest cosine between gravity and the normals of contacts that hand loads down.
 const BEARING: f32 = 0.5;
 
-/// Acceleration that is ignored, over that of free flight (1): of bodies that stand on one body, whose lean grows
-/// unless their loads fit their position, and of bodies that stand on several.
-const STILL: [f32; 2] = [1e-5, 1e-3];
+/// Acceleration that is ignored, over that of free flight (1): the lean of a column grows unless loads fit its position.
+const STILL: f32 = 1e-5;
 
 /// Smallest cosine between the normals of a body that does not lean (1).
 const ALIKE: f32 = 0.99;
@@ -35,9 +34,9 @@ pub(in super::super) struct HandDown {
     bearing: Vec<u32>,
     /// Of all contacts; empty if `upright` has all bodies that have some.
     all: Graph,
-    /// Bodies from the top downward, with the share of their free acceleration that is ignored; infinite for bodies
-    /// that lean, on a body of their own level or on several in different directions: only sweeps find their thrust.
-    downwards: Vec<(u32, f32)>,
+    /// Bodies from the top downward, and whether they lean, on a body of their own level or on several in different
+    /// directions: only sweeps find their thrust.
+    downwards: Vec<(u32, bool)>,
     /// Of one body.
     supports: Vec<Support>,
 }
@@ -78,32 +77,32 @@ impl HandDown {
             let hangs = |body: &&u32| self.upright.levels()[**body as usize] == UNSUPPORTED;
             let hanging = self.all.upwards().iter().rev().filter(hangs);
             self.downwards
-                .extend(hanging.map(|&body| (body, still(&self.all, body, |edge| &contacts[edge as usize]))));
+                .extend(hanging.map(|&body| (body, leans(&self.all, body, |edge| &contacts[edge as usize]))));
         } else {
             self.all = Graph::default();
         }
         let standing = self.upright.upwards().iter().rev();
         let bearing = |edge: u32| &contacts[self.bearing[edge as usize] as usize];
-        self.downwards.extend(standing.map(|&body| (body, still(&self.upright, body, bearing))));
+        self.downwards.extend(standing.map(|&body| (body, leans(&self.upright, body, bearing))));
     }
 
     /// Hands down what accelerates bodies.
     pub fn run(&mut self, on: &mut HandDownInput<'_>) {
         for i in 0..self.downwards.len() {
-            let (body, still) = self.downwards[i];
+            let (body, leans) = self.downwards[i];
             let [x, y, turn, inv_mass] = on.fields[body as usize].velocity;
             let inv_inertia = on.fields[body as usize].delta[3];
             let [free_x, free_y, ..] = on.increments[body as usize];
             let turning = if inv_inertia > 0.0 { turn * turn * inv_mass / inv_inertia } else { 0.0 };
             let free = free_x.mul_add(free_x, free_y * free_y);
             let moves = x.mul_add(x, y.mul_add(y, turning));
-            // A body without supports accelerates as in free flight.
-            if moves <= free * (still * still).min(0.25) {
+            // What nothing bears accelerates as in free flight.
+            if moves <= free * if leans { 0.25 } else { STILL * STILL } {
                 continue;
             }
             self.find_supports(on, body);
             let is_new = self.supports.iter().all(|support| support.load == [0.0; 2]);
-            if !self.supports.is_empty() && (is_new || still.is_finite()) {
+            if !self.supports.is_empty() && (is_new || !leans) {
                 self.stand(on, body);
             }
         }
@@ -188,25 +187,21 @@ impl HandDown {
 }
 
 /// See [`HandDown::downwards`]. `contact`: that of an edge.
-fn still<'c>(graph: &Graph, body: u32, contact: impl Fn(u32) -> &'c Contact) -> f32 {
+fn leans<'c>(graph: &Graph, body: u32, contact: impl Fn(u32) -> &'c Contact) -> bool {
     let level = graph.levels()[body as usize];
-    let mut below: Option<(u32, Vec2)> = None;
-    let mut still = STILL[0];
+    let mut below: Option<Vec2> = None;
     for &edge in graph.edges_of(body as usize) {
         let [a, b] = graph.ends(edge as usize);
         let (other, n) = (if a == body { b } else { a }, contact(edge).manifold.normal);
         let (of_other, normal) = (graph.levels()[other as usize], if b == body { n } else { -n });
         if of_other == level {
-            return f32::INFINITY;
+            return true;
         }
         if of_other < level {
-            match below {
-                None => below = Some((other, normal)),
-                Some((_, first)) if first.dot(normal) < ALIKE => return f32::INFINITY,
-                Some((first, _)) if first != other => still = STILL[1],
-                Some(_) => {}
+            if below.get_or_insert(normal).dot(normal) < ALIKE {
+                return true;
             }
         }
     }
-    still
+    false
 }

@@ -1,0 +1,101 @@
+//! How evenly a run is paced: its steps over the median of steps with as many contacts.
+//!
+//! A run is the same every time, so the time of a step is the least of several repeats, and what else the machine does
+//! is left out. More contacts take longer, so a step is compared with the [`NEAREST`] steps of the run that have most
+//! nearly as many.
+
+use super::sample::median;
+use crate::engine::clock::waited;
+use crate::engine::world::World;
+use crate::lab::error::Error;
+use std::time::{Duration, Instant};
+
+/// Steps that a step is compared with.
+const NEAREST: usize = 31;
+
+/// Steps of a run over the median of steps with as many contacts (1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Pace {
+    /// Median step of the run (ns).
+    pub median_ns: f64,
+    /// The first step, in which pairs, memory and contacts are new.
+    pub first: f64,
+    /// The longest of all others, and which it is, from 1.
+    pub longest: f64,
+    /// See `longest`.
+    pub longest_step: u32,
+    /// Mean of all steps.
+    pub mean: f64,
+}
+
+impl Pace {
+    /// The pace of a run of `steps` steps, or up to where it diverges. Errors: a world that cannot be built.
+    pub fn measure(
+        build: impl Fn() -> Result<World, Error>,
+        steps: u32,
+        repeats: u32,
+    ) -> Result<Self, Error> {
+        let (mut times, mut contacts) = (Vec::new(), Vec::new());
+        for _ in 0..repeats.max(1) {
+            let mut world = build()?;
+            for step in 0..steps as usize {
+                let (before, start) = (waited(), Instant::now());
+                let failed = world.step().is_err();
+                let elapsed = start.elapsed();
+                let pause = before.and_then(|before| Some(waited()?.saturating_sub(before)));
+                let ns = elapsed.saturating_sub(pause.unwrap_or(Duration::ZERO)).as_nanos() as f64;
+                match times.get_mut(step) {
+                    None => {
+                        times.push(ns);
+                        contacts.push(world.counts.contacts);
+                    }
+                    Some(least) => *least = ns.min(*least),
+                }
+                if failed {
+                    break;
+                }
+            }
+        }
+        Ok(Self::of(&times, &contacts))
+    }
+
+    /// Of steps that took so long (ns) and had so many contacts.
+    fn of(times: &[f64], contacts: &[usize]) -> Self {
+        let mut order: Vec<usize> = (0..times.len()).collect();
+        order.sort_by_key(|&step| contacts[step]);
+        let mut ratios = vec![0.0; times.len()];
+        for (place, &step) in order.iter().enumerate() {
+            let begin = place.saturating_sub(NEAREST / 2).min(times.len().saturating_sub(NEAREST));
+            let near = &order[begin..(begin + NEAREST).min(times.len())];
+            let near: Vec<f64> = near.iter().map(|&step| times[step]).collect();
+            ratios[step] = times[step] / median(&near).max(1.0);
+        }
+        let later = ratios.iter().enumerate().skip(1);
+        let (longest_step, longest) =
+            later.fold((0, 0.0), |most, (step, &ratio)| if ratio > most.1 { (step, ratio) } else { most });
+        Pace {
+            median_ns: median(times),
+            first: ratios.first().copied().unwrap_or(0.0),
+            longest,
+            longest_step: longest_step as u32 + 1,
+            mean: ratios.iter().sum::<f64>() / ratios.len().max(1) as f64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_compared_with_those_of_as_many_contacts() {
+        // 1 µs a contact; step 51 takes five times that.
+        let contacts: Vec<usize> = (0..100).map(|step| 10 + 10 * (step / 50)).collect();
+        let mut times: Vec<f64> = contacts.iter().map(|&n| 1e3 * n as f64).collect();
+        times[50] *= 5.0;
+        let pace = Pace::of(&times, &contacts);
+        assert_eq!((pace.first, pace.longest, pace.longest_step), (1.0, 5.0, 51));
+        assert!((pace.mean - 1.04).abs() < 1e-9 && pace.median_ns == 20e3, "{pace:?}");
+        assert_eq!(Pace::of(&[], &[]), Pace { longest_step: 1, ..Pace::default() });
+    }
+}
