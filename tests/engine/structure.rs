@@ -81,7 +81,8 @@ const ENGINE: &[&[&str]] = &[
 const LAB: &[&[&str]] = &[
     &["error"],
     &["estimate", "files", "interned", "overrides", "units"],
-    &["metrics", "reference"],
+    &["reference"],
+    &["metrics"],
     &["scenes", "capture", "picture"],
     &["recording"],
     &["verify", "study", "converge"],

@@ -365,7 +365,7 @@ struct HeldRow {
 }
 
 /// Rows that hold and share a block of T.
-struct Group {
+struct HeldGroup {
     first: usize,
     size: usize,
     softness: [[f64; 3]; 3],
@@ -374,7 +374,7 @@ struct Group {
 
 /// Rows of a joint that share their softness R.
 #[derive(Clone, Copy, Debug)]
-struct Softness {
+struct JointSoftness {
     first: usize,
     size: usize,
     /// 1/kg
@@ -389,7 +389,7 @@ struct Problem {
     rows: Vec<Row>,
     /// Of the rows of joints.
     bounds: Vec<Bound>,
-    joints: Vec<Softness>,
+    joints: Vec<JointSoftness>,
     /// λ₀ (N·s)
     start: Vec<f64>,
     /// u there, the bias included (m/s).
@@ -447,7 +447,7 @@ impl Problem {
                 r[k][k] = 1.0;
             }
         }
-        self.joints.push(Softness { first, size: block.size, r });
+        self.joints.push(JointSoftness { first, size: block.size, r });
     }
 
     /// Numbers the bodies that can move; with all rows in place.
@@ -648,7 +648,7 @@ impl Problem {
             return None;
         }
         // T⁻¹ x or T x
-        let soften = |x: &[f64], of: fn(&Group) -> &[[f64; 3]; 3]| {
+        let soften = |x: &[f64], of: fn(&HeldGroup) -> &[[f64; 3]; 3]| {
             let mut y = vec![0.0; x.len()];
             for group in &groups {
                 let members = group.first..group.first + group.size;
@@ -685,18 +685,18 @@ impl Problem {
     }
 
     /// T of the rows that hold: ε, and R of joints. None if that is singular.
-    fn groups(&self, held: &[HeldRow]) -> Option<Vec<Group>> {
+    fn groups(&self, held: &[HeldRow]) -> Option<Vec<HeldGroup>> {
         let mut groups = vec![];
         let (mut first, mut joints) = (0, self.joints.iter());
         while let Some(row) = held.get(first) {
             let joint = if row.at < 2 * self.points.len() {
-                Softness { first: row.at, size: 1, r: [[0.0; 3]; 3] }
+                JointSoftness { first: row.at, size: 1, r: [[0.0; 3]; 3] }
             } else {
                 *joints.find(|joint| row.at < joint.first + joint.size)?
             };
             let members = &held[first..];
             let size = members.iter().take_while(|row| row.at < joint.first + joint.size).count();
-            let mut group = Group { first, size, softness: [[0.0; 3]; 3], inverse: [[0.0; 3]; 3] };
+            let mut group = HeldGroup { first, size, softness: [[0.0; 3]; 3], inverse: [[0.0; 3]; 3] };
             for (r, c) in (0..size).flat_map(|r| (0..size).map(move |c| (r, c))) {
                 let entry = joint.r[members[r].at - joint.first][members[c].at - joint.first];
                 let shift = if r == c { SHIFT } else { 0.0 };

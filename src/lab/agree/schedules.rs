@@ -677,52 +677,6 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
     model.advance();
 }
 
-pub(super) fn admm(model: &mut Model, run: &Run) {
-    model.accelerate();
-    model.warm_start(false);
-    let law = VectorLaw::new(model, run.baumgarte());
-    let rho = run.get("penalty");
-    let mut lambda = model.l.clone();
-    let mut z = lambda.clone();
-    let slide = |u: Vec<DPair>| -> Vec<DPair> {
-        u.iter().zip(&law.friction).map(|(u, mu)| [u[0] + mu * u[1].abs(), u[1]]).collect()
-    };
-    // The multiplier is where the law puts it, in the polar cone.
-    let w = law.scaled(&slide(law.speeds(model, &lambda)), |m| -m / rho);
-    let mut w = plus(&w, -1.0, &law.project(&w));
-    if run.undoes(0) {
-        w.fill([0.0; 2]);
-    }
-    let stiff = |x: &[DPair]| law.scaled(x, |m| rho / m);
-    let product = |model: &Model, x: &[DPair]| plus(&model.problem.delassus_product(x), 1.0, &stiff(x));
-    // Steps of conjugate gradients; all that it takes where the solver has no number for them.
-    let steps = if run.undoes(1) { 1000 } else { run.find("linear_steps").map_or(1000, |n| n as usize) };
-    for _ in 0..run.budget.velocity_iterations {
-        let u = slide(law.speeds(model, &lambda));
-        let mut r = plus(&stiff(&plus(&plus(&z, -1.0, &w), -1.0, &lambda)), -1.0, &u);
-        let scaled = |r: &[DPair]| law.scaled(r, |m| m / (1.0 + rho));
-        let mut p = scaled(&r);
-        let (mut square, goal) = (dot(&r, &p), 1e-28 * dot(&r, &p));
-        for _ in 0..steps {
-            if square <= goal {
-                break;
-            }
-            let image = product(model, &p);
-            let length = square / dot(&p, &image);
-            lambda = plus(&lambda, length, &p);
-            r = plus(&r, -length, &image);
-            let next = dot(&r, &scaled(&r));
-            p = plus(&scaled(&r), next / square, &p);
-            square = next;
-        }
-        let both = plus(&lambda, 1.0, &w);
-        z = law.project(&both);
-        w = plus(&both, -1.0, &z);
-    }
-    model.jump(&z);
-    model.advance();
-}
-
 /// The solution of the law of [`pgs`], which Gauss–Seidel approaches.
 pub(super) fn solution(model: &mut Model, run: &Run) {
     let budget = Budget { velocity_iterations: 5000, ..run.budget };

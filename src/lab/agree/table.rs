@@ -125,15 +125,36 @@ pub const TABLE: &[AgreementEntry] = &[
         ..entry("apgd", Against::Method(by::apgd), "50 iterations (Chrono), until a residual is reached")
     },
     AgreementEntry {
-        departs: &[
-            "the multiplier starts at the law's −u (source: 0)",
-            "3 conjugate-gradient steps (source: linear problem solved)",
-        ],
-        ..entry("admm", Against::Method(by::admm), "ρ by problem, until both residuals are reached")
+        why: "its method ends at the solution of the convex relaxation",
+        bound: 1e-3,
+        ..entry(
+            "barzilai_borwein",
+            Against::Solution(by::apgd),
+            "until a residual is reached, 10 values remembered",
+        )
+    },
+    AgreementEntry {
+        why: "its rounds end at the solution of `pgs`",
+        bound: 1e-3,
+        ..entry("staggered", Against::Solution(by::solution), "until the change of a round is small")
+    },
+    AgreementEntry {
+        why: "its penalty changes with the residuals of all bodies; what it comes to is the solution of `pgs`",
+        bound: 1e-3,
+        ..entry("admm", Against::Solution(by::solution), "ρ by problem, until both residuals are reached")
     },
     AgreementEntry {
         why: "Newton's method ends at the solution of the same law, or with the sweeps that it began with",
         ..entry("direct", Against::Solution(by::solution), "until a residual is reached")
+    },
+    AgreementEntry {
+        why: "its method ends at the solution of the convex relaxation, a little soft",
+        bound: 1e-3,
+        ..entry(
+            "sap",
+            Against::Solution(by::apgd),
+            "until the gradient is small, σ 10⁻³, τ by problem (Drake)",
+        )
     },
     entry("shock", Against::Method(by::shock), "sweeps until contacts are resolved, then 1 upward"),
     AgreementEntry {
@@ -212,5 +233,20 @@ pub const TABLE: &[AgreementEntry] = &[
     AgreementEntry {
         departs: &["pairs below 10⁻³ of k₁₁ k₂₂ go row by row (source: below 10⁻²)"],
         ..entry("rapier", Against::Method(by::rapier), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s")
+    },
+    entry(
+        "physx",
+        Against::Nothing("its method has not been written in `f64`"),
+        "4 substeps, 1 velocity iteration at the end",
+    ),
+    entry(
+        "jolt",
+        Against::Nothing("its method has not been written in `f64`"),
+        "10 velocity and 2 position iterations",
+    ),
+    AgreementEntry {
+        why: "its sweeps and coarse problems end at the solution of `pgs`",
+        bound: 1e-3,
+        ..entry("two_level", Against::Solution(by::solution), "until a residual is reached")
     },
 ];

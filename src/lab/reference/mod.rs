@@ -21,12 +21,14 @@ pub mod nnls;
 pub mod problem;
 pub mod rates;
 pub mod residual;
+pub mod rows;
 mod scale;
 pub mod sparse;
 pub mod statics;
 pub mod stewart_trinkle;
 pub mod sweeps;
+pub mod target;
 pub(crate) mod validate;
 
-pub use joints::{BlockLaw, ProblemBlock, ProblemJoint, ProblemRow};
 pub use problem::{ContactProblem, DPair, ProblemBody, ProblemContact, Velocity};
+pub use rows::{BlockLaw, ProblemBlock, ProblemJoint, ProblemRow};

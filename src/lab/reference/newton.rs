@@ -29,7 +29,8 @@
 
 use super::joints::{BlockLine, RowVector};
 use super::problem::{ContactProblem, DPair, ProblemContact, SideRows};
-use super::residual::{OwnRow, Target, clamp, positive};
+use super::residual::{OwnRow, Target, clamp};
+use super::rows::positive;
 use super::sparse;
 use super::sweeps::{IterativeRun, Status, Stop, SweepDirection, pgs};
 

@@ -18,7 +18,7 @@
 //! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix. Joints have rows
 //! and laws of their own: [`crate::lab::reference::joints`].
 
-use super::joints::ProblemJoint;
+use super::rows::ProblemJoint;
 pub use crate::engine::constraints::numerics::coulomb_lcp::DPair;
 use crate::engine::constraints::numerics::matrix::Matrix;
 use serde::{Deserialize, Serialize};

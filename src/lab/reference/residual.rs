@@ -20,42 +20,9 @@
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
-
-/// The right-hand side b of un = Jn v + b that a residual is measured against.
-///
-/// "Is this the contact law?" and "did the solver solve what it set out to solve?" are different
-/// questions; the type keeps their answers apart.
-#[derive(Clone, Copy, Debug)]
-pub enum Target<'a> {
-    /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step,
-    /// overlapping ones may not deepen.
-    Rigid,
-    /// The solver's own law: one row for every contact of the problem, then one for every row of its joints.
-    Own(&'a [OwnRow]),
-}
-
-/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. Of a rigid row or a limit of a joint:
-/// J v + bias + compliance K λ; motors and springs have the law of the joint.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct OwnRow {
-    /// m/s; negative pushes apart.
-    pub bias: f64,
-    /// 1/kg, ≥ 0: velocity that the contact yields per impulse; of a row of a joint in its K (1).
-    pub compliance: f64,
-}
-
-impl Target<'_> {
-    /// Bias (m/s) and compliance (1/kg) at contact `i`.
-    pub fn row(&self, problem: &ContactProblem, i: usize) -> OwnRow {
-        match self {
-            Target::Own(rows) => rows[i],
-            Target::Rigid => {
-                let c = &problem.contacts[i];
-                OwnRow { bias: c.gap.max(0.0) / problem.h - c.rebound, compliance: 0.0 }
-            }
-        }
-    }
-}
+pub use super::rows::OwnRow;
+use super::rows::positive;
+pub use super::target::Target;
 
 /// Residuals of one contact; all zero exactly where the law holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -170,11 +137,6 @@ pub fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
         let n = (ln + mu * lt.abs()) / (1.0 + mu * mu);
         [n, (mu * n).copysign(lt)]
     }
-}
-
-/// max(x, 0) that hands NaN on, so that a blown-up solver cannot look exact.
-pub(super) fn positive(x: f64) -> f64 {
-    if x <= 0.0 { 0.0 } else { x }
 }
 
 /// x clamped to [−radius, radius]; NaN stays NaN.

@@ -18,9 +18,9 @@
 //!
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts. O(n³) for n rows of joints.
 
-use super::joints::Bound;
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
+use super::rows::BlockBound;
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::engine::constraints::numerics::lemke::LemkeOutcome;
 use crate::engine::constraints::numerics::matrix::Matrix;
@@ -125,11 +125,11 @@ impl<'a> Eliminated<'a> {
             fixed.extend((0..line.size).map(|i| held.map(|held| held[i])));
             match (held, line.bound) {
                 (Some(held), _) => line.write(held, &mut start),
-                (None, Bound::Positive) => limits.push(first),
-                (None, Bound::Cap(cap)) if line.size == 1 => caps.push((first, cap)),
+                (None, BlockBound::Positive) => limits.push(first),
+                (None, BlockBound::Cap(cap)) if line.size == 1 => caps.push((first, cap)),
                 (None, bound) => {
                     free.extend(first..first + line.size);
-                    if let Bound::Cap(cap) = bound {
+                    if let BlockBound::Cap(cap) = bound {
                         balls.push((first, line.size, cap));
                     }
                 }

@@ -18,7 +18,8 @@
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{Measure, OwnRow, Target, clamp, positive};
+use super::residual::{Measure, OwnRow, Target, clamp};
+use super::rows::positive;
 
 /// When an iteration ends.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Validation of a contact problem.
 
-use super::joints::{BlockLaw, ProblemBlock, ProblemJoint, ROWS, inverted};
 use super::problem::ContactProblem;
+use super::rows::{BlockLaw, ProblemBlock, ProblemJoint, ROWS, inverted};
 use crate::lab::error::Error;
 
 impl ContactProblem {

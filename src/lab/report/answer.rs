@@ -14,8 +14,6 @@ use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::ranking::{Ranking, Standing, ranking};
 use crate::lab::study::{self, Record};
 
-/// Names in a line, solvers in the ranking, and notes on what falls later.
-const PER_LINE: usize = 12;
 const MOST_RANKED: usize = 8;
 const MOST_NOTES: usize = 7;
 
@@ -421,10 +419,7 @@ fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
         others => {
-            let mut text = format!("not run, {} solvers (--solvers all runs every solver):", others.len());
-            let lines: Vec<String> = others.chunks(PER_LINE).map(|line| line.join(", ")).collect();
-            text += &format!("\n  {}\n", lines.join(",\n  "));
-            text
+            wrapped(&format!("not run, {} solvers (--solvers all): {}", others.len(), others.join(", ")))
         }
     }
 }

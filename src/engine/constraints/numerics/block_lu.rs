@@ -14,7 +14,7 @@
 
 use super::envelope::by_breadth;
 
-type Block<const B: usize> = [[f64; B]; B];
+type LuBlock<const B: usize> = [[f64; B]; B];
 
 /// A system and its factors; keeps its memory.
 #[derive(Clone, Debug, Default)]
@@ -25,10 +25,10 @@ pub struct BlockLu<const B: usize> {
     /// f_i, and where row i of L and column i of U begin.
     first: Vec<usize>,
     start: Vec<usize>,
-    lower: Vec<Block<B>>,
-    upper: Vec<Block<B>>,
+    lower: Vec<LuBlock<B>>,
+    upper: Vec<LuBlock<B>>,
     /// A_ii, then U_ii⁻¹.
-    diagonal: Vec<Block<B>>,
+    diagonal: Vec<LuBlock<B>>,
 }
 
 impl<const B: usize> BlockLu<B> {
@@ -64,7 +64,7 @@ impl<const B: usize> BlockLu<B> {
     /// # Panics
     /// If the two do not couple.
     #[inline]
-    pub fn add(&mut self, row: usize, column: usize, values: Block<B>) {
+    pub fn add(&mut self, row: usize, column: usize, values: LuBlock<B>) {
         let [i, j] = [row, column].map(|k| self.place[k]);
         let at = |i: usize, j: usize| self.start[i] + j - self.first[i];
         let block = match i.cmp(&j) {
@@ -130,7 +130,7 @@ impl<const B: usize> BlockLu<B> {
 
 /// a −= l u
 #[inline]
-fn subtract<const B: usize>(a: &mut Block<B>, l: &Block<B>, u: &Block<B>) {
+fn subtract<const B: usize>(a: &mut LuBlock<B>, l: &LuBlock<B>, u: &LuBlock<B>) {
     for (a, l) in a.iter_mut().zip(l) {
         for (l, u) in l.iter().zip(u) {
             (0..B).for_each(|c| a[c] -= l * u[c]);
@@ -139,8 +139,8 @@ fn subtract<const B: usize>(a: &mut Block<B>, l: &Block<B>, u: &Block<B>) {
 }
 
 /// Of a small matrix, by elimination with the largest entry of a column as its pivot; none if it is singular.
-pub fn inverse<const B: usize>(mut a: Block<B>) -> Option<Block<B>> {
-    let mut x: Block<B> = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
+pub fn inverse<const B: usize>(mut a: LuBlock<B>) -> Option<LuBlock<B>> {
+    let mut x: LuBlock<B> = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
     for k in 0..B {
         let pivot = (k..B).max_by(|&r, &s| a[r][k].abs().total_cmp(&a[s][k].abs()))?;
         a.swap(k, pivot);

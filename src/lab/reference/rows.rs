@@ -1,0 +1,307 @@
+//! Rows of joints, and the law of a block as a line; see [`super::joints`].
+
+use crate::engine::constraints::numerics::coulomb_lcp::DPair;
+use crate::engine::constraints::numerics::matrix::solve_in_place;
+use crate::engine::constraints::records::rows::RowLaw;
+use serde::{Deserialize, Serialize};
+
+/// Rows of the largest block.
+pub const ROWS: usize = 3;
+/// Numbers of the rows of a block; those of absent rows are zero.
+pub type RowVector = [f64; ROWS];
+/// A spring that is damped less than this (1) pushes as its error says, whatever its velocity is.
+pub(super) const UNDAMPED: f64 = 1e-12;
+
+/// A joint of a problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemJoint {
+    /// Body a; none if that side is static.
+    pub body_a: Option<u32>,
+    /// Body b; none if that side is static.
+    pub body_b: Option<u32>,
+    /// Lengths of the arms from the centers of mass of a and b to the anchors (m).
+    pub reach: DPair,
+    /// Its blocks, in the order in which they are solved.
+    pub blocks: Vec<ProblemBlock>,
+}
+
+/// Rows of a joint that are solved together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemBlock {
+    /// The law of all of them.
+    pub law: BlockLaw,
+    /// One to three rows.
+    pub rows: Vec<ProblemRow>,
+}
+
+/// The law of a block; see [`super::joints`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum BlockLaw {
+    /// C = 0.
+    Rigid,
+    /// C ≥ 0, of one row.
+    Limit,
+    /// J v = u.
+    Motor {
+        /// u (m/s or rad/s)
+        speed: f64,
+        /// F h (N·s or N·m·s)
+        cap: f64,
+    },
+    /// A spring.
+    Spring {
+        /// S (1/s)
+        stiffness: f64,
+        /// D (1)
+        damping: f64,
+        /// F h (N·s or N·m·s), if it is bounded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cap: Option<f64>,
+    },
+}
+
+impl From<RowLaw<f32>> for BlockLaw {
+    fn from(law: RowLaw<f32>) -> Self {
+        match law {
+            RowLaw::Rigid => BlockLaw::Rigid,
+            RowLaw::Limit => BlockLaw::Limit,
+            RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
+            RowLaw::Spring { stiffness, damping, cap } => {
+                let cap = cap.map(f64::from);
+                BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap }
+            }
+        }
+    }
+}
+
+impl BlockLaw {
+    /// Greatest norm of its impulses, where there is one.
+    pub fn cap(&self) -> Option<f64> {
+        match *self {
+            BlockLaw::Motor { cap, .. } => Some(cap),
+            BlockLaw::Spring { cap, .. } => cap,
+            BlockLaw::Rigid | BlockLaw::Limit => None,
+        }
+    }
+}
+
+/// A row of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemRow {
+    /// d: a unit vector, or zero for an angle.
+    pub axis: [f64; 2],
+    /// s_a: r_a × d (m), or 1 for an angle.
+    pub arm_a: f64,
+    /// s_b: the same of b.
+    pub arm_b: f64,
+    /// C at the start of the step (m or rad).
+    pub error: f64,
+    /// Impulse that a warm-started solver begins with (N·s or N·m·s).
+    pub warm_impulse: f64,
+}
+
+impl ProblemRow {
+    /// Whether it is a row of an angle.
+    pub fn is_angular(&self) -> bool {
+        self.axis == [0.0; 2]
+    }
+}
+
+impl ProblemJoint {
+    /// Rows of all its blocks.
+    pub fn rows(&self) -> impl Iterator<Item = &ProblemRow> {
+        self.blocks.iter().flat_map(|block| &block.rows)
+    }
+
+    /// A revolute joint whose anchors meet: `r` from the centers of mass to the point (m).
+    pub fn revolute(bodies: [Option<u32>; 2], r: [[f64; 2]; 2]) -> Self {
+        let arm = |k: usize, d: [f64; 2]| bodies[k].map_or(0.0, |_| r[k][0] * d[1] - r[k][1] * d[0]);
+        let row = |axis| ProblemRow {
+            axis,
+            arm_a: arm(0, axis),
+            arm_b: arm(1, axis),
+            error: 0.0,
+            warm_impulse: 0.0,
+        };
+        let [body_a, body_b] = bodies;
+        let rows = vec![row([1.0, 0.0]), row([0.0, 1.0])];
+        let reach = [0, 1].map(|k| bodies[k].map_or(0.0, |_| r[k][0].hypot(r[k][1])));
+        ProblemJoint { body_a, body_b, reach, blocks: vec![ProblemBlock { law: BlockLaw::Rigid, rows }] }
+    }
+}
+
+/// Bounds of the impulses of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum BlockBound {
+    None,
+    /// λ ≥ 0
+    Positive,
+    /// Greatest norm.
+    Cap(f64),
+}
+
+impl BlockBound {
+    /// Whether impulses are off the bound, so that they answer to velocities.
+    pub fn is_inside(self, y: RowVector) -> bool {
+        match self {
+            BlockBound::None => true,
+            BlockBound::Positive => y[0] > 0.0,
+            BlockBound::Cap(cap) => y.iter().map(|y| y * y).sum::<f64>().sqrt() < cap,
+        }
+    }
+
+    /// Π; NaN stays NaN.
+    pub fn project(self, mut y: RowVector) -> RowVector {
+        match self {
+            BlockBound::None => {}
+            BlockBound::Positive => y[0] = positive(y[0]),
+            BlockBound::Cap(cap) => {
+                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+                if norm > cap {
+                    y = y.map(|y| y * (cap / norm));
+                }
+            }
+        }
+        y
+    }
+}
+
+/// The law of a block as a line in the velocity; see [`super::joints`].
+#[derive(Clone, Debug)]
+pub struct LawLine {
+    /// Rows.
+    pub size: usize,
+    /// K
+    pub(super) response: [RowVector; ROWS],
+    /// K⁻¹
+    inverse: [RowVector; ROWS],
+    /// P of [`Self::solution`], K⁻¹ at first.
+    pub(super) step: [RowVector; ROWS],
+    /// α = q
+    pub(super) alpha: f64,
+    offset: RowVector,
+    pub(super) bound: BlockBound,
+}
+
+impl LawLine {
+    /// The line of `law` for `size` rows with these errors, in a block of response K. `own`: right-hand sides of rigid rows and
+    /// limits.
+    pub fn new(
+        law: BlockLaw,
+        size: usize,
+        errors: RowVector,
+        own: [OwnRow; ROWS],
+        response: [RowVector; ROWS],
+    ) -> Self {
+        let alpha = match law {
+            BlockLaw::Rigid | BlockLaw::Limit => 1.0 / (1.0 + own[0].compliance),
+            BlockLaw::Motor { .. } => 1.0,
+            BlockLaw::Spring { damping, .. } => damping / (1.0 + damping),
+        };
+        let mut offset = [0.0; ROWS];
+        for (i, offset) in offset.iter_mut().enumerate().take(size) {
+            *offset = match law {
+                BlockLaw::Rigid | BlockLaw::Limit => alpha * own[i].bias,
+                BlockLaw::Motor { speed, .. } => -speed,
+                BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * errors[i],
+            };
+        }
+        let bound = match (law, law.cap()) {
+            (BlockLaw::Limit, _) => BlockBound::Positive,
+            (_, Some(cap)) => BlockBound::Cap(cap),
+            (_, None) => BlockBound::None,
+        };
+        let inverse = inverted(response, size).unwrap_or_default();
+        LawLine { size, response, inverse, step: inverse, alpha, offset, bound }
+    }
+
+    /// K⁻¹ x
+    fn solved(&self, x: RowVector) -> RowVector {
+        product(&self.inverse, x)
+    }
+
+    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
+    /// with impulses `l`.
+    pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
+        let soft = product(&self.response, l);
+        let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
+        let x = product(&self.step, f);
+        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+    }
+
+    /// Impulses of a spring whose force does not depend on the velocity.
+    pub(super) fn fixed(&self) -> Option<RowVector> {
+        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
+    }
+
+    /// b of J v + b + R λ = 0 (m/s or rad/s).
+    pub(super) fn bias(&self) -> RowVector {
+        self.offset.map(|c| c / self.alpha)
+    }
+
+    /// R = `softness` K (1).
+    pub(super) fn softness(&self) -> f64 {
+        (1.0 - self.alpha) / self.alpha
+    }
+}
+
+/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. Of a rigid row or a limit of a joint:
+/// J v + bias + compliance K λ; motors and springs have the law of the joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OwnRow {
+    /// m/s; negative pushes apart.
+    pub bias: f64,
+    /// 1/kg, ≥ 0: velocity that the contact yields per impulse; of a row of a joint in its K (1).
+    pub compliance: f64,
+}
+
+impl ProblemRow {
+    /// b of the rigid law (m/s or rad/s).
+    pub fn rigid_bias(&self, law: BlockLaw, h: f64) -> f64 {
+        match law {
+            BlockLaw::Limit => self.error.max(0.0) / h,
+            _ => 0.0,
+        }
+    }
+}
+
+/// What an impulse of a row counts in N·s, by the sum of both inverse masses (1/kg): 1, or √(K m) of an angle (1/m).
+pub fn row_scale(is_angular: bool, response: f64, inv_mass: f64) -> f64 {
+    if is_angular && inv_mass > 0.0 { (response / inv_mass).sqrt() } else { 1.0 }
+}
+
+/// The inverse of K, the diagonal of which is scaled to 1 first; none if it has none to 9 digits.
+pub(super) fn inverted(k: [RowVector; ROWS], size: usize) -> Option<[RowVector; ROWS]> {
+    let mut inverse = [[0.0; ROWS]; ROWS];
+    let scale = [0, 1, 2].map(|i| if i < size { 1.0 / k[i][i].sqrt() } else { 1.0 });
+    for column in 0..size {
+        let mut a = [0.0; ROWS * ROWS];
+        let (a, x) = (&mut a[..size * size], &mut [0.0; ROWS][..size]);
+        for r in 0..size {
+            for c in 0..size {
+                a[r * size + c] = scale[r] * k[r][c] * scale[c];
+            }
+        }
+        x[column] = 1.0;
+        if a.iter().any(|a| !a.is_finite()) || !solve_in_place(a, x, 1e-9) {
+            return None;
+        }
+        for (row, x) in x.iter().enumerate() {
+            inverse[row][column] = scale[row] * x * scale[column];
+        }
+    }
+    Some(inverse)
+}
+
+fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
+    matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+}
+
+/// max(x, 0) that hands NaN on, so that a blown-up solver cannot look exact.
+pub(super) fn positive(x: f64) -> f64 {
+    if x <= 0.0 { 0.0 } else { x }
+}
