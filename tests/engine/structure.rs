@@ -293,6 +293,8 @@ fn steps_are_timed_in_one_place() {
         "lab/profile/ceilings.rs",
         "lab/profile/growth.rs",
         "lab/profile/mod.rs",
+        // Each step of a random scene, in the processor time of its thread.
+        "lab/study/pace.rs",
         // Iterations of a frozen problem.
         "lab/converge/replay.rs",
         // A solver against itself without a mechanism, step by step in turns.

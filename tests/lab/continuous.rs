@@ -56,7 +56,7 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
 }
 
 /// Solvers under which something that turns fast gets through in the end, or that diverge.
-const KNOWN: [&str; 4] = ["pgs_soft", "jacobi", "mass_splitting", "tgs_soft"];
+const KNOWN: [&str; 5] = ["pgs_soft", "jacobi", "mass_splitting", "tgs_soft", "physx"];
 
 #[test]
 fn dynamic_bodies_stop_those_that_ask_for_it() {

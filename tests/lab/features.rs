@@ -48,8 +48,10 @@ fn needs_are_read_off_the_scene() {
 
 #[test]
 fn the_specialized_and_the_full_kernel_give_the_same_bits() {
-    for (name, _) in scenes() {
-        for variant in &VARIANTS {
+    for (name, features) in scenes() {
+        // The moments of levels in `two_level` come from arms, which records of discs without friction do not have.
+        let has_arms = |solver: &str| solver != "two_level" || features.rotation;
+        for variant in VARIANTS.iter().filter(|variant| has_arms(variant.name)) {
             let mut settings = crate::common::settings(variant);
             settings.impacts = Impacts::Waves;
             let mut special = scene(name).build(settings.clone()).unwrap();

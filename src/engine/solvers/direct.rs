@@ -11,15 +11,16 @@
 //! [`super::pgs`]. Sweeps of [`super::pgs`] come first; a scene of more than `largest` points is left to them, and runs and studies say so.
 //! Where a step of Newton's finds nothing better, eight sweeps in `f64` take its place (not in scenes with joints).
 //!
-//! **Agreement.** The source at its best: until a residual is reached. Here: 20 iterations, baumgarte 0.3, sweeps 8,
-//! largest 4000, lemke 0. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (Newton's method
-//! ends at the solution of the same law, or with the sweeps that it began with): `simpulse agree --solvers direct`.
+//! **Agreement.** The source at its best: until a residual is reached. Here: 20 iterations, baumgarte 0.3, sweeps
+//! 8, largest 4000, lemke 0. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (Newton's
+//! method ends at the solution of the same law, or with the sweeps that it began with): `simpulse agree --solvers
+//! direct`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
 //! of a matrix of 3 × 3 blocks, one row of blocks per body, ordered by breadth (`numerics/block_lu.rs`): n b² products of blocks in `f64` for
 //! n bodies in a band of b, one lane. COST Lemke's method goes through a
 //! tableau of 16m² entries for m points at each pivot, and there are more pivots than points: it loses to Newton's from the first
-//! point on. Sweeps of a step request 1750 B per contact.
+//! point on. Sweeps of a step request 7766 B per contact.
 //!
 //! **Fails when** bands are wide, and where friction lets a point
 //! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.

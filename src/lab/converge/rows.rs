@@ -13,7 +13,7 @@ use crate::lab::reference::validate::BLOCKS;
 use crate::lab::reference::{BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemJoint};
 
 /// Which blocks a joint has: rows of each, and its law.
-type Blocks = [Option<(usize, LawForm)>; BLOCKS];
+type ProblemBlocks = [Option<(usize, LawForm)>; BLOCKS];
 
 /// A law without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ struct FrozenJoint {
     numbers: Vec<f32>,
 }
 
-fn form(joint: &ProblemJoint) -> Blocks {
+fn form(joint: &ProblemJoint) -> ProblemBlocks {
     let mut form = [None; BLOCKS];
     for (form, block) in form.iter_mut().zip(&joint.blocks) {
         *form = Some((block.rows.len(), LawForm::of(&block.law)));
@@ -95,27 +95,27 @@ fn numbers(block: &ProblemBlock) -> Vec<f32> {
 }
 
 impl JointType for FrozenJoint {
-    type Form = Blocks;
+    type Form = ProblemBlocks;
 
     /// Their lengths are all that is known of them.
     fn anchors(&self) -> [[f64; 2]; 2] {
         self.reach.map(|reach| [reach, 0.0])
     }
 
-    fn numbers(form: Blocks) -> usize {
+    fn numbers(form: ProblemBlocks) -> usize {
         form.into_iter().flatten().map(|(rows, law)| ROW * rows + law.numbers()).sum()
     }
 
-    fn kept(form: Blocks) -> usize {
+    fn kept(form: ProblemBlocks) -> usize {
         form.into_iter().flatten().map(|(rows, law)| rows * law.kept()).sum()
     }
 
-    fn place(&self, _: Blocks, _: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _: ProblemBlocks, _: Placing<'_>, numbers: &mut [f32]) {
         numbers.copy_from_slice(&self.numbers);
     }
 
     #[inline(always)]
-    fn rows<L: Lanes>(form: Blocks, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
+    fn rows<L: Lanes>(form: ProblemBlocks, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let (mut numbers, mut kept) = (numbers, kept);
         for (rows, law) in form.into_iter().flatten() {
             let (of_block, others) = numbers.split_at(ROW * rows + law.numbers());

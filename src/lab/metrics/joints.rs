@@ -49,7 +49,7 @@ pub struct JointErrors {
 }
 
 /// A block after a step.
-struct Block<'a> {
+struct JointBlock<'a> {
     solved: &'a SolvedBlock,
     law: BlockLaw,
     /// K
@@ -64,7 +64,7 @@ struct Block<'a> {
     scale: RowVector,
 }
 
-impl<'a> Block<'a> {
+impl<'a> JointBlock<'a> {
     fn new(solved: &'a SolvedBlock, [a, b]: [&BodyStep; 2]) -> Self {
         let block = &solved.block;
         let response = block.response.map(|row| row.map(f64::from));
@@ -78,7 +78,7 @@ impl<'a> Block<'a> {
             }
             scale[i] = row_scale(axis == [0.0; 2], response[i][i], a.after.inv_mass + b.after.inv_mass);
         }
-        Block {
+        JointBlock {
             solved,
             law: block.law.into(),
             response,
@@ -110,7 +110,9 @@ impl<'a> Block<'a> {
         }
         let line = LawLine::new(law, block.size, errors, Default::default(), self.response);
         let exact = line.solution(speeds, impulses);
-        [0, 1, 2].map(|i| times * self.scale[i] * (impulses[i] - exact[i]))
+        let residual = [0, 1, 2].map(|i| times * self.scale[i] * (impulses[i] - exact[i]));
+        // One that overflowed counts as the largest that `f32` holds.
+        residual.map(|r| if r.is_finite() { r } else { f64::from(f32::MAX) })
     }
 
     /// Energy that it gave to its bodies (J). A limit acts in an instant, at the mean of the velocities before and after; a
@@ -143,7 +145,7 @@ impl JointErrors {
 
     fn add_block(&mut self, solved: &SolvedBlock, bodies: &[BodyStep], dt: f64, substeps: f64) {
         let ends = solved.block.bodies.map(|body| &bodies[body as usize]);
-        let block = Block::new(solved, ends);
+        let block = JointBlock::new(solved, ends);
         let weights = ends.map(|body| (body.before.inv_mass > 0.0, body.before.force.length()));
         let lighter =
             weights.into_iter().filter(|w| w.0 && w.1 > 0.0).map(|w| w.1).fold(f64::INFINITY, f64::min);

@@ -55,7 +55,7 @@ pub fn contact_residuals(
     velocities: &[Velocity],
     impulses: &[DPair],
 ) -> Vec<ContactResidual> {
-    let measure = Measure::new(problem, target);
+    let measure = LawMeasure::new(problem, target);
     (0..problem.contacts.len()).map(|i| measure.contact(i, velocities, impulses)).collect()
 }
 
@@ -73,17 +73,17 @@ pub fn joint_residuals(
 }
 
 /// A problem under a law, with everything that does not change with impulses.
-pub(super) struct Measure<'a> {
+pub(super) struct LawMeasure<'a> {
     problem: &'a ContactProblem,
     diagonal: Vec<DPair>,
     rows: Vec<OwnRow>,
     lines: Vec<BlockLine>,
 }
 
-impl<'a> Measure<'a> {
+impl<'a> LawMeasure<'a> {
     pub fn new(problem: &'a ContactProblem, target: Target) -> Self {
         let rows = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-        Measure { problem, diagonal: problem.delassus_diagonal(), rows, lines: problem.lines(target) }
+        LawMeasure { problem, diagonal: problem.delassus_diagonal(), rows, lines: problem.lines(target) }
     }
 
     fn contact(&self, i: usize, velocities: &[Velocity], impulses: &[DPair]) -> ContactResidual {
@@ -157,7 +157,7 @@ pub fn natural_map(
     velocities: &[Velocity],
     impulses: &[DPair],
 ) -> f64 {
-    Measure::new(problem, target).natural_map(velocities, impulses)
+    LawMeasure::new(problem, target).natural_map(velocities, impulses)
 }
 
 /// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): velocities that do not follow from the impulses.

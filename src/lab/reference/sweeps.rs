@@ -18,7 +18,7 @@
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{Measure, OwnRow, Target, clamp};
+use super::residual::{LawMeasure, OwnRow, Target, clamp};
 use super::rows::positive;
 
 /// When an iteration ends.
@@ -158,7 +158,7 @@ pub(super) fn iterate(
     stop: Stop,
     mut step: impl FnMut(&mut Vec<DPair>, &mut Vec<Velocity>),
 ) -> IterativeRun {
-    let (unit, measure) = (problem.impulse_unit(), Measure::new(problem, target));
+    let (unit, measure) = (problem.impulse_unit(), LawMeasure::new(problem, target));
     let mut impulses = start.to_vec();
     let mut history = Vec::new();
     loop {

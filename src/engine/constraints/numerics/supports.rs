@@ -71,10 +71,10 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
         }
         let solution = matrix.inverse() * all;
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
-            let normal = column(support, support.normal).dot(solution).clamp(0.0, greatest);
+            let normal = column(support, support.normal).dot(solution).max(0.0).min(greatest);
             let tangent = support.load[0] / most * column(support, support.tangent()).dot(solution);
             let bound = support.friction * normal;
-            support.load = [normal, if is_last { tangent.clamp(-bound, bound) } else { 0.0 }];
+            support.load = [normal, if is_last { tangent.max(-bound).min(bound) } else { 0.0 }];
         }
     }
 }

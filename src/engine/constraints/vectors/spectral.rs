@@ -210,7 +210,7 @@ impl SpectralDescent {
             if along(s) <= highest + DECREASE * s * slope {
                 break;
             }
-            s = (-slope / curve).clamp(SHORTER[0] * s, SHORTER[1] * s);
+            s = (-slope / curve).max(SHORTER[0] * s).min(SHORTER[1] * s);
         }
         if s < 1.0 {
             let part = s as f32;

@@ -35,7 +35,7 @@
 //! # A bound for each island
 //!
 //! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
-//! island has at most 8 waves, of which the last 2 only stop, and a number of visits that grows with its points ([`VISITS`]). The
+//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
 //! solver stops what still approaches then, and bodies of such an island are not moved: they might end up in a body that was not visited.
 //! So the time of a step has a bound: `simpulse torture --pace 3` measures how many times the median it is.
 
@@ -66,10 +66,13 @@ const AHEAD: f32 = 1.1;
 const BOUNCES: f32 = 0.1;
 
 /// Greatest number of waves of an island, and how many of the last ones only stop.
-const WAVES: [u32; 2] = [8, 2];
+const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: a constant, and more for each of its points.
-const VISITS: [usize; 2] = [64, 2];
+/// Greatest number of visits of an island: a constant, more for each of its first [`FEW`] points, and for each further point.
+const VISITS: [usize; 3] = [256, 8, 2];
+
+/// Impacts of so many points are followed to their end (1); those of more are finished by the sweeps of the step.
+const FEW: usize = 64;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -298,7 +301,9 @@ impl Spread {
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
-            is_done = self.visits <= VISITS[0] + VISITS[1] * (self.points.len() - self.first);
+            let points = self.points.len() - self.first;
+            let crowd = points.saturating_sub(FEW);
+            is_done = self.visits <= VISITS[0] + VISITS[1] * (points - crowd) + VISITS[2] * crowd;
         }
         is_done
     }

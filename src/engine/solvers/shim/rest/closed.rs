@@ -109,8 +109,7 @@ fn close<L: Lanes>(
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // What is left of impulses is what statics does not know.
             let borne = if p == 0 { borne_0 } else { borne_1 };
-            let opened = (borne + L::splat(0.5)).select_positive(zero, one);
-            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], opened);
+            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], one);
             let lacks =
                 (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
             is_short = is_short.max(lacks);
