@@ -103,6 +103,8 @@ pub struct CurvePoint {
 pub struct Reached {
     /// Index into [`ReplayCurve::points`] of the first point within each of [`TOLERANCES`].
     pub first: [Option<usize>; TOLERANCES.len()],
+    /// The iterations of those points.
+    pub iterations: [Option<u32>; TOLERANCES.len()],
     /// Smallest residual after at least one iteration (1): the start is no work of the solver. Infinite where there
     /// is none.
     pub smallest: f64,
@@ -411,5 +413,6 @@ fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f6
         points.iter().filter_map(|p| Some([f64::from(p.iterations), law(p)?])).collect();
     let smallest = residuals.iter().filter(|p| p[0] > 0.0).map(|p| p[1]).fold(f64::INFINITY, f64::min);
     let usable = residuals.iter().position(|p| p[1] <= ABOVE_FLOOR * floor).unwrap_or(residuals.len());
-    Reached { first, smallest, rate: rates::rate_at(&residuals[..usable]) }
+    let iterations = first.map(|at| at.map(|at| points[at].iterations));
+    Reached { first, iterations, smallest, rate: rates::rate_at(&residuals[..usable]) }
 }
