@@ -1,7 +1,7 @@
 //! Every mechanism of a solver is needed: what its row says fails without it.
 
 use simpulse::engine::params::Without;
-use simpulse::engine::solvers::{DEFAULT, VARIANTS, find};
+use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::Settings;
 use simpulse::lab::torture::{TortureVerdict, family, run_solver};
 use simpulse::lab::verify::{self, Lab};
@@ -54,29 +54,4 @@ fn every_mechanism_has_a_case_that_fails_without_it() {
             }
         }
     }
-}
-
-/// Of 12 000 scenes with pistons and stirrers more are given energy without `depth`: one in 120, instead of one in 180.
-/// That is too rare for the sixty scenes that the test above draws.
-#[test]
-#[ignore = "minutes: 24 000 scenes"]
-fn pistons_give_more_energy_without_depth() {
-    let shim = find(DEFAULT).unwrap();
-    let depth = shim.mechanism("depth").unwrap();
-    let failing = |without| {
-        let settings = Settings { without, ..Settings::new(shim) };
-        let fails = |seed, n| {
-            let case = family("driven").unwrap().case(seed, n);
-            run_solver(&case, &settings).unwrap().has(TortureVerdict::Energy)
-        };
-        let of_seed = |seed| (0..4000).filter(|&n| fails(seed, n)).count() as f64;
-        std::thread::scope(|scope| {
-            let seeds = [1, 2, 3].map(|seed| scope.spawn(move || of_seed(seed)));
-            seeds.map(|seed| seed.join().unwrap()).iter().sum::<f64>()
-        })
-    };
-    let with = failing(Without::default());
-    let without = failing(Without::default().and(depth));
-    println!("{with} scenes are given energy, {without} without `depth`");
-    assert!(without >= MORE * with, "{with} scenes are given energy, {without} without `depth`");
 }

@@ -218,18 +218,12 @@ impl ConvexBlock {
 
     /// J_rowᵀ G J_column of two sides.
     fn curvature(&self, [row, column]: [usize; 2]) -> Block3 {
-        let (mut half, mut whole) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
-        for r in 0..self.size {
-            for c in 0..3 {
-                half[r][c] = (0..self.size).map(|k| self.stiffness[r][k] * self.jacobian[column][k][c]).sum();
-            }
-        }
-        for r in 0..3 {
-            for c in 0..3 {
-                whole[r][c] = (0..self.size).map(|k| self.jacobian[row][k][r] * half[k][c]).sum();
-            }
-        }
-        whole
+        let of = |entry: &dyn Fn(usize, usize, usize) -> f64| -> Block3 {
+            let sum = |r, c| (0..self.size).map(|k| entry(r, c, k)).sum();
+            [0, 1, 2].map(|r| [0, 1, 2].map(|c| sum(r, c)))
+        };
+        let half = of(&|r, c, k| self.stiffness[r][k] * self.jacobian[column][k][c]);
+        of(&|r, c, k| self.jacobian[row][k][r] * half[k][c])
     }
 
     /// The pairs of sides whose blocks of H it is in, each block once.

@@ -7,8 +7,7 @@
 //! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between. If its springs
 //! are also shortened for nearly all of its load, they follow it at once from then on ([`super::shorten`]).
 //!
-//! What is left of impulses, after the part that springs are shortened for, is what statics does not know. A point that was open has no such
-//! part: it keeps all of its impulse, or a body that rocks loses its support in each step in which a corner closes.
+//! What is left of impulses, after the part that springs are shortened for, is what statics does not know.
 
 use super::OPEN;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};

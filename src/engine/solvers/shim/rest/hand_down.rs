@@ -197,10 +197,8 @@ fn leans<'c>(graph: &Graph, body: u32, contact: impl Fn(u32) -> &'c Contact) -> 
         if of_other == level {
             return true;
         }
-        if of_other < level {
-            if below.get_or_insert(normal).dot(normal) < ALIKE {
-                return true;
-            }
+        if of_other < level && below.get_or_insert(normal).dot(normal) < ALIKE {
+            return true;
         }
     }
     false

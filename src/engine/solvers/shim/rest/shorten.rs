@@ -24,19 +24,6 @@
 //! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
 //! swells and settles without an end. So a contact of one point keeps the load that it was shortened for while that is at least half of what it
 //! bears, and no more than that and a tenth.
-//!
-//! # How deep springs see it
-//!
-//! Springs carry their load at any depth ([`crate::engine::constraints::kernels::velocity::rules::Bearing`]). Overlap
-//! that no load has made is pushed out at the push speed alone: at the beginning of a step springs see a contact no
-//! deeper than
-//!
-//! ```text
-//! u/(γ_m β) + 20 sag
-//! ```
-//!
-//! the depth at which they reach the push speed u, plus a depth that grows with their load. So a body thrown into
-//! another is not thrown back.
 
 use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -58,8 +45,6 @@ pub(in super::super) struct Shorten {
     pub rises: bool,
     /// Contacts of one point keep what they were shortened by.
     pub holds: bool,
-    /// Springs see no deeper than they bear.
-    pub caps: bool,
 }
 
 /// Least and most that a contact of one point keeps of its load (1).
@@ -70,9 +55,6 @@ const MOST: f32 = 1.1;
 
 /// τ: time in which loads rise on what is calm (s).
 const RISE: f32 = 3.0;
-
-/// Depth that springs see beyond that of the push speed, per sag (1).
-const EARNED: f32 = 20.0;
 
 /// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
@@ -96,7 +78,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt, rises, holds, caps }: &Shorten,
+    &Shorten { springs, h, dt, rises, holds }: &Shorten,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,
@@ -104,9 +86,6 @@ fn shorten<L: Lanes>(
     };
     // Sag per load and effective mass (s²).
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
-    let per_impulse = L::splat(impulse_scale / (mass_scale * bias_rate));
-    // Depth at which springs reach the push speed (m).
-    let deepest = L::splat(if caps { springs.push_speed / (mass_scale * bias_rate) } else { f32::MAX });
     let grows = L::splat(dt / (RISE + dt));
     let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
@@ -148,11 +127,9 @@ fn shorten<L: Lanes>(
             let at = layout.at(p, layout.normal_impulse);
             // What rises is in the impulse already: the spring gave way for it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
-            let impulse = known.mul_add(h_lanes, record[at]).max(zero);
-            record[at] = impulse;
-            let depth = L::splat(EARNED).mul_add(per_impulse * impulse / mass, deepest);
+            record[at] = known.mul_add(h_lanes, record[at]).max(zero);
             let at = layout.at(p, layout.separation);
-            record[at] = record[at].max(-depth) - sag;
+            record[at] = record[at] - sag;
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
                 let part = load.select_positive(borne[p] / load, zero);
