@@ -23,7 +23,7 @@ pub struct AgreementEntry {
     pub against: Against,
     /// Best settings of its source, as the source has them.
     pub best: &'static str,
-    /// What departs from the source and can be taken back in `f64`, by its place ([`Run::undo`]).
+    /// What departs from the source and can be taken back in `f64`, by its place.
     pub departs: &'static [&'static str],
     /// Largest distance that a test allows (1), and the reason where it is not [`ROUNDING`].
     pub bound: f64,

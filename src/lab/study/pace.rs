@@ -1,7 +1,7 @@
 //! How evenly a run is paced: its steps over the median of steps with as many contacts.
 //!
 //! A run is the same every time, so the time of a step is the least of several repeats, and what else the machine does
-//! is left out. More contacts take longer, so a step is compared with the [`NEAREST`] steps of the run that have most
+//! is left out. More contacts take longer, so a step is compared with the 31 steps of the run that have most
 //! nearly as many.
 
 use super::sample::median;
