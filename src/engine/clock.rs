@@ -224,6 +224,16 @@ pub fn waited() -> Option<Duration> {
     parse_wait(&std::fs::read_to_string("/proc/thread-self/schedstat").ok()?)
 }
 
+/// What `act` returns and how long it took, without the pauses in which this thread waited for a processor.
+#[doc(hidden)]
+pub fn timed<T>(act: impl FnOnce() -> T) -> (T, Duration) {
+    let (before, start) = (waited(), Instant::now());
+    let result = act();
+    let elapsed = start.elapsed();
+    let pause = before.and_then(|before| Some(waited()?.saturating_sub(before)));
+    (result, elapsed.saturating_sub(pause.unwrap_or_default()))
+}
+
 /// Time on a processor, time waiting, times scheduled: nanoseconds, nanoseconds, a count.
 fn parse_wait(text: &str) -> Option<Duration> {
     text.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)

@@ -293,8 +293,6 @@ fn steps_are_timed_in_one_place() {
         "lab/profile/ceilings.rs",
         "lab/profile/growth.rs",
         "lab/profile/mod.rs",
-        // Each step of a random scene, in the processor time of its thread.
-        "lab/study/pace.rs",
         // Iterations of a frozen problem.
         "lab/converge/replay.rs",
         // A solver against itself without a mechanism, step by step in turns.
@@ -302,7 +300,6 @@ fn steps_are_timed_in_one_place() {
         // How long a command has taken.
         "cli/times.rs",
         "lab/advise/search.rs",
-        "lab/torture/mod.rs",
     ];
     assert_eq!(clocks, known.map(String::from).into_iter().collect());
     for user in [

@@ -2,7 +2,7 @@
 
 use super::{Agreement, AgreementCurve};
 use crate::lab::error::Error;
-use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, write};
+use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, with_dark, write};
 use crate::lab::report::style::solver_color;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -14,7 +14,7 @@ const TOP: i32 = 40;
 pub fn svg(all: &[Agreement]) -> Result<String, Error> {
     let mut text = String::new();
     draw(all, &mut text).map_err(|e| Error::invalid("agree.svg", e.to_string()))?;
-    Ok(text)
+    Ok(with_dark(&text))
 }
 
 fn draw(all: &[Agreement], text: &mut String) -> Drawn {
@@ -45,7 +45,7 @@ fn panel(area: &Area, (x, y): (i32, i32), agreement: &Agreement, curve: &Agreeme
     let counts = LogScale::of(curve.counts.iter().map(|&k| f64::from(k)), 5);
     let residuals = LogScale::of(values(), 4);
     let plain = |v: f64| format!("{v}");
-    edges.grid(area, [&counts, &residuals], 10, [&plain, &|v| format!("{v:.0e}")])?;
+    edges.grid(area, [&counts, &residuals], 10, [&plain, &|v| format!("{v:.1e}")])?;
     let (name, _) = curve.problem.split_once(", shaken").unwrap_or((&curve.problem, ""));
     write(area, &format!("{}: {name}", agreement.solver), (x + 52, y + 8), 11, HPos::Left)?;
     write(area, agreement.unit, ((edges.left + edges.right) / 2, edges.bottom + 24), 11, HPos::Center)?;

@@ -5,10 +5,9 @@
 //! nearly as many.
 
 use super::sample::median;
-use crate::engine::clock::waited;
+use crate::engine::clock::timed;
 use crate::engine::world::World;
 use crate::lab::error::Error;
-use std::time::{Duration, Instant};
 
 /// Steps that a step is compared with.
 const NEAREST: usize = 31;
@@ -39,11 +38,8 @@ impl Pace {
         for _ in 0..repeats.max(1) {
             let mut world = build()?;
             for step in 0..steps as usize {
-                let (before, start) = (waited(), Instant::now());
-                let failed = world.step().is_err();
-                let elapsed = start.elapsed();
-                let pause = before.and_then(|before| Some(waited()?.saturating_sub(before)));
-                let ns = elapsed.saturating_sub(pause.unwrap_or(Duration::ZERO)).as_nanos() as f64;
+                let (stepped, took) = timed(|| world.step());
+                let ns = took.as_nanos() as f64;
                 match times.get_mut(step) {
                     None => {
                         times.push(ns);
@@ -51,7 +47,7 @@ impl Pace {
                     }
                     Some(least) => *least = ns.min(*least),
                 }
-                if failed {
+                if stepped.is_err() {
                     break;
                 }
             }

@@ -13,7 +13,7 @@
 //! | sunk | at the end, two bodies past the middle of the thinner one |
 //! | restless | still in motion after seconds without a drive |
 //!
-//! A step that takes longer than the time that it simulates counts as late. That depends on the machine, so it is
+//! A step that takes longer than the time that it simulates, without waiting for a processor, counts as late. That depends on the machine, so it is
 //! reported but is not a failure.
 
 pub mod families;
@@ -25,6 +25,7 @@ pub mod shapes;
 #[doc(hidden)]
 pub mod table;
 
+use crate::engine::clock::timed;
 use crate::engine::solvers::Variant;
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
@@ -32,7 +33,6 @@ use crate::lab::scenes::Scene;
 use crate::lab::study::pace::Pace;
 use families::{FAMILIES, Family};
 use judge::Judge;
-use std::time::Instant;
 
 /// A scene with its conditions.
 #[derive(Clone, Debug, PartialEq)]
@@ -203,9 +203,8 @@ pub fn run(case: &TortureCase, engine: &mut dyn Engine) -> Result<CaseOutcome, E
     let mut judge = Judge::new(case)?;
     let (budget, mut slowest, mut late) = (1e3 * case.scene.dt, 0.0_f64, 0);
     for _ in 0..case.scene.steps {
-        let start = Instant::now();
-        let stepped = engine.step();
-        let ms = 1e3 * start.elapsed().as_secs_f64();
+        let (stepped, took) = timed(|| engine.step());
+        let ms = 1e3 * took.as_secs_f64();
         slowest = slowest.max(ms);
         late += u32::from(ms > budget);
         if !judge.observe(engine, stepped.is_ok()) {
