@@ -295,8 +295,6 @@ fn steps_are_timed_in_one_place() {
         "lab/profile/mod.rs",
         // Iterations of a frozen problem.
         "lab/converge/replay.rs",
-        // A solver against itself without a mechanism, step by step in turns.
-        "lab/ablate.rs",
         // How long a command has taken.
         "cli/times.rs",
         "lab/advise/search.rs",
