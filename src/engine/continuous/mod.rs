@@ -11,18 +11,21 @@
 //! center does not move, may pass through a thin wall. In addition, the center of a slow body never enters a static
 //! shape, whatever presses it.
 //!
-//! **Cost.** One comparison per body; for a fast body, a test of its bounds against those of all fixed shapes, and a
-//! few distance computations for those that it may hit. Scalar code, so the bits are the same at every width.
+//! Bodies that joints hold together take the same part of their step: one that stopped alone would tear its joints.
+//!
+//! **Cost.** One comparison per body; for a fast body, a search of the broad phase, a test of its bounds against those of all
+//! kinematic shapes, and a few distance computations for those that it may hit. Scalar code, so the bits are the same at
+//! every width.
 //!
 //! **Source.** Conservative advancement: `mirtich1996`.
 
 mod advance;
 mod press;
 
-use crate::engine::bodies::Bodies;
+use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::broadphase::Proxy;
 use crate::engine::contacts::Contact;
-use crate::engine::lanes::BodyRow;
+use crate::engine::lanes::{BodyRow, held};
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
 use glam::Vec2;
@@ -37,10 +40,14 @@ pub struct Continuous {
     safe_squared: Vec<f32>,
     /// First shape of each body, and one more.
     first_shape: Vec<u32>,
-    /// Shapes of bodies that nothing moves.
-    fixed: Vec<u32>,
+    /// Shapes of kinematic bodies.
+    kinematic: Vec<u32>,
     /// Bodies that move farther than is safe in this step, and the part of the step that they take.
     fast: Vec<(u32, f32)>,
+    /// First body of the bodies that joints hold together with one. `[bodies]`
+    first: Vec<u32>,
+    /// Parts of the step, by first body. `[bodies]`
+    parts: Vec<f32>,
 }
 
 /// Moving bodies, in the form that [`Continuous::shorten`] needs.
@@ -57,31 +64,35 @@ pub struct Moving<'w> {
     pub contacts: &'w [Contact],
     /// Whether two bodies do not collide.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
+    /// Finds the proxies whose bounds meet a box.
+    pub near: &'w dyn Fn(Aabb, &mut dyn FnMut(u32)),
+    /// Calls with the bodies of every joint with rigid rows.
+    pub joined: &'w dyn Fn(&mut dyn FnMut([u32; 2])),
 }
 
 impl Continuous {
-    /// Takes in all bodies of a world, each by whether it is dynamic and the shapes that it has, none if it was removed. `shapes`:
-    /// those of all bodies, in their order.
-    pub fn build(&mut self, bodies: impl Iterator<Item = (bool, Range<u32>)>, shapes: &[Shape]) {
+    /// Takes in all bodies of a world, each by its kind and the shapes that it has, none if it was removed. `shapes`: those of
+    /// all bodies, in their order.
+    pub fn build(&mut self, bodies: impl Iterator<Item = (BodyKind, Range<u32>)>, shapes: &[Shape]) {
         self.safe_squared.clear();
         self.first_shape.clear();
-        self.fixed.clear();
+        self.kinematic.clear();
         self.first_shape.push(0);
-        for (is_dynamic, own) in bodies {
+        for (kind, own) in bodies {
             let half = shapes[own.start as usize..own.end as usize].iter().map(Shape::min_half_extent);
             let half = half.fold(f32::INFINITY, f32::min);
-            self.safe_squared.push(if is_dynamic { half * half } else { f32::INFINITY });
+            self.safe_squared.push(if kind == BodyKind::Dynamic { half * half } else { f32::INFINITY });
             self.first_shape.push(own.end);
-            if !is_dynamic {
-                self.fixed.extend(own);
+            if kind == BodyKind::Kinematic {
+                self.kinematic.extend(own);
             }
         }
     }
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        4 * (self.safe_squared.capacity() + self.first_shape.capacity() + self.fixed.capacity())
-            + 8 * self.fast.capacity()
+        let Continuous { safe_squared, first_shape, kinematic, fast, first, parts } = self;
+        held(safe_squared) + held(first_shape) + held(kinematic) + held(fast) + held(first) + held(parts)
     }
 
     /// Shortens the motions of fast bodies to where they meet what they would pass; returns how many are fast.
@@ -102,26 +113,61 @@ impl Continuous {
                 self.meet_dynamic(moving, rows, k);
             }
         }
-        for &(body, part) in &self.fast {
-            let delta = &mut rows[body as usize].delta;
-            [delta[0], delta[1], delta[2]] = [part * delta[0], part * delta[1], part * delta[2]];
+        if self.fast.iter().any(|&(_, part)| part < 1.0) {
+            self.stop_together(moving, rows);
         }
         self.fast.len()
     }
 
-    /// The part of the step after which `body` meets something fixed; 1 if it does not.
+    /// Shortens the motion of each fast body, and of what joints hold together with it.
+    fn stop_together(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) {
+        let Continuous { fast, first, parts, .. } = self;
+        let count = moving.bodies.len();
+        first.clear();
+        first.extend(0..count as u32);
+        (moving.joined)(&mut |ends| {
+            if ends.iter().all(|&body| moving.bodies.is_dynamic(body as usize)) {
+                let [a, b] = ends.map(|body| first_of(first, body));
+                first[a.max(b) as usize] = a.min(b);
+            }
+        });
+        parts.clear();
+        parts.resize(count, 1.0);
+        for &(body, part) in &*fast {
+            let least = &mut parts[first_of(first, body) as usize];
+            *least = least.min(part);
+        }
+        for (body, row) in rows[..count].iter_mut().enumerate() {
+            let part = parts[first_of(first, body as u32) as usize];
+            if part < 1.0 {
+                row.delta[..3].iter_mut().for_each(|way| *way *= part);
+            }
+        }
+    }
+
+    /// The part of the step after which `body` meets something that no impulse moves; 1 if it does not.
     fn part(&self, moving: Moving<'_>, rows: &[BodyRow], body: usize) -> f32 {
         let own = self.first_shape[body]..self.first_shape[body + 1];
         let mut part = 1.0_f32;
         for shape in own {
             let swept = swept(moving, rows, shape as usize);
-            for &other in &self.fixed {
+            let mine = &moving.proxies[shape as usize];
+            let mut meet = |other: u32, proxy: &Proxy| {
+                if proxy.may_meet(mine) && !(moving.apart)([proxy.body, body as u32]) {
+                    part = part.min(pair(moving, rows, [other, shape], part));
+                }
+            };
+            (moving.near)(swept, &mut |other| {
+                let proxy = &moving.proxies[other as usize];
+                if moving.bodies.kind[proxy.body as usize] == BodyKind::Static {
+                    meet(other, proxy);
+                }
+            });
+            for &other in &self.kinematic {
                 let proxy = &moving.proxies[other as usize];
                 let [x, y, ..] = rows[proxy.body as usize].delta;
-                let near = overlap(&proxy.aabb.grown(x.abs().max(y.abs())), &swept);
-                let may_meet = proxy.may_meet(&moving.proxies[shape as usize]);
-                if near && may_meet && !(moving.apart)([proxy.body, body as u32]) {
-                    part = part.min(pair(moving, rows, [other, shape], part));
+                if overlap(&proxy.aabb.grown(x.abs().max(y.abs())), &swept) {
+                    meet(other, proxy);
                 }
             }
         }
@@ -149,6 +195,16 @@ impl Continuous {
             }
         }
     }
+}
+
+/// The first of the bodies that are held together with one; links on the way become shorter.
+fn first_of(first: &mut [u32], body: u32) -> u32 {
+    let mut at = body as usize;
+    while first[at] as usize != at {
+        first[at] = first[first[at] as usize];
+        at = first[at] as usize;
+    }
+    at as u32
 }
 
 /// When in the step shape b meets shape a, before `limit`.

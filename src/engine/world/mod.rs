@@ -5,7 +5,7 @@
 //! ```
 
 use crate::engine::bodies::Bodies;
-use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy};
+use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
 use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
 use crate::engine::constraints::kernels::motion::{self, MotionInput};
 use crate::engine::constraints::kernels::observe::ObservedRule;
@@ -210,17 +210,30 @@ impl World {
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
-            let World { bodies, shapes, proxies, contacts, slots, joints, .. } = self;
+            let World { bodies, shapes, proxies, contacts, slots, joints, broadphase, work, .. } = self;
             if std::mem::take(&mut self.continuous_is_stale) {
-                let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes).enumerate();
-                let each = lives.map(|(i, ((&lives, &first), &count))| {
-                    (lives && bodies.is_dynamic(i), first..first + if lives { count } else { 0 })
+                let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes);
+                let each = lives.zip(&bodies.kind).map(|(((&lives, &first), &count), &kind)| {
+                    (kind, first..first + if lives { count } else { 0 })
                 });
                 self.continuous.build(each, shapes);
             }
-            let apart = &|pair| joints.keeps_apart(pair);
-            let moving = Moving { bodies, shapes, proxies, contacts, apart };
-            self.counts.fast = self.continuous.shorten(moving, &mut self.work.rows);
+            let Workspace { types, rows, .. } = work;
+            let moving = Moving {
+                bodies,
+                shapes,
+                proxies,
+                contacts,
+                apart: &|pair| joints.keeps_apart(pair),
+                near: &|area, visit| {
+                    broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));
+                },
+                joined: &|visit| {
+                    let rigid = types.iter().filter(|joined| joined.kind.is_rigid());
+                    rigid.for_each(|joined| joined.kind.ends().iter().for_each(|&ends| visit(ends)));
+                },
+            };
+            self.counts.fast = self.continuous.shorten(moving, rows);
         }
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
     }
