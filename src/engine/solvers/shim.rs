@@ -187,6 +187,10 @@ struct Shim {
     hand_down: HandDown,
     jams: Jams,
     trees: Trees,
+    /// Whether a body has a joint; empty without joints. `[bodies]`
+    joined: Vec<bool>,
+    /// The same of the last step.
+    last_joined: Vec<bool>,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Of the last step (m/s²).
@@ -215,9 +219,10 @@ impl Solver for Shim {
             self.jams.clear();
         }
         self.place(scene);
-        if scene.contacts_changed || scene.gravity != self.gravity {
+        let joints_changed = self.find_joined(scene);
+        if scene.contacts_changed || joints_changed || scene.gravity != self.gravity {
             self.gravity = scene.gravity;
-            self.hand_down.build(scene.bodies, scene.contacts, scene.gravity);
+            self.hand_down.build(scene.bodies, &self.joined, scene.contacts, scene.gravity);
         }
     }
 
@@ -274,11 +279,26 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        self.hand_down.held_bytes() + self.trees.held_bytes() + self.jams.held_bytes() + held(&self.fields)
+        let parts = [self.hand_down.held_bytes(), self.trees.held_bytes(), self.jams.held_bytes()];
+        parts.iter().sum::<usize>() + held(&self.fields) + held(&self.joined) + held(&self.last_joined)
     }
 }
 
 impl Shim {
+    /// Finds which bodies have joints; whether others had in the last step.
+    fn find_joined(&mut self, scene: &CollisionScene<'_>) -> bool {
+        if scene.types.is_empty() && self.joined.is_empty() {
+            return false;
+        }
+        std::mem::swap(&mut self.joined, &mut self.last_joined);
+        self.joined.clear();
+        self.joined.resize(if scene.types.is_empty() { 0 } else { scene.bodies.len() }, false);
+        for &body in scene.types.iter().flat_map(|joined| joined.kind.ends()).flatten() {
+            self.joined[body as usize] = true;
+        }
+        self.joined != self.last_joined
+    }
+
     /// Contacts found in the first step of one of their bodies bear all of their load at once.
     fn place(&self, scene: &mut CollisionScene<'_>) {
         if self.stepped >= scene.bodies.len() {

@@ -147,6 +147,7 @@ impl World {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
             kept: &mut self.work.kept,
+            types: &self.work.types,
             candidates: Candidates { all: candidates, of_kind, poses },
             contacts_changed: *is_changed,
             step_index: self.step_index,

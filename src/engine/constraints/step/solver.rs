@@ -2,6 +2,7 @@
 
 use super::Passes;
 use crate::engine::bodies::Bodies;
+use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::constraints::records::kept::Kept;
 use crate::engine::contacts::Contact;
@@ -53,6 +54,8 @@ pub struct CollisionScene<'a> {
     pub contacts: &'a mut [Contact],
     /// Numbers that the solver keeps per contact, contact point and body, in the order of `contacts`.
     pub kept: &'a mut Kept,
+    /// Constraints of other types than contacts.
+    pub types: &'a [Joined],
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
     /// Contacts have come or gone since contacts got their lanes; known after the collision.

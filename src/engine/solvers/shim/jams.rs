@@ -85,6 +85,10 @@ impl Jams {
                 let n = contacts[i as usize].manifold.normal;
                 if is_own { n } else { -n }
             };
+            let [first, second] = group[0].0;
+            if first != second && bodies.is_dynamic(first as usize) && bodies.is_dynamic(second as usize) {
+                continue;
+            }
             let mut is_jam = false;
             for &(_, i, is_own) in group {
                 let n = normal(contacts, i, is_own);

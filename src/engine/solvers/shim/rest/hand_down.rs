@@ -56,10 +56,12 @@ pub(in super::super) struct HandDownInput<'a> {
 }
 
 impl HandDown {
-    /// Builds the graphs when contacts have appeared or disappeared.
-    pub fn build(&mut self, bodies: &Bodies, contacts: &[Contact], gravity: Vec2) {
+    /// Builds the graphs when contacts have appeared or disappeared. `joined`: see [`Shim::joined`](super::super::Shim).
+    pub fn build(&mut self, bodies: &Bodies, joined: &[bool], contacts: &[Contact], gravity: Vec2) {
         let up = (-gravity).try_normalize().unwrap_or(Vec2::Y);
-        let is_dynamic = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic;
+        let is_dynamic = |body: u32| {
+            bodies.kind[body as usize] == BodyKind::Dynamic && joined.get(body as usize) != Some(&true)
+        };
         let ends = |c: &u32| [contacts[*c as usize].body_a, contacts[*c as usize].body_b];
         let bears = |c: &u32| contacts[*c as usize].manifold.normal.dot(up).abs() >= BEARING;
         self.bearing.clear();

@@ -26,6 +26,9 @@
 //! impulses of the springs that they shorten. So there is no feedback loop that must be tuned, delays loads or rocks
 //! a column.
 //!
+//! Joints bear what statics does not know. A body with a joint is, to statics, one that does not move: it bears what stands on it,
+//! and its own contacts with others of its kind have no load, so their springs sag.
+//!
 //! # New bodies
 //!
 //! Sweeps from zero need as many steps as a pile is high. New contacts start from the loads that a pass down the
@@ -71,6 +74,9 @@ impl Shim {
             velocity: [gained[0], gained[1], gained[2], row.velocity[3]],
             delta: [0.0, 0.0, 0.0, row.delta[3]],
         }));
+        for (field, _) in fields.iter_mut().zip(&self.joined).filter(|(_, joined)| **joined) {
+            *field = BodyRow::default();
+        }
         passes.over_contacts(&mut closed::Close { fields, h, dt });
         if load_sweeps > 0 {
             let StepParts { work, contacts, .. } = passes.parts();
