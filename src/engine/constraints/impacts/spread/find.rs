@@ -4,7 +4,9 @@
 //! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|), and than a hundredth of dt |a_b|, and
 //! leave faster than a tenth of that. A
 //! point that only stops has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
-//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen.
+//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen. And it has to close
+//! a gap: what overlaps by more than the slop and the way of one step was in contact before. Springs push it apart; where others
+//! hold it, as joints hold a limb that is caught in another, stopping it anew in each step would shake it.
 
 use super::{AHEAD, BOUNCES};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -12,6 +14,7 @@ use crate::engine::constraints::records::batches::{Batches, Segment, SegmentReco
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::engine::params::LINEAR_SLOP;
 
 /// Finds contacts that are hit; see the [module](self).
 pub(crate) struct Find<'a> {
@@ -105,13 +108,16 @@ fn find<L: Lanes>(
         let bounces_at = (per_step * along_n).max(slow);
         let threshold = if bounces { bounces_at } else { stops_at };
         let fall = gained * L::splat((0.5 * dt + 0.5 * h) / h);
-        let mut any = zero;
+        let (mut any, mut fresh) = (zero, zero);
         for p in 0..layout.points {
             let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
             let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
             let fast = (-threshold - v).select_positive(-v, zero);
             let fast = record[layout.at(p, layout.normal_mass)].select_positive(fast, zero);
-            any = any.max((-closes).select_positive(fast, zero));
+            let fast = (-closes).select_positive(fast, zero);
+            any = any.max(fast);
+            let since = v.neg_mul_add(L::splat(dt), s) + L::splat(LINEAR_SLOP);
+            fresh = fresh.max(since.select_positive(fast, zero));
         }
         if !any.any_positive() {
             continue;
@@ -122,7 +128,7 @@ fn find<L: Lanes>(
             let speed = of(&any, lane);
             let e =
                 if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
-            let is_stopped = stops && speed > of(&stops_at, lane);
+            let is_stopped = stops && of(&fresh, lane) > of(&stops_at, lane);
             if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
                 found.push((segment.first_lane + first + lane) as u32);
             }
