@@ -268,3 +268,17 @@ fn heavy_boxes_on_pyramids_come_to_rest() {
     // Where speed is an average over a second and over mass, the target is 1e-3: this is the fastest body of one step.
     assert!(fastest < 5e-3, "{fastest} m/s");
 }
+
+/// Limbs that fall into each other at 9 m/s end up crossed, held by joints and pushed apart by contacts: an equilibrium that
+/// impacts, jams and loads of statics must leave alone.
+#[test]
+fn most_piles_of_ragdolls_come_to_rest() {
+    let moves = |humans: u32| {
+        let scene = crate::common::scene(&format!("ragdolls:{humans}"));
+        let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 800);
+        let fastest = (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max);
+        fastest > 0.01
+    };
+    let restless: Vec<u32> = (3..11).filter(|&humans| moves(humans)).collect();
+    assert!(restless.len() <= 3, "{restless:?} humans");
+}

@@ -9,7 +9,7 @@
 //!
 //! What is left of impulses, after the part that springs are shortened for, is what statics does not know.
 
-use super::OPEN;
+use super::{JOINED, OPEN};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
@@ -82,8 +82,7 @@ fn close<L: Lanes>(
         };
         let of_a = if segment.pushes_a() { gained(row_a) } else { zero };
         let still = per_step * (of_a + gained(row_b));
-        // Zero where statics moves neither body.
-        let yields = free_a[3] + free_b[3];
+        let is_free = L::splat(0.5) - free_a[JOINED].max(free_b[JOINED]);
         let [nx, ny] = [record[0], record[1]];
         let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
@@ -99,7 +98,7 @@ fn close<L: Lanes>(
             let near = closed - at(layout.separation);
             let in_the_middle = half_step.mul_add(vn, at(layout.separation).max(-closed));
             let stays = near.min(still - speed).min(closed - in_the_middle);
-            let is_closed = at(layout.normal_mass).min(yields).select_positive(stays, zero);
+            let is_closed = at(layout.normal_mass).min(is_free).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
             let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
             let normal = begun(last[2 * p], at(layout.normal_impulse));

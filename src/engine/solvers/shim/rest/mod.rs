@@ -26,8 +26,8 @@
 //! impulses of the springs that they shorten. So there is no feedback loop that must be tuned, delays loads or rocks
 //! a column.
 //!
-//! Joints bear what statics does not know. A body with a joint is, to statics, one that does not move: it bears what stands on it,
-//! and its own contacts with others of its kind have no load, so their springs sag.
+//! Joints bear what statics does not know. So contacts of bodies with joints count as open: they have no load, and their springs
+//! sag.
 //!
 //! # New bodies
 //!
@@ -58,6 +58,9 @@ pub(super) const LEAD: usize = 5;
 /// See [`PER_CONTACT`].
 pub(super) const BORNE: usize = 6;
 
+/// Place in the fields of bodies that is 1 for a body with a joint.
+const JOINED: usize = 4;
+
 /// N of a point that is open.
 const OPEN: f32 = -1.0;
 
@@ -75,7 +78,7 @@ impl Shim {
             delta: [0.0, 0.0, 0.0, row.delta[3]],
         }));
         for (field, _) in fields.iter_mut().zip(&self.joined).filter(|(_, joined)| **joined) {
-            *field = BodyRow::default();
+            field.delta[JOINED - 4] = 1.0;
         }
         passes.over_contacts(&mut closed::Close { fields, h, dt });
         if load_sweeps > 0 {
