@@ -320,6 +320,7 @@ impl Shim {
             passes.spread_impacts(Spreading {
                 timed: passes.has(part::MOMENT),
                 stops: true,
+                joined: &self.joined,
                 lead: Some(LEAD),
                 releases: passes.has(part::RELEASE),
             });

@@ -11,11 +11,12 @@ use crate::engine::constraints::records::bounces::Bounces;
 
 /// How impacts spread, see [`spread`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spreading {
+pub(crate) struct Spreading<'a> {
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
-    /// What does not bounce stops.
+    /// What does not bounce stops, but for contacts of these bodies. `[bodies]`, or empty
     pub stops: bool,
+    pub joined: &'a [bool],
     /// Which number that the solver keeps per contact is the time of its frame.
     pub lead: Option<usize>,
     /// Points that an impact releases have borne their body until then.
@@ -24,8 +25,8 @@ pub(crate) struct Spreading {
 
 impl Passes<'_> {
     /// Lets what comes in bounce or stop, before the step.
-    pub(crate) fn spread_impacts(&mut self, spreading: Spreading) {
-        let Spreading { timed, stops, lead, releases } = spreading;
+    pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
+        let Spreading { timed, stops, joined, lead, releases } = spreading;
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
         let Some([least_gain, fastest]) =
@@ -36,7 +37,7 @@ impl Passes<'_> {
         let mut spread = std::mem::take(&mut self.work.impacts.spread);
         for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
             found.clear();
-            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
+            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, joined, found });
         }
         let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
         let size = kept.size().per_contact;
@@ -74,7 +75,14 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(Spreading { timed: false, stops: false, lead: None, releases: true });
+                let joined = &[];
+                self.spread_impacts(Spreading {
+                    timed: false,
+                    stops: false,
+                    joined,
+                    lead: None,
+                    releases: true,
+                });
             }
         }
     }

@@ -4,9 +4,8 @@
 //! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|), and than a hundredth of dt |a_b|, and
 //! leave faster than a tenth of that. A
 //! point that only stops has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
-//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen. And it has to close
-//! a gap: what overlaps by more than the slop and the way of one step was in contact before. Springs push it apart; where others
-//! hold it, as joints hold a limb that is caught in another, stopping it anew in each step would shake it.
+//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen. Bodies with joints are
+//! not stopped: their joints, which an impact knows nothing of, would pull them on, step by step where a limb is caught in another.
 
 use super::{AHEAD, BOUNCES};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -14,7 +13,6 @@ use crate::engine::constraints::records::batches::{Batches, Segment, SegmentReco
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
-use crate::engine::params::LINEAR_SLOP;
 
 /// Finds contacts that are hit; see the [module](self).
 pub(crate) struct Find<'a> {
@@ -29,6 +27,8 @@ pub(crate) struct Find<'a> {
     /// Whether contacts may bounce, and whether points that do not bounce are stopped.
     pub bounces: bool,
     pub stops: bool,
+    /// Bodies whose contacts are not stopped; empty if there are none. `[bodies]`
+    pub joined: &'a [bool],
     /// Lanes of the contacts that are hit, in order.
     pub found: &'a mut Vec<u32>,
 }
@@ -64,7 +64,7 @@ fn find<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &mut Find { h, dt, least_gain, fastest, bounces, stops, ref mut found }: &mut Find<'_>,
+    &mut Find { h, dt, least_gain, fastest, bounces, stops, joined, ref mut found }: &mut Find<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
     let least = if between_dynamic && !bounces { 2.0 * FASTER * least_gain } else { SLOW * least_gain };
@@ -108,16 +108,13 @@ fn find<L: Lanes>(
         let bounces_at = (per_step * along_n).max(slow);
         let threshold = if bounces { bounces_at } else { stops_at };
         let fall = gained * L::splat((0.5 * dt + 0.5 * h) / h);
-        let (mut any, mut fresh) = (zero, zero);
+        let mut any = zero;
         for p in 0..layout.points {
             let (v, s) = (velocity(p), record[layout.at(p, layout.separation)]);
             let closes = (v - fall).mul_add(L::splat(AHEAD * dt), s);
             let fast = (-threshold - v).select_positive(-v, zero);
             let fast = record[layout.at(p, layout.normal_mass)].select_positive(fast, zero);
-            let fast = (-closes).select_positive(fast, zero);
-            any = any.max(fast);
-            let since = v.neg_mul_add(L::splat(dt), s) + L::splat(LINEAR_SLOP);
-            fresh = fresh.max(since.select_positive(fast, zero));
+            any = any.max((-closes).select_positive(fast, zero));
         }
         if !any.any_positive() {
             continue;
@@ -126,9 +123,11 @@ fn find<L: Lanes>(
         let of = |x: &L, lane: usize| bytemuck::cast_slice::<L, f32>(std::slice::from_ref(x))[lane];
         for lane in (0..segment.filled(batch, L::WIDTH)).filter(|&lane| of(&any, lane) > 0.0) {
             let speed = of(&any, lane);
-            let e =
-                if bounces { contacts[contact.entries()[first + lane] as usize].restitution } else { 0.0 };
-            let is_stopped = stops && of(&fresh, lane) > of(&stops_at, lane);
+            let hit = &contacts[contact.entries()[first + lane] as usize];
+            let e = if bounces { hit.restitution } else { 0.0 };
+            let is_joined = |body: u32| joined.get(body as usize) == Some(&true);
+            let is_stopped =
+                stops && speed > of(&stops_at, lane) && ![hit.body_a, hit.body_b].into_iter().any(is_joined);
             if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
                 found.push((segment.first_lane + first + lane) as u32);
             }
