@@ -193,10 +193,9 @@ fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
 /// Random scenes side by side: the first of a world moves as it does alone, to the bit, whatever the other one a kilometer
 /// away is. Scenes with steps, gravity or substeps of their own cannot share a world, and are left out.
 #[test]
-#[ignore = "known not to hold to the bit: `driven` 4 beside `drops` differs in the sixth digit after 65 steps"]
 fn a_random_scene_moves_as_it_does_alone_beside_another() {
-    const SCENES: u32 = 6;
-    const STEPS: u32 = 100;
+    const SCENES: u32 = 30;
+    const STEPS: u32 = 150;
     let settings = || common::settings(solvers::find("shim").unwrap());
     let families: Vec<_> = FAMILIES.iter().filter(|family| family.name != "extremes").collect();
     let state = |world: &World, body: usize| {

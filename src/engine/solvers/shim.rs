@@ -220,7 +220,8 @@ impl Solver for Shim {
         }
         self.place(scene);
         let joints_changed = self.find_joined(scene);
-        if scene.contacts_changed || joints_changed || scene.gravity != self.gravity {
+        let changed = scene.contacts_changed || joints_changed || scene.gravity != self.gravity;
+        if changed || self.hand_down.is_stale(scene.contacts, scene.gravity) {
             self.gravity = scene.gravity;
             self.hand_down.build(scene.bodies, &self.joined, scene.contacts, scene.gravity);
         }

@@ -19,8 +19,15 @@
 //! contacts use the frame at t = τ, which removes the lag. With one substep that is the start of the step: symplectic
 //! Euler has no lag.
 //!
-//! A contact rolls if its gap changes by less than a fifth of the slop in the step. Contacts that close, open or pass
-//! by use the frame of the start of the step. Only the record turns; the contact itself keeps that frame.
+//! A contact rolls if its gap changes by less than a fifth of the slop s in the step, and so does its speed of approach until τ,
+//! with φ below and ℓ from center to center or to the face:
+//!
+//! ```text
+//! |v_n| ≤ s/(5 dt),   φ² ℓ/τ ≤ s/(5 dt)
+//! ```
+//!
+//! Contacts that close, open or pass by use the frame of the start of the step: a chip that spins on a disc of a thousand times its
+//! size would be turned beyond its own edge. Only the record turns; the contact itself keeps that frame.
 //!
 //! # Arms
 //!
@@ -114,7 +121,11 @@ fn roll<L: Lanes>(
         // ω × c = ω (c·t, −c·n) in these directions.
         let approach = a[2].neg_mul_add(center_a[1], b[2].mul_add(center_b[1], straight[0]));
         let slide = a[2].mul_add(center_a[0], b[2].neg_mul_add(center_b[0], straight[1]));
-        let rolls = is_round.select_positive(steady - approach.max(-approach), zero);
+        let distance = to_a + to_b;
+        let between = slide / distance.select_positive(distance, one);
+        let angle = tau * face_a.select_positive(-a[2], face_b.select_positive(-b[2], between));
+        let bends = steady.mul_add(tau, -(angle * angle * distance));
+        let rolls = is_round.select_positive((steady - approach.max(-approach)).min(bends), zero);
         let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
         let lead = rolls.select_positive(tau, zero);
         let leads: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&lead));
@@ -124,9 +135,6 @@ fn roll<L: Lanes>(
         if !rolls.any_positive() {
             continue;
         }
-        let distance = to_a + to_b;
-        let between = slide / distance.select_positive(distance, one);
-        let angle = tau * face_a.select_positive(-a[2], face_b.select_positive(-b[2], between));
         let unit = |[n, t]: [L; 2], length: L| {
             let inverse = one / length.mul_add(length, one).sqrt();
             [n * inverse, t * inverse]

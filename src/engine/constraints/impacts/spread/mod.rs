@@ -435,7 +435,8 @@ impl Spread {
             for point in points.iter_mut().filter(|point| point.mass > 0.0) {
                 // Arms end at one point at the time of the frame, if nothing is hit.
                 let [a, b] = point.rows.map(|row| self.bodies[row as usize].flown);
-                let lead = on.leads.of(point.contact);
+                let is_flat = on.contacts[point.contact as usize].radii == [0.0; 2];
+                let lead = if is_flat { 0.0 } else { on.leads.of(point.contact) };
                 point.apart = std::array::from_fn(|k| lead * (b[k] - a[k]));
                 point.is_round |= lead != 0.0;
             }

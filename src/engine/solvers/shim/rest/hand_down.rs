@@ -34,9 +34,8 @@ pub(in super::super) struct HandDown {
     bearing: Vec<u32>,
     /// Of all contacts; empty if `upright` has all bodies that have some.
     all: Graph,
-    /// Bodies from the top downward, and whether they lean, on a body of their own level or on several in different
-    /// directions: only sweeps find their thrust.
-    downwards: Vec<(u32, bool)>,
+    /// Bodies from the top downward.
+    downwards: Vec<u32>,
     /// Of one body.
     supports: Vec<Support>,
 }
@@ -56,16 +55,23 @@ pub(in super::super) struct HandDownInput<'a> {
 }
 
 impl HandDown {
-    /// Builds the graphs when contacts have appeared or disappeared. `joined`: see [`Shim::joined`](super::super::Shim).
+    /// Whether the graphs are those of other contacts: normals have turned. A graph that lasted until contacts anywhere in the
+    /// world come or go would make a pile depend on another.
+    pub fn is_stale(&self, contacts: &[Contact], gravity: Vec2) -> bool {
+        let up = up(gravity);
+        let mut bearing = self.bearing.iter().peekable();
+        (0..).zip(contacts).any(|(i, contact)| bears(contact, up) != bearing.next_if_eq(&&i).is_some())
+    }
+
+    /// Builds the graphs of contacts between bodies without joints.
     pub fn build(&mut self, bodies: &Bodies, joined: &[bool], contacts: &[Contact], gravity: Vec2) {
-        let up = (-gravity).try_normalize().unwrap_or(Vec2::Y);
+        let up = up(gravity);
         let is_dynamic = |body: u32| {
             bodies.kind[body as usize] == BodyKind::Dynamic && joined.get(body as usize) != Some(&true)
         };
         let ends = |c: &u32| [contacts[*c as usize].body_a, contacts[*c as usize].body_b];
-        let bears = |c: &u32| contacts[*c as usize].manifold.normal.dot(up).abs() >= BEARING;
         self.bearing.clear();
-        self.bearing.extend((0..contacts.len() as u32).filter(bears));
+        self.bearing.extend((0..).zip(contacts).filter(|(_, contact)| bears(contact, up)).map(|(i, _)| i));
         self.upright.build(bodies.len(), self.bearing.iter().map(ends), is_dynamic);
         let hangs = |c: &Contact| {
             [c.body_a, c.body_b]
@@ -77,29 +83,29 @@ impl HandDown {
             let ends = contacts.iter().map(|c| [c.body_a, c.body_b]);
             self.all.build(bodies.len(), ends, is_dynamic);
             let hangs = |body: &&u32| self.upright.levels()[**body as usize] == UNSUPPORTED;
-            let hanging = self.all.upwards().iter().rev().filter(hangs);
-            self.downwards
-                .extend(hanging.map(|&body| (body, leans(&self.all, body, |edge| &contacts[edge as usize]))));
+            self.downwards.extend(self.all.upwards().iter().rev().filter(hangs));
         } else {
             self.all = Graph::default();
         }
-        let standing = self.upright.upwards().iter().rev();
-        let bearing = |edge: u32| &contacts[self.bearing[edge as usize] as usize];
-        self.downwards.extend(standing.map(|&body| (body, leans(&self.upright, body, bearing))));
+        self.downwards.extend(self.upright.upwards().iter().rev());
     }
 
     /// Hands down what accelerates bodies.
     pub fn run(&mut self, on: &mut HandDownInput<'_>) {
         for i in 0..self.downwards.len() {
-            let (body, leans) = self.downwards[i];
+            let body = self.downwards[i];
             let [x, y, turn, inv_mass] = on.fields[body as usize].velocity;
             let inv_inertia = on.fields[body as usize].delta[3];
             let [free_x, free_y, ..] = on.increments[body as usize];
             let turning = if inv_inertia > 0.0 { turn * turn * inv_mass / inv_inertia } else { 0.0 };
             let free = free_x.mul_add(free_x, free_y * free_y);
             let moves = x.mul_add(x, y.mul_add(y, turning));
+            if moves <= free * (STILL * STILL) {
+                continue;
+            }
             // What nothing bears accelerates as in free flight.
-            if moves <= free * if leans { 0.25 } else { STILL * STILL } {
+            let leans = self.leans(on.contacts, body);
+            if leans && moves <= 0.25 * free {
                 continue;
             }
             self.find_supports(on, body);
@@ -108,6 +114,27 @@ impl HandDown {
                 self.stand(on, body);
             }
         }
+    }
+
+    /// Whether a body leans, on a body of its own level or on several in different directions: only sweeps find its thrust.
+    fn leans(&self, contacts: &[Contact], body: u32) -> bool {
+        let hangs = self.upright.levels()[body as usize] == UNSUPPORTED;
+        let graph = if hangs { &self.all } else { &self.upright };
+        let level = graph.levels()[body as usize];
+        let mut below: Option<Vec2> = None;
+        for &edge in graph.edges_of(body as usize) {
+            let [a, b] = graph.ends(edge as usize);
+            let contact = if hangs { edge } else { self.bearing[edge as usize] };
+            let (other, n) = (if a == body { b } else { a }, contacts[contact as usize].manifold.normal);
+            let (of_other, normal) = (graph.levels()[other as usize], if b == body { n } else { -n });
+            if of_other == level {
+                return true;
+            }
+            if of_other < level && below.get_or_insert(normal).dot(normal) < ALIKE {
+                return true;
+            }
+        }
+        false
     }
 
     /// Lists the closed points of `body` with the bodies below it, and their loads.
@@ -188,20 +215,12 @@ impl HandDown {
     }
 }
 
-/// See [`HandDown::downwards`]. `contact`: that of an edge.
-fn leans<'c>(graph: &Graph, body: u32, contact: impl Fn(u32) -> &'c Contact) -> bool {
-    let level = graph.levels()[body as usize];
-    let mut below: Option<Vec2> = None;
-    for &edge in graph.edges_of(body as usize) {
-        let [a, b] = graph.ends(edge as usize);
-        let (other, n) = (if a == body { b } else { a }, contact(edge).manifold.normal);
-        let (of_other, normal) = (graph.levels()[other as usize], if b == body { n } else { -n });
-        if of_other == level {
-            return true;
-        }
-        if of_other < level && below.get_or_insert(normal).dot(normal) < ALIKE {
-            return true;
-        }
-    }
-    false
+/// Against gravity; y without it.
+fn up(gravity: Vec2) -> Vec2 {
+    (-gravity).try_normalize().unwrap_or(Vec2::Y)
+}
+
+/// Whether a contact hands loads down.
+fn bears(contact: &Contact, up: Vec2) -> bool {
+    contact.manifold.normal.dot(up).abs() >= BEARING
 }
