@@ -50,6 +50,14 @@ pub struct Continuous {
     parts: Vec<f32>,
 }
 
+/// Finds the proxies whose bounds meet a box, and calls with each.
+#[doc(hidden)]
+pub type Near<'w> = dyn Fn(Aabb, &mut dyn FnMut(u32)) + 'w;
+
+/// Calls with the bodies of every joint with rigid rows.
+#[doc(hidden)]
+pub type EachJoined<'w> = dyn Fn(&mut dyn FnMut([u32; 2])) + 'w;
+
 /// Moving bodies, in the form that [`Continuous::shorten`] needs.
 #[derive(Clone, Copy)]
 #[doc(hidden)]
@@ -64,10 +72,8 @@ pub struct Moving<'w> {
     pub contacts: &'w [Contact],
     /// Whether two bodies do not collide.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
-    /// Finds the proxies whose bounds meet a box.
-    pub near: &'w dyn Fn(Aabb, &mut dyn FnMut(u32)),
-    /// Calls with the bodies of every joint with rigid rows.
-    pub joined: &'w dyn Fn(&mut dyn FnMut([u32; 2])),
+    pub near: &'w Near<'w>,
+    pub joined: &'w EachJoined<'w>,
 }
 
 impl Continuous {

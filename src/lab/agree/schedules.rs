@@ -356,6 +356,75 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
     }
 }
 
+pub(super) fn physx(model: &mut Model, run: &Run) {
+    let substeps = run.budget.substeps;
+    let fraction = run.get("baumgarte").min(2.0 / f64::from(substeps).sqrt());
+    model.l.fill([0.0; 2]);
+    let sweep = |m: &mut Model, relaxing: bool| {
+        for range in m.manifolds.clone() {
+            for i in range.clone() {
+                let (rows, s) = (m.rows(i, false), m.place(i)[0]);
+                let s = if relaxing { s.max(0.0) } else { s };
+                let began_apart = m.problem.contacts[i].gap > 0.0;
+                let rate =
+                    if began_apart { s / m.h } else { (fraction * s / m.h).max(-run.get("push_speed")) };
+                let new = (m.l[i][0] - m.mass(&rows, 0) * (m.speed(&rows, 0) + rate)).max(0.0);
+                m.push(&rows, 0, new - m.l[i][0]);
+                m.l[i][0] = new;
+            }
+            let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
+            let share = range.len() as f64;
+            for i in range {
+                let (rows, [s, drift]) = (m.rows(i, false), m.place(i));
+                let back = if s < 8.0 * SLOP { fraction * drift / m.h } else { 0.0 };
+                let bound = m.problem.contacts[i].friction * total / share;
+                let wanted = m.l[i][1] - fraction * m.mass(&rows, 1) * (m.speed(&rows, 1) + back);
+                let new = wanted.clamp(-bound, bound);
+                m.push(&rows, 1, new - m.l[i][1]);
+                m.l[i][1] = new;
+            }
+        }
+    };
+    for substep in 0..substeps {
+        match run.undoes(0) {
+            true if substep == 0 => (0..substeps).for_each(|_| model.accelerate()),
+            true => {}
+            false => model.accelerate(),
+        }
+        (0..run.budget.velocity_iterations).for_each(|_| sweep(model, false));
+        model.advance();
+    }
+    (0..run.budget.relax_iterations).for_each(|_| sweep(model, true));
+}
+
+pub(super) fn jolt(model: &mut Model, run: &Run) {
+    let normals = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Rigid) };
+    let sweep = |m: &mut Model| {
+        for range in m.manifolds.clone() {
+            // One friction row, at the mean of the points.
+            let share = 1.0 / range.len() as f64;
+            let mut rows = m.rows(range.start, false);
+            for i in range.start + 1..range.end {
+                for ((_, mean), (_, j)) in rows.iter_mut().zip(m.rows(i, false)) {
+                    mean[1][2] += j[1][2];
+                }
+            }
+            rows.iter_mut().for_each(|(_, mean)| mean[1][2] *= share);
+            let sum = |axis: usize| range.clone().map(|i| m.l[i][axis]).sum::<f64>();
+            let (bound, old) = (m.problem.contacts[range.start].friction * sum(0), sum(1));
+            let new = (old - m.mass(&rows, 1) * m.speed(&rows, 1)).clamp(-bound, bound);
+            m.push(&rows, 1, new - old);
+            range.clone().for_each(|i| m.l[i][1] = share * new);
+            m.contact(range, &normals);
+        }
+    };
+    let (share, slop) = (run.get("correction"), run.get("slop"));
+    let after = |m: &mut Model| {
+        (0..run.budget.position_iterations).for_each(|_| m.positions(share, slop, share * MOST, true));
+    };
+    substeps(model, run, false, sweep, after);
+}
+
 pub(super) fn xpbd(model: &mut Model, run: &Run) {
     let compliance = run.get("compliance") / (model.h * model.h);
     for _ in 0..run.budget.substeps {
@@ -674,6 +743,39 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
         steepness *= 0.9;
     }
     model.jump(&now);
+    model.advance();
+}
+
+/// The solution of the convex relaxation of soft contacts: least ½ γᵀ (J M⁻¹ Jᵀ + R) γ + γᵀ (J v − v̂) within the cones, point by
+/// point.
+pub(super) fn sap(model: &mut Model, run: &Run) {
+    model.accelerate();
+    model.warm_start(false);
+    let push = model.bias(ScalarRule::Baumgarte(run.get("baumgarte"), 0.0, CAP));
+    for i in (0..5000).flat_map(|_| 0..push.len()) {
+        let (rows, l, mu) = (model.rows(i, false), model.l[i], model.problem.contacts[i].friction);
+        let k = |a, b| model.coupling((&rows, a), (&rows, b));
+        let (nn, nt, tt, gives) = (k(0, 0), k(0, 1), k(1, 1), 1.0 + run.get("softness"));
+        // J v − v̂ without γ of this point, and J M⁻¹ Jᵀ + R.
+        let n = model.speed(&rows, 0) + push[i] - nn * l[0] - nt * l[1];
+        let t = model.speed(&rows, 1) - nt * l[0] - tt * l[1];
+        let (a, b) = (gives * nn, gives * tt);
+        let stick = [nt * t - b * n, nt * n - a * t].map(|x| x / (a * b - nt * nt));
+        let edge = |side: f64| {
+            let least = -(n + side * mu * t) / (a + 2.0 * side * mu * nt + mu * mu * b);
+            [least.max(0.0), side * mu * least.max(0.0)]
+        };
+        let energy =
+            |g: DPair| 0.5 * (a * g[0] * g[0] + b * g[1] * g[1]) + nt * g[0] * g[1] + n * g[0] + t * g[1];
+        let (one, other) = (edge(1.0), edge(-1.0));
+        let new = match () {
+            () if stick[1].abs() <= mu * stick[0] => stick,
+            () if energy(one) < energy(other) => one,
+            () => other,
+        };
+        (0..2).for_each(|axis| model.push(&rows, axis, new[axis] - l[axis]));
+        model.l[i] = new;
+    }
     model.advance();
 }
 

@@ -144,11 +144,14 @@ pub const TABLE: &[AgreementEntry] = &[
         why: "Newton's method ends at the solution of the same law, or with the sweeps that it began with",
         ..entry("direct", Against::Solution(by::solution), "until a residual is reached")
     },
-    entry(
-        "sap",
-        Against::Nothing("its contacts are soft and have no slop: that law has not been written in `f64`"),
-        "until the gradient is small, σ 10⁻³, τ by problem (Drake)",
-    ),
+    AgreementEntry {
+        why: "Newton's method ends at the solution of its law",
+        ..entry(
+            "sap",
+            Against::Solution(by::sap),
+            "until the gradient is small, σ 10⁻³, τ by problem (Drake)",
+        )
+    },
     entry("shock", Against::Method(by::shock), "sweeps until contacts are resolved, then 1 upward"),
     AgreementEntry {
         departs: &["all overlap by pseudo-velocities (source: beyond 40 mm, by velocities before)"],
@@ -227,16 +230,11 @@ pub const TABLE: &[AgreementEntry] = &[
         departs: &["pairs below 10⁻³ of k₁₁ k₂₂ go row by row (source: below 10⁻²)"],
         ..entry("rapier", Against::Method(by::rapier), "4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s")
     },
-    entry(
-        "physx",
-        Against::Nothing("its method has not been written in `f64`"),
-        "4 substeps, 1 velocity iteration at the end",
-    ),
-    entry(
-        "jolt",
-        Against::Nothing("its method has not been written in `f64`"),
-        "10 velocity and 2 position iterations",
-    ),
+    AgreementEntry {
+        departs: &["forces act in every substep (source: all before the first)"],
+        ..entry("physx", Against::Method(by::physx), "4 substeps, 1 velocity iteration at the end")
+    },
+    entry("jolt", Against::Method(by::jolt), "10 velocity and 2 position iterations"),
     AgreementEntry {
         why: "its sweeps and coarse problems end at the solution of `pgs`",
         ..entry("two_level", Against::Solution(by::solution), "until a residual is reached")
