@@ -6,7 +6,6 @@ use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::agree::{self, Agreement};
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::picture::axes::with_dark;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -51,7 +50,7 @@ pub fn run(args: &AgreeArgs) -> Result<ExitCode, Error> {
         for (name, text) in [
             ("agree.csv", agree::csv(&all)),
             ("agree.json", format!("{json:#}\n")),
-            ("agree.svg", with_dark(&agree::svg(&all)?)),
+            ("agree.svg", agree::svg(&all)?),
         ] {
             files::write(&folder.join(name), text.as_bytes())?;
         }
@@ -61,6 +60,6 @@ pub fn run(args: &AgreeArgs) -> Result<ExitCode, Error> {
         true => print_json(&json)?,
         false => print(&agree::text(&all))?,
     };
-    let within = all.iter().all(|a| a.apart.is_none_or(|apart| apart <= a.bound));
+    let within = all.iter().all(|a| a.apart <= a.bound);
     Ok(if within { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

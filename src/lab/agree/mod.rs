@@ -48,10 +48,8 @@ pub struct Agreement {
     pub ours: String,
     /// What is counted: iterations or substeps.
     pub unit: &'static str,
-    /// Why there is nothing to compare with; empty where there is.
-    pub none_because: &'static str,
-    /// Largest distance (1), none where there is nothing to compare with.
-    pub apart: Option<f64>,
+    /// Largest distance (1).
+    pub apart: f64,
     /// Largest distance that a test allows, and the reason where rounding is not all of it.
     pub bound: f64,
     pub why: &'static str,
@@ -59,7 +57,7 @@ pub struct Agreement {
     pub departures: Vec<Departure>,
     /// A curve for each problem.
     pub curves: Vec<AgreementCurve>,
-    /// The section of its docs, which a test compares; empty where there is nothing to compare with.
+    /// The section of its docs, which a test compares.
     pub docs: String,
 }
 
@@ -116,7 +114,8 @@ fn problems() -> [ContactProblem; 3] {
 
 /// Compares one solver.
 pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
-    let entry = table::find(variant.name);
+    let missing = || Error::invalid(variant.name, "has no entry in src/lab/agree/table.rs");
+    let entry = table::find(variant.name).ok_or_else(missing)?;
     let AgreementEntry { against, best, bound, why, .. } = entry;
     let in_substeps = variant.budget.substeps > 1;
     let mut result = Agreement {
@@ -125,8 +124,7 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         best,
         ours: settings(variant),
         unit: if in_substeps { "substeps" } else { "iterations" },
-        none_because: "",
-        apart: None,
+        apart: 0.0,
         bound,
         why,
         departures: Vec::new(),
@@ -134,10 +132,6 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         docs: String::new(),
     };
     let (method, counts) = match against {
-        Against::Nothing(why) => {
-            result.none_because = why;
-            return Ok(result);
-        }
         Against::Method(method) => (method, (1..=COUNT).collect::<Vec<_>>()),
         Against::Solution(method) => (method, vec![MANY]),
     };
@@ -181,10 +175,10 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
         let name = problem.name.clone();
         result.curves.push(AgreementCurve { problem: name, counts: counts.clone(), ours, theirs, apart });
     }
-    result.apart = result.curves.iter().flat_map(|c| &c.apart).copied().reduce(worse);
+    result.apart = result.curves.iter().flat_map(|c| &c.apart).copied().fold(0.0, worse);
     let departures = entry.departs.iter().zip(departs).map(|(&what, apart)| Departure { what, apart });
     result.departures = departures.collect();
-    result.docs = result.section();
+    result.docs = result.section(entry.without);
     Ok(result)
 }
 
@@ -233,7 +227,7 @@ fn distance(problem: &ContactProblem, time: f64, one: &ModelState, other: &Model
 
 impl Agreement {
     /// The section of its docs: all of it follows from the table and from what is measured in `f64`.
-    fn section(&self) -> String {
+    fn section(&self, without: &[&str]) -> String {
         let Agreement { solver, best, ours, bound, why, unit, .. } = self;
         let kind = if self.curves[0].counts.len() > 1 {
             format!("the source's method in `f64` over {COUNT} {unit}")
@@ -248,7 +242,7 @@ impl Agreement {
         } else {
             format!(" Departures, and how far each moves the result: {}.", departs.join("; "))
         };
-        let without = match table::find(solver).without {
+        let without = match without {
             [] => String::new(),
             names => format!(", both without {}", names.join(", ")),
         };
@@ -276,13 +270,9 @@ pub fn text(all: &[Agreement]) -> String {
     );
     let width = all.iter().map(|a| a.solver.len()).max().unwrap_or(0);
     for a in all {
-        let figure = match a.apart {
-            Some(apart) => format!("{apart:.1e} of {:.0e} allowed", a.bound),
-            None => format!("none, because {}", a.none_because),
-        };
-        out += &format!("{:<width$}  {figure}\n", a.solver);
+        out += &format!("{:<width$}  {:.1e} of {:.0e} allowed\n", a.solver, a.apart, a.bound);
     }
-    for a in all.iter().filter(|a| a.apart.is_some()) {
+    for a in all {
         out += &format!("\n{}\n  source [{}]: {}\n  here: {}\n", a.solver, a.source, a.best, a.ours);
         if !a.why.is_empty() {
             out += &format!("  {}\n", a.why);

@@ -1,17 +1,15 @@
-//! What every solver is compared with. A solver needs one entry, or a reason why it has none.
+//! What every solver is compared with: an entry for each.
 
 use super::model::Model;
 use super::schedules::{self as by, Run};
 
-/// What a solver is compared with, if anything.
+/// What a solver is compared with.
 #[derive(Clone, Copy, Debug)]
 pub enum Against {
     /// Its source's method in `f64`: state by state, iteration by iteration or substep by substep.
     Method(fn(&mut Model, &Run)),
     /// The solution of its law, after many of its iterations.
     Solution(fn(&mut Model, &Run)),
-    /// Nothing, because …
-    Nothing(&'static str),
 }
 
 /// An entry of the table.
@@ -41,9 +39,8 @@ const fn entry(solver: &'static str, against: Against, best: &'static str) -> Ag
 }
 
 /// The entry of a solver.
-pub fn find(solver: &str) -> AgreementEntry {
-    let unknown = entry("", Against::Nothing("no entry has been written"), "");
-    TABLE.iter().copied().find(|e| e.solver == solver).unwrap_or(unknown)
+pub fn find(solver: &str) -> Option<AgreementEntry> {
+    TABLE.iter().copied().find(|e| e.solver == solver)
 }
 
 /// The table, in the order of [`crate::engine::solvers::VARIANTS`].
