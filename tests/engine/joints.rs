@@ -365,6 +365,33 @@ fn what_joints_hold_together_stops_together() {
     assert!(stopped < -0.2 && world.bodies.velocity_x[train[0].index()] > 99.0, "{stopped} m");
 }
 
+/// A joint of the ground is none of the boxes that land on it: their impacts are solved before the step, as without the
+/// pendulum.
+#[test]
+fn a_pendulum_on_the_ground_does_not_matter_to_what_lands_there() {
+    let visits = |with_pendulum: bool| {
+        let mut world = World::new(Settings::new(find("shim").unwrap()));
+        let floor = ShapeDef::rectangle(50.0, 1.0).unwrap();
+        let ground = world.add_body(&BodyDef::fixed([0.0, -1.0]).with(floor)).unwrap();
+        for i in 0..5 {
+            let square = ShapeDef::rectangle(0.5, 0.5).unwrap();
+            world.add_body(&BodyDef::dynamic([2.0 * f64::from(i), 2.0]).with(square)).unwrap();
+        }
+        if with_pendulum {
+            let bob = BodyDef::dynamic([30.0, 5.0]).with(ShapeDef::circle(0.5).unwrap());
+            let bob = world.add_body(&bob).unwrap();
+            world.add_joint(&Joint::revolute(ground, bob).anchor([30.0, 8.0])).unwrap();
+        }
+        let step = |_| {
+            world.step().unwrap();
+            world.counts.impact_visits
+        };
+        (0..100).map(step).sum::<usize>()
+    };
+    assert!(visits(false) > 0);
+    assert_eq!(visits(true), visits(false));
+}
+
 /// A type of joint from outside: a gear, b turns `ratio` times as far as a.
 #[derive(Clone, Debug)]
 struct Gear {

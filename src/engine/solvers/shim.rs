@@ -187,7 +187,7 @@ struct Shim {
     hand_down: HandDown,
     jams: Jams,
     trees: Trees,
-    /// Whether a body has a joint; empty without joints. `[bodies]`
+    /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
     joined: Vec<bool>,
     /// The same of the last step.
     last_joined: Vec<bool>,
@@ -286,7 +286,7 @@ impl Solver for Shim {
 }
 
 impl Shim {
-    /// Finds which bodies have joints; whether others had in the last step.
+    /// Finds which dynamic bodies have joints; whether others had in the last step.
     fn find_joined(&mut self, scene: &CollisionScene<'_>) -> bool {
         if scene.types.is_empty() && self.joined.is_empty() {
             return false;
@@ -295,7 +295,7 @@ impl Shim {
         self.joined.clear();
         self.joined.resize(if scene.types.is_empty() { 0 } else { scene.bodies.len() }, false);
         for &body in scene.types.iter().flat_map(|joined| joined.kind.ends()).flatten() {
-            self.joined[body as usize] = true;
+            self.joined[body as usize] = scene.bodies.is_dynamic(body as usize);
         }
         self.joined != self.last_joined
     }
