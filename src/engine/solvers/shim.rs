@@ -320,8 +320,7 @@ impl Shim {
         if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) && passes.has(part::IMPACTS) {
             passes.spread_impacts(Spreading {
                 timed: passes.has(part::MOMENT),
-                stops: true,
-                joined: &self.joined,
+                stops: Some(&self.joined),
                 lead: Some(LEAD),
                 releases: passes.has(part::RELEASE),
             });

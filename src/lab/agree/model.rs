@@ -287,7 +287,8 @@ impl<'a> Model<'a> {
         [old + sweep.relax * (c - old), sweep.relax * m * scale]
     }
 
-    fn set(&mut self, i: usize, axis: usize, rows: &SidesOfPoint, new: f64) {
+    /// Gives a row a new impulse.
+    pub fn set(&mut self, i: usize, axis: usize, rows: &SidesOfPoint, new: f64) {
         let old = std::mem::replace(&mut self.l[i][axis], new);
         self.push(rows, axis, new - old);
     }

@@ -336,8 +336,7 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
                 let bound = m.problem.contacts[i].friction * total / share;
                 let wanted = m.l[i][1] - mass * (m.speed(&rows, 1) + back);
                 let new = wanted.clamp(-bound, bound);
-                m.push(&rows, 1, new - m.l[i][1]);
-                m.l[i][1] = new;
+                m.set(i, 1, &rows, new);
                 // What slides begins to stick again where it is.
                 if wanted.abs() > bound && !run.undoes(3) {
                     drifts[i] = -drift;
@@ -369,8 +368,7 @@ pub(super) fn physx(model: &mut Model, run: &Run) {
                 let rate =
                     if began_apart { s / m.h } else { (fraction * s / m.h).max(-run.get("push_speed")) };
                 let new = (m.l[i][0] - m.mass(&rows, 0) * (m.speed(&rows, 0) + rate)).max(0.0);
-                m.push(&rows, 0, new - m.l[i][0]);
-                m.l[i][0] = new;
+                m.set(i, 0, &rows, new);
             }
             let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
             let share = range.len() as f64;
@@ -380,8 +378,7 @@ pub(super) fn physx(model: &mut Model, run: &Run) {
                 let bound = m.problem.contacts[i].friction * total / share;
                 let wanted = m.l[i][1] - fraction * m.mass(&rows, 1) * (m.speed(&rows, 1) + back);
                 let new = wanted.clamp(-bound, bound);
-                m.push(&rows, 1, new - m.l[i][1]);
-                m.l[i][1] = new;
+                m.set(i, 1, &rows, new);
             }
         }
     };
@@ -773,8 +770,7 @@ pub(super) fn sap(model: &mut Model, run: &Run) {
             () if energy(one) < energy(other) => one,
             () => other,
         };
-        (0..2).for_each(|axis| model.push(&rows, axis, new[axis] - l[axis]));
-        model.l[i] = new;
+        (0..2).for_each(|axis| model.set(i, axis, &rows, new[axis]));
     }
     model.advance();
 }

@@ -14,9 +14,8 @@ use crate::engine::constraints::records::bounces::Bounces;
 pub(crate) struct Spreading<'a> {
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
-    /// What does not bounce stops, but for contacts of these bodies. `[bodies]`, or empty
-    pub stops: bool,
-    pub joined: &'a [bool],
+    /// What does not bounce stops, but for contacts of these bodies (`[bodies]`, or empty); none: nothing stops.
+    pub stops: Option<&'a [bool]>,
     /// Which number that the solver keeps per contact is the time of its frame.
     pub lead: Option<usize>,
     /// Points that an impact releases have borne their body until then.
@@ -26,7 +25,7 @@ pub(crate) struct Spreading<'a> {
 impl Passes<'_> {
     /// Lets what comes in bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
-        let Spreading { timed, stops, joined, lead, releases } = spreading;
+        let Spreading { timed, stops, lead, releases } = spreading;
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
         let Some([least_gain, fastest]) =
@@ -37,7 +36,7 @@ impl Passes<'_> {
         let mut spread = std::mem::take(&mut self.work.impacts.spread);
         for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
             found.clear();
-            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, joined, found });
+            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
         }
         let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
         let size = kept.size().per_contact;
@@ -75,14 +74,7 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                let joined = &[];
-                self.spread_impacts(Spreading {
-                    timed: false,
-                    stops: false,
-                    joined,
-                    lead: None,
-                    releases: true,
-                });
+                self.spread_impacts(Spreading { timed: false, stops: None, lead: None, releases: true });
             }
         }
     }

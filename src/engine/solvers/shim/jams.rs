@@ -85,8 +85,8 @@ impl Jams {
                 let n = contacts[i as usize].manifold.normal;
                 if is_own { n } else { -n }
             };
-            let [first, second] = group[0].0;
-            if first != second && bodies.is_dynamic(first as usize) && bodies.is_dynamic(second as usize) {
+            let [body, same] = group[0].0;
+            if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
             let mut is_jam = false;
@@ -97,7 +97,6 @@ impl Jams {
                     forget(&mut contacts[i as usize]);
                 }
             }
-            let [body, same] = group[0].0;
             if is_jam && body == same {
                 let i = body as usize;
                 let gyration = bodies.inv_mass[i] / bodies.inv_inertia[i];

@@ -24,11 +24,10 @@ pub(crate) struct Find<'a> {
     pub least_gain: f32,
     /// Upper bound of the speed of all points (m/s).
     pub fastest: f32,
-    /// Whether contacts may bounce, and whether points that do not bounce are stopped.
+    /// Whether contacts may bounce.
     pub bounces: bool,
-    pub stops: bool,
-    /// Bodies whose contacts are not stopped; empty if there are none. `[bodies]`
-    pub joined: &'a [bool],
+    /// If points that do not bounce are stopped, the bodies whose points are not. `[bodies]`, or empty
+    pub stops: Option<&'a [bool]>,
     /// Lanes of the contacts that are hit, in order.
     pub found: &'a mut Vec<u32>,
 }
@@ -64,7 +63,7 @@ fn find<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &mut Find { h, dt, least_gain, fastest, bounces, stops, joined, ref mut found }: &mut Find<'_>,
+    &mut Find { h, dt, least_gain, fastest, bounces, stops, ref mut found }: &mut Find<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
     let least = if between_dynamic && !bounces { 2.0 * FASTER * least_gain } else { SLOW * least_gain };
@@ -125,9 +124,11 @@ fn find<L: Lanes>(
             let speed = of(&any, lane);
             let hit = &contacts[contact.entries()[first + lane] as usize];
             let e = if bounces { hit.restitution } else { 0.0 };
-            let is_joined = |body: u32| joined.get(body as usize) == Some(&true);
-            let is_stopped =
-                stops && speed > of(&stops_at, lane) && ![hit.body_a, hit.body_b].into_iter().any(is_joined);
+            let is_stopped = speed > of(&stops_at, lane)
+                && stops.is_some_and(|joined| {
+                    let is_joined = |body: u32| joined.get(body as usize) == Some(&true);
+                    !is_joined(hit.body_a) && !is_joined(hit.body_b)
+                });
             if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
                 found.push((segment.first_lane + first + lane) as u32);
             }
