@@ -27,6 +27,8 @@ pub mod coloring;
 pub mod constraints;
 pub mod contacts;
 pub mod continuous;
+#[doc(hidden)]
+pub mod disjoint;
 pub mod error;
 pub mod joints;
 pub mod lanes;

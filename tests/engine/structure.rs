@@ -70,7 +70,7 @@ fn named_after<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
 /// Rooms of a story from the ground up; those on one floor do not import each other.
 const ENGINE: &[&[&str]] = &[
     &["error", "params", "lanes"],
-    &["clock", "shapes", "contacts", "coloring"],
+    &["clock", "shapes", "contacts", "coloring", "disjoint"],
     &["bodies"],
     &["broadphase", "narrowphase"],
     &["constraints", "continuous"],

@@ -366,6 +366,17 @@ fn world(name: &str, variant: &'static Variant, budget: Budget, order: Order, st
     crate::common::run(&crate::common::scene(name), settings, steps)
 }
 
+/// Newton's steps go in circles on the thrust of an arch, whatever its warm start is; small islands are pivoted then.
+#[test]
+fn newton_and_lemke_together_solve_an_arch_from_any_start() {
+    let pgs = solvers::find("pgs").unwrap();
+    let mut world = world("arch", pgs, pgs.budget, Order::Colored, 29);
+    let report = run(&capture(&mut world, "arch"), &["direct"]);
+    for curve in report.curves.iter().filter(|c| c.solver == "direct") {
+        assert!(curve.own.smallest < 1e-5, "{} {}: {:e}", curve.order, curve.start, curve.own.smallest);
+    }
+}
+
 #[test]
 fn capture_looks_and_does_not_touch() {
     let standard = solvers::find("soft_step").unwrap();

@@ -25,6 +25,7 @@ mod press;
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::broadphase::Proxy;
 use crate::engine::contacts::Contact;
+use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
@@ -44,9 +45,9 @@ pub struct Continuous {
     kinematic: Vec<u32>,
     /// Bodies that move farther than is safe in this step, and the part of the step that they take.
     fast: Vec<(u32, f32)>,
-    /// First body of the bodies that joints hold together with one. `[bodies]`
-    first: Vec<u32>,
-    /// Parts of the step, by first body. `[bodies]`
+    /// Bodies that joints hold together. `[bodies]`
+    together: DisjointSets,
+    /// Parts of the step, by the least of such bodies. `[bodies]`
     parts: Vec<f32>,
 }
 
@@ -97,8 +98,8 @@ impl Continuous {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let Continuous { safe_squared, first_shape, kinematic, fast, first, parts } = self;
-        held(safe_squared) + held(first_shape) + held(kinematic) + held(fast) + held(first) + held(parts)
+        let Continuous { safe_squared, first_shape, kinematic, fast, together, parts } = self;
+        held(safe_squared) + held(first_shape) + held(kinematic) + held(fast) + together.bytes() + held(parts)
     }
 
     /// Shortens the motions of fast bodies to where they meet what they would pass; returns how many are fast.
@@ -127,24 +128,22 @@ impl Continuous {
 
     /// Shortens the motion of each fast body, and of what joints hold together with it.
     fn stop_together(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) {
-        let Continuous { fast, first, parts, .. } = self;
+        let Continuous { fast, together, parts, .. } = self;
         let count = moving.bodies.len();
-        first.clear();
-        first.extend(0..count as u32);
-        (moving.joined)(&mut |ends| {
-            if ends.iter().all(|&body| moving.bodies.is_dynamic(body as usize)) {
-                let [a, b] = ends.map(|body| first_of(first, body));
-                first[a.max(b) as usize] = a.min(b);
+        together.begin(count);
+        (moving.joined)(&mut |[a, b]| {
+            if [a, b].iter().all(|&body| moving.bodies.is_dynamic(body as usize)) {
+                together.join(a, b);
             }
         });
         parts.clear();
         parts.resize(count, 1.0);
         for &(body, part) in &*fast {
-            let least = &mut parts[first_of(first, body) as usize];
+            let least = &mut parts[together.least(body) as usize];
             *least = least.min(part);
         }
         for (body, row) in rows[..count].iter_mut().enumerate() {
-            let part = parts[first_of(first, body as u32) as usize];
+            let part = parts[together.least(body as u32) as usize];
             if part < 1.0 {
                 row.delta[..3].iter_mut().for_each(|way| *way *= part);
             }
@@ -201,16 +200,6 @@ impl Continuous {
             }
         }
     }
-}
-
-/// The first of the bodies that are held together with one; links on the way become shorter.
-fn first_of(first: &mut [u32], body: u32) -> u32 {
-    let mut at = body as usize;
-    while first[at] as usize != at {
-        first[at] = first[first[at] as usize];
-        at = first[at] as usize;
-    }
-    at as u32
 }
 
 /// When in the step shape b meets shape a, before `limit`.
