@@ -208,12 +208,15 @@ impl Trees {
         for joint in joints.iter_mut() {
             let [t, i] = joint.place;
             let found = types[t as usize].kind.rigid_rows(i as usize, Placed { rows, poses });
-            joint.rows = match found.size {
-                1 => eliminate::<1>(joint.nodes, &found, nodes, rows, inv_h),
-                2 if found.is_point() => eliminate_point(joint.nodes, &found, nodes, rows, inv_h),
-                2 => eliminate::<2>(joint.nodes, &found, nodes, rows, inv_h),
-                _ => eliminate::<3>(joint.nodes, &found, nodes, rows, inv_h),
-            };
+            if found.is_point() {
+                joint.rows = eliminate_point(joint.nodes, &found, nodes, rows, inv_h);
+            } else {
+                joint.rows = match found.size {
+                    1 => eliminate::<1>(joint.nodes, &found, nodes, rows, inv_h),
+                    2 => eliminate::<2>(joint.nodes, &found, nodes, rows, inv_h),
+                    _ => eliminate::<3>(joint.nodes, &found, nodes, rows, inv_h),
+                };
+            }
         }
         for joint in joints.iter().rev() {
             let increments = joint.substitute(nodes);
