@@ -2,7 +2,8 @@
 //!
 //! A point is closed if its gap is a fraction of the slop, it moves along its normal no faster than what forces make of
 //! rest in a step, v ≤ dt (|a_a| + |a_b|), and it is still closed in the middle of the step: a load acts until its end, and one that acts
-//! on what has left works on it. That work is all that keeps a box rocking. One that closes begins with the impulse of the last substep.
+//! on what has left works on it. One that closes begins with the impulse of the last substep, which its load replaces. So a point that
+//! sags counts as closed as long as it overlaps: if its spring lost its impulse whenever a heavy body rocks on it, the body would rock on.
 //!
 //! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between. If its springs
 //! are also shortened for nearly all of its load, they follow it at once from then on ([`super::shorten`]).
@@ -96,7 +97,7 @@ fn close<L: Lanes>(
             fastest = fastest.max(record[layout.at(p, layout.normal_mass)].select_positive(speed, zero));
             let at = |quantity: usize| record[layout.at(p, quantity)];
             let near = closed - at(layout.separation);
-            let in_the_middle = half_step.mul_add(vn, at(layout.separation).max(-closed));
+            let in_the_middle = half_step.mul_add(vn, at(layout.separation));
             let stays = near.min(still - speed).min(closed - in_the_middle);
             let is_closed = at(layout.normal_mass).min(is_free).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
