@@ -43,6 +43,7 @@ mod find;
 mod law;
 mod point;
 
+use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
@@ -82,8 +83,8 @@ pub struct Spread {
     hit: Vec<(u32, u32)>,
     /// `[rows]`
     bodies: Vec<Body>,
-    /// Union–find of bodies that contacts connect. `[rows]`
-    parent: Vec<u32>,
+    /// Bodies that contacts connect. `[rows]`
+    islands: DisjointSets,
     /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
     /// `[2 lanes]`
     next: Vec<u32>,
@@ -106,9 +107,10 @@ pub struct Spread {
 impl Spread {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.next, &self.listed, &self.parent, &self.pushed, &self.found[0], &self.found[1]];
+        let lists = [&self.next, &self.listed, &self.pushed, &self.found[0], &self.found[1]];
         let queue = self.queue.capacity() * size_of::<u32>();
         lists.map(held).iter().sum::<usize>()
+            + self.islands.bytes()
             + held(&self.points)
             + held(&self.bodies)
             + held(&self.hit)
@@ -392,8 +394,7 @@ impl Spread {
         self.bodies.extend(
             on.rows.iter().map(|row| Body { flown: std::array::from_fn(|k| row.velocity[k]), ..STILL }),
         );
-        self.parent.clear();
-        self.parent.extend(0..count as u32);
+        self.islands.begin(count);
         self.next.resize(2 * lanes, NONE);
         self.listed.clear();
         self.listed.resize(lanes, NONE);
@@ -411,8 +412,7 @@ impl Spread {
                 }
                 let moves = |row: u32| on.rows[row as usize].velocity[3] > 0.0;
                 if moves(a) && moves(b) {
-                    let (a, b) = (root(&mut self.parent, a), root(&mut self.parent, b));
-                    self.parent[a.max(b) as usize] = a.min(b);
+                    self.islands.join(a, b);
                 }
             }
         }
@@ -423,7 +423,7 @@ impl Spread {
         let (lane, lanes) = (lane as usize, on.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
         // Body b is dynamic.
-        root(&mut self.parent, on.batches[part].row_b()[of])
+        self.islands.least(on.batches[part].row_b()[of])
     }
 
     /// The place of the first point of a lane.
@@ -444,16 +444,6 @@ impl Spread {
         }
         *listed as usize
     }
-}
-
-/// The body that stands for the island of a body; paths are halved on the way.
-fn root(parent: &mut [u32], mut body: u32) -> u32 {
-    while parent[body as usize] != body {
-        let above = parent[body as usize];
-        parent[body as usize] = parent[above as usize];
-        body = above;
-    }
-    body
 }
 
 /// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
