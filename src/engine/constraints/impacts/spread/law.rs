@@ -47,9 +47,9 @@ pub(super) fn rough_impulses(
     let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted_n));
     let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, wanted_t));
     let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
-    let safe = if determinant > 0.0 { determinant } else { 1.0 };
+    let inverse = if determinant > 0.0 { 1.0 / determinant } else { 1.0 };
     let stick =
-        [k_tt.mul_add(want_n, -(k_nt * want_t)) / safe, k_nn.mul_add(want_t, -(k_nt * want_n)) / safe];
+        [k_tt.mul_add(want_n, -(k_nt * want_t)) * inverse, k_nn.mul_add(want_t, -(k_nt * want_n)) * inverse];
     if stick[0] > 0.0 && stick[1].abs() <= mu * stick[0] {
         return stick;
     }

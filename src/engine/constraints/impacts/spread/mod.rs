@@ -55,10 +55,10 @@ use std::collections::VecDeque;
 const NONE: u32 = u32::MAX;
 
 /// Impacts spread until no approach is faster than this share of the fastest (1).
-const TOLERANCE: f32 = 1e-4;
+const TOLERANCE: f32 = 1e-3;
 
 /// Factor on it where something bounces (1): the spin that an error gives to a flat box grows with each bounce.
-const FINER: f32 = 1e-2;
+const FINER: f32 = 1e-3;
 
 /// How far a point is followed, as a multiple of its way in the step (1).
 const AHEAD: f32 = 1.1;
@@ -70,7 +70,7 @@ const BOUNCES: f32 = 0.1;
 const WAVES: [u32; 2] = [32, 4];
 
 /// Greatest number of visits of an island: a constant, more for each of its first [`FEW`] points, and for each further point.
-const VISITS: [usize; 3] = [256, 8, 2];
+const VISITS: [usize; 3] = [160, 8, 2];
 
 /// Impacts of so many points are followed to their end (1); those of more are finished by the sweeps of the step.
 const FEW: usize = 64;

@@ -58,7 +58,7 @@ pub(super) struct HitPoint {
     pub own_arms: [[f32; 2]; 2],
     /// k_nn, k_tt, k_nt (1/kg).
     pub k: [f32; 3],
-    /// 1/k_nn (kg); zero for a point that is not there.
+    /// The normal mass of its record (kg); zero for a point that is not there.
     pub mass: f32,
     pub friction: f32,
     /// Coefficient of restitution (1).
@@ -181,7 +181,7 @@ impl SpreadInput<'_> {
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let put = |vector: usize, value: f32| floats[first + vector * width] = value;
-        write_arms(&layout, point.index as usize, point.arms, [point.mass, 1.0 / point.k[1]], put);
+        write_arms(&layout, point.index as usize, point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
     }
 
     /// A point that has bounced leaves by itself: it is not pushed out as well.
@@ -279,21 +279,17 @@ impl HitPoint {
     pub fn push(&self, rows: &mut [BodyRow], bodies: &mut [Body], [n, t]: [f32; 2], time: f32) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
-        let mut give = |body: usize, sign: f32, rows: &mut [BodyRow]| {
-            let (place, arm) = (self.rows[body] as usize, self.arms[body]);
-            let (row, rounded) = (&mut rows[place], &mut bodies[place].rounded);
-            let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
-            let gained = [mass * x, mass * y, inertia * arm[0].mul_add(n, arm[1] * t)];
-            for (k, gained) in gained.into_iter().enumerate() {
-                row.delta[k] = time.neg_mul_add(gained, row.delta[k]);
-                let (before, gained) = (row.velocity[k], gained + rounded[k]);
-                row.velocity[k] = before + gained;
-                rounded[k] = gained - (row.velocity[k] - before);
+        for (side, sign) in [(1, 1.0), (0, -1.0)] {
+            if side == 1 || self.pushes_a {
+                let (place, [arm_n, arm_t]) = (self.rows[side] as usize, self.arms[side]);
+                give(
+                    &mut rows[place],
+                    &mut bodies[place].rounded,
+                    sign,
+                    [x, y, arm_n.mul_add(n, arm_t * t)],
+                    time,
+                );
             }
-        };
-        give(1, 1.0, rows);
-        if self.pushes_a {
-            give(0, -1.0, rows);
         }
     }
 
@@ -301,7 +297,7 @@ impl HitPoint {
     pub(super) fn turn(&mut self, frame: &TouchFrame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
-        (self.k, self.mass, self.separation) = (k, 1.0 / k[0], frame.separation);
+        (self.k, self.separation) = (k, frame.separation);
         let [a, b] = self.rows.map(|row| rows[row as usize]);
         let apart = |k: usize| frame.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
         self.apart = [apart(0), apart(1)];
@@ -325,6 +321,17 @@ impl HitPoint {
             self.arms[1][axis] = self.own_arms[1][axis] - shift;
         }
         self.k = couplings([&a, &b], self.arms);
-        self.mass = 1.0 / self.k[0];
+    }
+}
+
+/// Gives `sign` times an impulse (N·s, N·s, N·m·s) to a body at `time` (s).
+#[inline(always)]
+fn give(row: &mut BodyRow, rounded: &mut [f32; 3], sign: f32, [x, y, turn]: [f32; 3], time: f32) {
+    let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
+    for (k, gained) in [mass * x, mass * y, inertia * turn].into_iter().enumerate() {
+        row.delta[k] = time.neg_mul_add(gained, row.delta[k]);
+        let (before, gained) = (row.velocity[k], gained + rounded[k]);
+        row.velocity[k] = before + gained;
+        rounded[k] = gained - (row.velocity[k] - before);
     }
 }
