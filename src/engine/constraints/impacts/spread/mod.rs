@@ -10,7 +10,7 @@
 //! It *stops* the approach, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all later ones. So zero restitution is
 //! the limit of a small one.
 //!
-//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻⁴ of the first. Bodies that nothing hits
+//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first. Bodies that nothing hits
 //! cost nothing.
 //!
 //! # Time of the impact within the step
