@@ -21,15 +21,15 @@
 //! from half of w on.
 //!
 //! A body that touches at the start, d ≤ δ, has a contact there that its solver may not have solved to the end. Let u be
-//! how far the points of the contact would get in, and m the distance of the middle from the surface along n. It moves
-//! on until a point is in by w/2, if u takes it farther than twice that, and until w/2 is left of m:
+//! the approach of a point of the contact, s its separation, and m the distance of the middle from the surface along n. The body
+//! moves on until a point is in by w/2, if u takes it farther than twice that, and until w/2 is left of m:
 //!
 //! ```text
-//! t = max(d + w/2, 0)/u   if u > w + max(d, −w/2)
+//! t = max(s + w/2, 0)/u   if u > w + max(s, −w/2), the least of all points
 //! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (3)
 //! ```
 //!
-//! So a rod whose tip stands on a floor tips over: its tip does not get in, and its middle has far to go.
+//! So a rod whose tip stands on a floor tips over: its tip does not get in, and its middle and its other end have far to go.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::narrowphase::collide;
@@ -97,7 +97,7 @@ pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
         }
         if distance <= near {
             if part == 0.0 {
-                return limit.min(while_touching(&manifold, [a, b], distance, width));
+                return limit.min(while_touching(&manifold, [a, b], width));
             }
             break;
         }
@@ -110,14 +110,15 @@ pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
 }
 
 /// (3): the part of the step that b takes against a, which it touches.
-fn while_touching(manifold: &Manifold, [a, b]: [&Mover<'_>; 2], distance: f32, width: f32) -> f32 {
+fn while_touching(manifold: &Manifold, [a, b]: [&Mover<'_>; 2], width: f32) -> f32 {
     let n = manifold.normal;
     let moved = |of: &Mover<'_>, arm: Vec2| of.way + of.turn * arm.perp();
-    let gets_in = |p: &ManifoldPoint| -n.dot(moved(b, p.anchor_b) - moved(a, p.anchor_a));
-    let most = manifold.points().iter().map(gets_in).fold(0.0, f32::max);
     let mut part = 1.0_f32;
-    if most > width + distance.max(-0.5 * width) {
-        part = (distance + 0.5 * width).max(0.0) / most;
+    for &ManifoldPoint { separation, anchor_a, anchor_b, .. } in manifold.points() {
+        let gets_in = -n.dot(moved(b, anchor_b) - moved(a, anchor_a));
+        if gets_in > width + separation.max(-0.5 * width) {
+            part = part.min((separation + 0.5 * width).max(0.0) / gets_in);
+        }
     }
     let middles = manifold.points().iter().map(|p| 0.5 * p.separation - n.dot(p.anchor_b));
     let (middle, approach) = (middles.fold(f32::INFINITY, f32::min), n.dot(a.way - b.way));
@@ -184,6 +185,14 @@ mod tests {
         let leaning =
             Mover { pose: Pose::new(Vec2::new(0.0, 0.3), 0.7), ..mover(&rod, 0.0, 0.0, [0.0; 2], 0.3) };
         assert_eq!(impact(&fixed, &Mover { way: Vec2::new(-0.1, -0.08), ..leaning }, 1.0), 1.0);
+        // Nor does it hold up the other end of a plate, which is far from the floor.
+        let (plate, angle, turn) = (rectangle(1.0, 0.02), 0.3_f32, -0.05);
+        let (from_tip, height) = (Vec2::from_angle(angle), angle.sin() + 0.02 * angle.cos());
+        let tips = Mover {
+            pose: Pose::new(Vec2::new(0.0, height), angle),
+            ..mover(&plate, 0.0, 0.0, [0.0; 2], turn)
+        };
+        assert_eq!(impact(&fixed, &Mover { way: turn * from_tip.perp(), ..tips }, 1.0), 1.0);
     }
 
     #[test]
