@@ -1,14 +1,14 @@
 //! When two convex shapes meet that move and turn evenly.
 //!
-//! At a part t of the step let d be the distance along the unit axis n from a to b that separates the shapes best, and let
-//! v be the way of b against a over the whole step. No point of either shape gets nearer along n, over a further part s,
-//! by more than
+//! Let shape a be at rest: b moves in the frame of a, by v along a straight line and by Δθ, both relative over the whole step. At a part t
+//! of the step let d be the distance along the unit axis n from a to b that separates the shapes best. No point of b gets nearer
+//! along n, over a further part s, by more than
 //!
 //! ```text
-//! s c,   c = max(−v·n, 0) + |Δθ_a| r_a + |Δθ_b| r_b                               (1)
+//! s c,   c = max(−v·n, 0) + |Δθ| r                                               (1)
 //! ```
 //!
-//! with r the farthest point from the center of mass. So t may advance by (d − δ)/c without passing the distance δ
+//! with r its farthest point from the center of mass. So t may advance by (d − δ)/c without passing the distance δ
 //! (conservative advancement). The middle of b is at least its half width w farther along n than its surface is, and it
 //! moves along n by no more than −v·n for the rest of the step, however b turns. So where
 //!
@@ -20,13 +20,22 @@
 //! the floor's next segment begins. A middle that stops on the surface may be past it in the next step, so bodies stop
 //! from half of w on.
 //!
+//! Where a recedes, b may go on as far as a does in the rest of the step: with its own way w it takes
+//!
+//! ```text
+//! t + (1 − t) r,   r = 1 − (v·n)/(w·n)   if both are negative and r positive,       (3)
+//! ```
+//!
+//! else t. Otherwise it would never reach a wall that recedes, and gravity would add to its speed in every step. Where a comes in, b keeps
+//! its place: what carried it along would carry it through other walls.
+//!
 //! A body that touches at the start, d ≤ δ, has a contact there that its solver may not have solved to the end. Let u be
 //! the approach of a point of the contact, s its separation, and m the distance of the middle from the surface along n. The body
 //! moves on until a point is in by w/2, if u takes it farther than twice that, and until w/2 is left of m:
 //!
 //! ```text
 //! t = max(s + w/2, 0)/u   if u > w + max(s, −w/2), the least of all points
-//! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (3)
+//! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (4)
 //! ```
 //!
 //! So a rod whose tip stands on a floor tips over: its tip does not get in, and its middle and its other end have far to go.
@@ -43,10 +52,9 @@ const MOST_ADVANCES: u32 = 32;
 /// Distances looked at (m): beyond any way of a step.
 const FAR: f32 = 1e9;
 
-/// A shape on its way through the step.
-pub struct Mover<'s> {
-    /// In the frame of its body's center of mass.
-    pub shape: &'s Shape,
+/// A body on its way through the step.
+#[derive(Clone, Copy)]
+pub struct Mover {
     /// Of the center of mass at the start.
     pub pose: Pose,
     /// Of the center of mass over the step (m).
@@ -55,19 +63,21 @@ pub struct Mover<'s> {
     pub turn: f32,
 }
 
-impl Mover<'_> {
+impl Mover {
     /// Where it is at a part of the step.
     fn at(&self, part: f32) -> Pose {
-        let (sin, cos) = (part * self.turn).sin_cos();
         Pose {
             position: self.pose.position + part * self.way,
-            rotation: Vec2::new(cos, sin).rotate(self.pose.rotation),
+            rotation: Vec2::from_angle(part * self.turn).rotate(self.pose.rotation),
         }
     }
 
-    /// |Δθ| r of (1).
-    fn swing(&self) -> f32 {
-        self.turn.abs() * reach(self.shape)
+    /// Its way in the frame that `other` takes along.
+    fn against(&self, other: &Self) -> Self {
+        let back = Vec2::from_angle(-other.turn);
+        let end = self.pose.position + self.way - other.pose.position - other.way;
+        let way = back.rotate(end) + other.pose.position - self.pose.position;
+        Mover { way, turn: self.turn - other.turn, ..*self }
     }
 }
 
@@ -78,50 +88,52 @@ pub fn reach(shape: &Shape) -> f32 {
     reach + shape.radius()
 }
 
-/// The part of the step at which `b` is as near to `a` as a contact, or by (3) if it is so at the start, if its middle
-/// would get through it afterward and that is before `limit`; else `limit`.
-pub fn impact(a: &Mover<'_>, b: &Mover<'_>, limit: f32) -> f32 {
-    let width = b.shape.min_half_extent().min(reach(b.shape));
+/// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (4) if
+/// it is so at the start, if its middle would get through it afterward, and by (3) later if the first recedes; at most `limit`.
+pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], limit: f32) -> f32 {
+    let own = b.against(a);
+    let width = shape_b.min_half_extent().min(reach(shape_b));
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
     let near = LINEAR_SLOP.min(0.1 * width);
-    let (way, swing) = (b.way - a.way, a.swing() + b.swing());
+    let swing = own.turn.abs() * reach(shape_b);
     let mut part = 0.0_f32;
     for _ in 0..MOST_ADVANCES {
-        let manifold = collide(a.shape, &a.at(part), b.shape, &b.at(part), FAR);
+        let manifold = collide(shape_a, &a.pose, shape_b, &own.at(part), FAR);
         let separations = manifold.points().iter().map(|p| p.separation);
         let distance = separations.fold(f32::INFINITY, f32::min);
-        let approach = -way.dot(manifold.normal);
+        let approach = -own.way.dot(manifold.normal);
         let passes = (1.0 - part) * approach - distance > 0.5 * width;
         if !passes {
             return limit;
         }
         if distance <= near {
             if part == 0.0 {
-                return limit.min(while_touching(&manifold, [a, b], width));
+                part = while_touching(&manifold, &own, width);
             }
-            break;
+            let total = -b.way.dot(manifold.normal);
+            let recedes = if total > approach { 1.0 - approach / total } else { 0.0 };
+            return limit.min((1.0 - part).mul_add(recedes, part));
         }
         part += (distance - 0.5 * near) / (approach.max(0.0) + swing);
         if part >= limit {
             return limit;
         }
     }
-    part
+    limit.min(part)
 }
 
-/// (3): the part of the step that b takes against a, which it touches.
-fn while_touching(manifold: &Manifold, [a, b]: [&Mover<'_>; 2], width: f32) -> f32 {
+/// (4): the part of the step that b takes against a, which it touches and which is at rest.
+fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
     let n = manifold.normal;
-    let moved = |of: &Mover<'_>, arm: Vec2| of.way + of.turn * arm.perp();
-    let mut part = 1.0_f32;
-    for &ManifoldPoint { separation, anchor_a, anchor_b, .. } in manifold.points() {
-        let gets_in = -n.dot(moved(b, anchor_b) - moved(a, anchor_a));
+    let (mut part, mut middle) = (1.0_f32, f32::INFINITY);
+    for &ManifoldPoint { separation, anchor_b, .. } in manifold.points() {
+        let gets_in = -n.dot(b.way + b.turn * anchor_b.perp());
         if gets_in > width + separation.max(-0.5 * width) {
             part = part.min((separation + 0.5 * width).max(0.0) / gets_in);
         }
+        middle = middle.min(0.5 * separation - n.dot(anchor_b));
     }
-    let middles = manifold.points().iter().map(|p| 0.5 * p.separation - n.dot(p.anchor_b));
-    let (middle, approach) = (middles.fold(f32::INFINITY, f32::min), n.dot(a.way - b.way));
+    let approach = -n.dot(b.way);
     if approach > middle.max(0.5 * width) {
         part = part.min((middle - 0.5 * width).max(0.0) / approach);
     }
@@ -132,8 +144,21 @@ fn while_touching(manifold: &Manifold, [a, b]: [&Mover<'_>; 2], width: f32) -> f
 mod tests {
     use super::*;
 
-    fn mover(shape: &Shape, x: f32, y: f32, way: [f32; 2], turn: f32) -> Mover<'_> {
-        Mover { shape, pose: Pose { position: Vec2::new(x, y), rotation: Vec2::X }, way: way.into(), turn }
+    /// A shape and its way.
+    #[derive(Clone, Copy)]
+    struct Moving<'s>(&'s Shape, Mover);
+
+    fn mover(shape: &Shape, x: f32, y: f32, way: [f32; 2], turn: f32) -> Moving<'_> {
+        let pose = Pose { position: Vec2::new(x, y), rotation: Vec2::X };
+        Moving(shape, Mover { pose, way: way.into(), turn })
+    }
+
+    fn leaning(shape: &Shape, height: f32, angle: f32, way: Vec2, turn: f32) -> Moving<'_> {
+        Moving(shape, Mover { pose: Pose::new(Vec2::new(0.0, height), angle), way, turn })
+    }
+
+    fn impact(a: &Moving<'_>, b: &Moving<'_>, limit: f32) -> f32 {
+        super::impact([a.0, b.0], [&a.1, &b.1], limit)
     }
 
     fn rectangle(w: f32, h: f32) -> Shape {
@@ -182,17 +207,11 @@ mod tests {
         }
         // Deeper it waits for its contact; a tip that stands does not hold up the rod.
         assert_eq!(impact(&fixed, &mover(&rod, 0.0, 0.38, [0.3, -0.5], 0.0), 1.0), 0.0);
-        let leaning =
-            Mover { pose: Pose::new(Vec2::new(0.0, 0.3), 0.7), ..mover(&rod, 0.0, 0.0, [0.0; 2], 0.3) };
-        assert_eq!(impact(&fixed, &Mover { way: Vec2::new(-0.1, -0.08), ..leaning }, 1.0), 1.0);
+        assert_eq!(impact(&fixed, &leaning(&rod, 0.3, 0.7, Vec2::new(-0.1, -0.08), 0.3), 1.0), 1.0);
         // Nor does it hold up the other end of a plate, which is far from the floor.
         let (plate, angle, turn) = (rectangle(1.0, 0.02), 0.3_f32, -0.05);
-        let (from_tip, height) = (Vec2::from_angle(angle), angle.sin() + 0.02 * angle.cos());
-        let tips = Mover {
-            pose: Pose::new(Vec2::new(0.0, height), angle),
-            ..mover(&plate, 0.0, 0.0, [0.0; 2], turn)
-        };
-        assert_eq!(impact(&fixed, &Mover { way: turn * from_tip.perp(), ..tips }, 1.0), 1.0);
+        let (arm, height) = (Vec2::from_angle(angle), angle.sin() + 0.02 * angle.cos());
+        assert_eq!(impact(&fixed, &leaning(&plate, height, angle, turn * arm.perp(), turn), 1.0), 1.0);
     }
 
     #[test]
@@ -205,7 +224,7 @@ mod tests {
             let thrown = mover(&needle, 0.0, y, [5.0, 0.1], turn);
             let part = impact(&fixed, &thrown, 1.0);
             assert!(part < 1.0, "{k}");
-            let touch = collide(&wall, &fixed.at(part), &needle, &thrown.at(part), FAR);
+            let touch = collide(&wall, &fixed.1.at(part), &needle, &thrown.1.at(part), FAR);
             let nearest = touch.points().iter().map(|p| p.separation).fold(f32::INFINITY, f32::min);
             assert!((-1e-5..=0.0011).contains(&nearest), "{k}: {nearest}");
         }
@@ -219,5 +238,22 @@ mod tests {
         // 8 m between them at 10 m per step.
         assert!((impact(&left, &right, 1.0) - 0.8).abs() < 0.001);
         assert_eq!(impact(&left, &right, 0.5), 0.5);
+    }
+
+    #[test]
+    fn what_a_receding_wall_stops_goes_on_as_far_as_the_wall() {
+        // A wall of 10 m turns away below a box that falls on it faster.
+        let (wall, small) = (rectangle(10.0, 0.5), rectangle(0.1, 0.1));
+        let (turning, way) = (mover(&wall, 0.0, 0.0, [0.0; 2], -0.02), Vec2::new(0.0, -0.6));
+        let part = impact(&turning, &mover(&small, 9.0, 0.75, way.into(), 0.0), 1.0);
+        let end = Pose::new(Vec2::new(9.0, 0.75) + part * way, 0.0);
+        let touch = collide(&wall, &turning.1.at(1.0), &small, &end, FAR);
+        let nearest = touch.points().iter().map(|p| p.separation).fold(f32::INFINITY, f32::min);
+        assert!(nearest.abs() < 0.01, "{part}: {nearest}");
+        // One that falls as fast as the wall recedes does not stop, and one that a wall comes in at keeps its place.
+        assert_eq!(impact(&turning, &mover(&small, 9.0, 0.75, [0.0, -0.18], -0.02), 1.0), 1.0);
+        let (comes, still) =
+            (mover(&wall, 0.0, 0.0, [0.0, 0.6], 0.0), mover(&small, 0.0, 0.75, [0.1, 0.0], 0.0));
+        assert!((impact(&comes, &still, 1.0) - 0.25).abs() < 0.01);
     }
 }

@@ -204,15 +204,14 @@ impl Continuous {
 
 /// When in the step shape b meets shape a, before `limit`.
 fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f32 {
-    let [body_a, body_b] = [a, b].map(|s| moving.proxies[s as usize].body as usize);
+    let [body_a, body_b] = [a, b].map(|shape| moving.proxies[shape as usize].body as usize);
     let [pose_a, pose_b] = moving.bodies.relative_poses(body_a, body_b);
-    let mover = |shape: u32, body: usize, pose: Pose| Mover {
-        shape: &moving.shapes[shape as usize],
-        pose,
-        way: Vec2::new(rows[body].delta[0], rows[body].delta[1]),
-        turn: rows[body].delta[2],
+    let mover = |pose: Pose, body: usize| {
+        let [x, y, turn, _] = rows[body].delta;
+        Mover { pose, way: Vec2::new(x, y), turn }
     };
-    impact(&mover(a, body_a, pose_a), &mover(b, body_b, pose_b), limit)
+    let shapes = [a, b].map(|shape| &moving.shapes[shape as usize]);
+    impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], limit)
 }
 
 /// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.

@@ -10,19 +10,8 @@
 //! It *stops* the approach, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all later ones. So zero restitution is
 //! the limit of a small one.
 //!
-//! A wave begins with the points that come in. Once a body is pushed, sweeps visit its other points as well, until no approach is faster
-//! than 10⁻³ of the first. Bodies that nothing hits cost nothing.
-//!
-//! # Conjugate gradients between sweeps
-//!
-//! A sweep carries an impact by one body, and a heavy body that comes down on light ones is stopped by a little in each. So sweeps are steps
-//! of a nonlinear conjugate gradient method (`silcowitz2010`): where F is a sweep and λ all impulses before it,
-//!
-//! ```text
-//! g = λ − F(λ)      β = |g|²/|g of the sweep before|², zero if not below 1      d ← β d − g      λ ← F(λ) + β d of the sweep before
-//! ```
-//!
-//! with |g|² = Σ k_nn g_n² + k_tt g_t², an energy. The last sweep is not followed by a step, so impulses end within the cone.
+//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first. Bodies that nothing hits
+//! cost nothing.
 //!
 //! # Time of the impact within the step
 //!
@@ -60,6 +49,7 @@ pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 use point::{Body, HitPoint, Role, STILL};
 pub(crate) use point::{Leads, SpreadInput};
+use std::collections::VecDeque;
 
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
@@ -68,7 +58,7 @@ const NONE: u32 = u32::MAX;
 const TOLERANCE: f32 = 1e-3;
 
 /// Factor on it where something bounces (1): the spin that an error gives to a flat box grows with each bounce.
-const FINER: f32 = 1e-2;
+const FINER: f32 = 1e-3;
 
 /// How far a point is followed, as a multiple of its way in the step (1).
 const AHEAD: f32 = 1.1;
@@ -79,8 +69,11 @@ const BOUNCES: f32 = 0.1;
 /// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: a constant, and more for each point that is looked at.
-const VISITS: [usize; 2] = [96, 2];
+/// Greatest number of visits of an island: a constant, more for each of its first [`FEW`] points, and for each further point.
+const VISITS: [usize; 3] = [160, 8, 2];
+
+/// Impacts of so many points are followed to their end (1); those of more are finished by the sweeps of the step.
+const FEW: usize = 64;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -99,14 +92,12 @@ pub struct Spread {
     listed: Vec<u32>,
     /// In pairs; a point that is not there has no mass.
     points: Vec<HitPoint>,
-    /// Contacts of bodies that this wave pushed: the place of the first of their points.
-    near: Vec<u32>,
+    /// Bodies that were pushed since their points were looked at.
+    queue: VecDeque<u32>,
     /// Bodies of the island that were pushed.
     pushed: Vec<u32>,
     /// The first point of the island.
     first: usize,
-    /// Counts the waves of all islands of the step.
-    wave: u32,
     /// How often its points were solved.
     visits: usize,
     /// Slower approaches count as solved (m/s).
@@ -116,12 +107,14 @@ pub struct Spread {
 impl Spread {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        let lists = [&self.next, &self.listed, &self.pushed, &self.near, &self.found[0], &self.found[1]];
+        let lists = [&self.next, &self.listed, &self.pushed, &self.found[0], &self.found[1]];
+        let queue = self.queue.capacity() * size_of::<u32>();
         lists.map(held).iter().sum::<usize>()
             + self.islands.bytes()
             + held(&self.points)
             + held(&self.bodies)
             + held(&self.hit)
+            + queue
     }
 
     /// Where [`find`] writes what it finds.
@@ -183,7 +176,6 @@ impl Spread {
                 let speeds = self.points[self.first..].iter().map(|p| -p.velocity(on.rows)[0]);
                 self.slowest = TOLERANCE * speeds.fold(0.0, f32::max);
             }
-            self.wave += 1;
             let any = self.begin_wave(on, wave == 0, bounces);
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                 self.slowest *= FINER;
@@ -193,10 +185,10 @@ impl Spread {
                 break;
             }
             let known = if wave == 0 { arrived } else { self.points.len() };
-            for first in (self.first..known).step_by(2) {
-                self.look_at(first);
+            for place in self.first..known {
+                self.visit(on, place, bounces);
             }
-            let is_solved = self.solve(on, bounces);
+            let is_solved = self.spread(on, bounces);
             self.end_wave();
             if !is_solved {
                 break;
@@ -245,8 +237,7 @@ impl Spread {
             let [v, slip] = point.velocity(on.rows);
             (point.target, point.time) = (target[0], target[1]);
             (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0));
-            (point.role, point.impulse, point.begun, point.swept) =
-                (Role::Bounces, [0.0; 2], [0.0; 2], [0.0; 2]);
+            (point.role, point.impulse, point.begun) = (Role::Bounces, [0.0; 2], [0.0; 2]);
             any = true;
         }
         any
@@ -296,83 +287,41 @@ impl Spread {
         }
     }
 
-    /// Has a contact, the first of whose points is at this place, visited in the sweeps of this wave.
-    fn look_at(&mut self, first: usize) {
-        if !std::mem::replace(&mut self.points[first].is_near, true) {
-            self.near.push(first as u32);
-            for point in &mut self.points[first..first + 2] {
-                (point.swept, point.direction) = (point.impulse, [0.0; 2]);
+    /// Visits the points of bodies that were pushed, until none is left or the bound is reached; whether none is left.
+    fn spread(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
+        let mut is_done = true;
+        while let Some(body) = self.queue.pop_front() {
+            self.bodies[body as usize].is_queued = false;
+            if !is_done {
+                continue;
             }
+            let mut end = self.bodies[body as usize].first;
+            while end != NONE {
+                let lane = end / 2;
+                end = self.next[end as usize];
+                let first = self.list(on, lane);
+                self.visit(on, first, bounces);
+                self.visit(on, first + 1, bounces);
+            }
+            let points = self.points.len() - self.first;
+            let crowd = points.saturating_sub(FEW);
+            is_done = self.visits <= VISITS[0] + VISITS[1] * (points - crowd) + VISITS[2] * crowd;
         }
-    }
-
-    /// Sweeps over the contacts of bodies that this wave pushed, until nothing changes or the bound is reached; whether
-    /// nothing changes.
-    fn solve(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
-        let mut last = 0.0;
-        let is_done = loop {
-            let (mut is_still, mut i) = (true, 0);
-            while i < self.near.len() && !self.is_over() {
-                let first = self.near[i] as usize;
-                for place in first..first + 2 {
-                    is_still &= !self.visit(on, place, bounces);
-                }
-                i += 1;
-            }
-            if is_still || self.is_over() {
-                break is_still;
-            }
-            self.go_on(on, &mut last);
-        };
-        for &first in &self.near {
-            self.points[first as usize].is_near = false;
-        }
-        self.near.clear();
         is_done
     }
 
-    /// Goes on in the direction of the last sweep; see the [module](self). `last`: |g|² of the sweep before.
-    fn go_on(&mut self, on: &mut SpreadInput<'_>, last: &mut f32) {
-        let mut square = 0.0;
-        for &first in &self.near {
-            for point in &self.points[first as usize..first as usize + 2] {
-                let [n, t] = point.gradient();
-                square += point.k[0].mul_add(n * n, point.k[1] * t * t);
-            }
-        }
-        let share = if square < *last { square / *last } else { 0.0 };
-        *last = square;
-        for i in 0..2 * self.near.len() {
-            let place = self.near[i / 2] as usize + i % 2;
-            let point = &mut self.points[place];
-            let (step, gradient) = (point.direction.map(|d| share * d), point.gradient());
-            point.direction = [step[0] - gradient[0], step[1] - gradient[1]];
-            point.impulse = [point.impulse[0] + step[0], point.impulse[1] + step[1]];
-            point.swept = point.impulse;
-            if step != [0.0; 2] {
-                let time = point.time;
-                self.push(on, place, step, [time; 2]);
-            }
-        }
-    }
-
-    /// Whether the island has reached its bound.
-    fn is_over(&self) -> bool {
-        self.visits > VISITS[0] + VISITS[1] * (self.points.len() - self.first)
-    }
-
-    /// Solves a point, if it approaches fast enough or was hit before; whether that changed anything.
-    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) -> bool {
+    /// Solves a point, if it approaches fast enough or was hit before.
+    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
         if point.mass <= 0.0 || point.role == Role::Left && bounces {
-            return false;
+            return;
         }
         let mut touch = None;
         if matches!(point.role, Role::Open | Role::Left) {
-            let Some(mut time) = arrival(point, on, self.slowest) else { return false };
+            let Some(mut time) = arrival(point, on, self.slowest) else { return };
             if bounces && will_bounce(point, on) {
                 // In the next wave.
-                return false;
+                return;
             }
             if let Some(round) = point.round.filter(|_| on.timed) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
@@ -381,7 +330,7 @@ impl Spread {
             if let Some(frame) = &touch {
                 let mut turned = *point;
                 turned.turn(frame, on.rows);
-                let Some(then) = arrival(&turned, on, self.slowest) else { return false };
+                let Some(then) = arrival(&turned, on, self.slowest) else { return };
                 (*point, time) = (turned, then);
                 point.round = None;
                 on.turn(point, frame);
@@ -389,7 +338,7 @@ impl Spread {
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
             (point.role, point.target) = (Role::Stops, 0.0);
-            (point.impulse, point.begun, point.swept) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+            (point.impulse, point.begun) = ([0.0; 2], [0.0; 2]);
         }
         if on.timed {
             for row in point.rows {
@@ -411,19 +360,18 @@ impl Spread {
         self.visits += 1;
         let delta = [new[0] - old[0], new[1] - old[1]];
         if point.k[0] * (delta[0].abs() + delta[1].abs()) <= self.slowest {
-            return false;
+            return;
         }
         point.impulse = new;
         let time = point.time;
         self.push(on, place, delta, [time; 2]);
-        true
     }
 
     /// Pushes both bodies of a point with an impulse (N·s) up to `time` (s), in the mean at `at` (s), and has their points
     /// looked at.
     fn push(&mut self, on: &mut SpreadInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
-        let HitPoint { rows, pushes_a, .. } = self.points[place];
-        for (row, is_pushed) in rows.into_iter().zip([pushes_a, true]) {
+        let point = &self.points[place];
+        for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
                 continue;
             }
@@ -432,18 +380,10 @@ impl Spread {
                 self.pushed.push(row);
             }
             body.time = body.time.max(time);
-            if body.wave != self.wave {
-                body.wave = self.wave;
-                let mut end = body.first;
-                while end != NONE {
-                    let lane = end / 2;
-                    end = self.next[end as usize];
-                    let first = self.list(on, lane);
-                    self.look_at(first);
-                }
+            if !std::mem::replace(&mut body.is_queued, true) {
+                self.queue.push_back(row);
             }
         }
-        let point = &self.points[place];
         point.push(on.rows, &mut self.bodies, impulse, if on.timed { at } else { 0.0 });
     }
 
@@ -459,7 +399,6 @@ impl Spread {
         self.listed.clear();
         self.listed.resize(lanes, NONE);
         self.points.clear();
-        self.wave = 0;
         let mut end = 0;
         for part in 0..2 {
             let batches = &on.batches[part];

@@ -17,8 +17,7 @@ pub(super) struct Body {
     pub first: u32,
     /// Time of the last push (s); −∞ without one.
     pub time: f32,
-    /// The last wave that pushed it.
-    pub wave: u32,
+    pub is_queued: bool,
     /// Its velocity before anything pushed it (m/s, m/s, rad/s).
     pub flown: [f32; 3],
     /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): there may be very many.
@@ -27,7 +26,7 @@ pub(super) struct Body {
 
 /// A body that nothing has pushed.
 pub(super) const STILL: Body =
-    Body { first: NONE, time: f32::NEG_INFINITY, wave: 0, flown: [0.0; 3], rounded: [0.0; 3] };
+    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 3], rounded: [0.0; 3] };
 
 /// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,11 +78,6 @@ pub(super) struct HitPoint {
     pub impulse: [f32; 2],
     pub begun: [f32; 2],
     pub given: [f32; 2],
-    /// Impulses at the beginning of the sweep, and the direction of the step after the last one (N·s).
-    pub swept: [f32; 2],
-    pub direction: [f32; 2],
-    /// Its contact is visited in the sweeps of this wave.
-    pub is_near: bool,
     /// Impulses of the last substep, along both (N·s).
     pub borne: [f32; 2],
     /// When it is hit (s).
@@ -268,11 +262,6 @@ impl HitPoint {
         let [of_a, of_b] = self.arms;
         let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
-    }
-
-    /// What a sweep has taken from its impulses (N·s).
-    pub fn gradient(&self) -> [f32; 2] {
-        [self.swept[0] - self.impulse[0], self.swept[1] - self.impulse[1]]
     }
 
     /// Gap as bodies are now (m).
