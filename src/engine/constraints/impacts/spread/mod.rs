@@ -13,19 +13,6 @@
 //! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first. Bodies that nothing hits
 //! cost nothing.
 //!
-//! # Conjugate gradients
-//!
-//! A visit carries an impact by one body, and a heavy body that comes down on light ones is stopped by a little in each. A small island
-//! that takes too many visits is finished by sweeps over all of its points, as steps of a nonlinear conjugate gradient method
-//! (`silcowitz2010`). With a sweep F and all impulses λ before it,
-//!
-//! ```text
-//! g = λ − F(λ)      β = |g|²/|g of the sweep before|², zero if not below 1      λ ← F(λ) + β d      d ← β d − g
-//! ```
-//!
-//! with |g|² = Σ k_nn g_n² + k_tt g_t², an energy. Cut off half-way, these impulses are worse than those of Gauss-Seidel (they throw a
-//! heavy body off the light ones below it), so an island that they do not solve is left as it was before them.
-//!
 //! # Time of the impact within the step
 //!
 //! In flight, semi-implicit Euler follows a parabola with w = v − a h/2 instead of v. A point with gap s reaches the surface at the time
@@ -48,8 +35,8 @@
 //! # A bound for each island
 //!
 //! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
-//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`],
-//! [`FINISH`]). The solver stops what still approaches then, and bodies of such an island are not moved: they might end up in a body that was not visited.
+//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
+//! solver stops what still approaches then, and bodies of such an island are not moved: they might end up in a body that was not visited.
 //! So the time of a step has a bound: `simpulse torture --pace 3` measures how many times the median it is.
 
 mod find;
@@ -71,7 +58,7 @@ const NONE: u32 = u32::MAX;
 const TOLERANCE: f32 = 1e-3;
 
 /// Factor on it where something bounces (1): the spin that an error gives to a flat box grows with each bounce.
-const FINER: f32 = 1e-2;
+const FINER: f32 = 1e-3;
 
 /// How far a point is followed, as a multiple of its way in the step (1).
 const AHEAD: f32 = 1.1;
@@ -82,14 +69,8 @@ const BOUNCES: f32 = 0.1;
 /// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island by Gauss-Seidel: a constant, and more for each of its points.
-const VISITS: [usize; 2] = [48, 2];
-
-/// The same of sweeps with conjugate gradients.
-const FINISH: [usize; 2] = [48, 1];
-
-/// Most points of an island that these finish (1).
-const FEW: usize = 32;
+/// Greatest number of visits of an island: a constant, and more for each of its points.
+const VISITS: [usize; 2] = [180, 1];
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -204,7 +185,7 @@ impl Spread {
             for place in self.first..known {
                 self.visit(on, place, bounces);
             }
-            let is_solved = self.spread(on, bounces) || self.finish(on, bounces);
+            let is_solved = self.spread(on, bounces);
             self.end_wave();
             if !is_solved {
                 break;
@@ -324,78 +305,6 @@ impl Spread {
         is_done
     }
 
-    /// Solves a small island that Gauss-Seidel has not solved within its bound: sweeps over all of its points, with steps of
-    /// conjugate gradients between them; whether that solves it. Else it is left as it was.
-    fn finish(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
-        let points = self.points.len() - self.first;
-        if points > FEW {
-            return false;
-        }
-        for point in &mut self.points[self.first..] {
-            (point.swept, point.direction, point.left) = (point.impulse, [0.0; 2], point.impulse);
-        }
-        let most = self.visits + FINISH[0] + FINISH[1] * points;
-        let mut last = 0.0;
-        loop {
-            let mut place = self.first;
-            while place < self.points.len() {
-                self.visit(on, place, bounces);
-                place += 1;
-            }
-            if self.queue.is_empty() {
-                return true;
-            }
-            self.list_pushed(on);
-            if self.visits > most {
-                break;
-            }
-            self.go_on(on, &mut last);
-        }
-        for place in self.first..self.points.len() {
-            let HitPoint { impulse, left, time, .. } = self.points[place];
-            self.points[place].impulse = left;
-            if impulse != left {
-                self.push(on, place, [left[0] - impulse[0], left[1] - impulse[1]], [time; 2]);
-            }
-        }
-        self.list_pushed(on);
-        false
-    }
-
-    /// Lists the points of the bodies that were pushed, without a visit.
-    fn list_pushed(&mut self, on: &SpreadInput<'_>) {
-        while let Some(body) = self.queue.pop_front() {
-            self.bodies[body as usize].is_queued = false;
-            let mut end = self.bodies[body as usize].first;
-            while end != NONE {
-                self.list(on, end / 2);
-                end = self.next[end as usize];
-            }
-        }
-    }
-
-    /// A step of conjugate gradients after a sweep; see the [module](self). `last`: |g|² of the sweep before.
-    fn go_on(&mut self, on: &mut SpreadInput<'_>, last: &mut f32) {
-        let mut square = 0.0;
-        for point in &self.points[self.first..] {
-            let [n, t] = point.gradient();
-            square += point.k[0].mul_add(n * n, point.k[1] * t * t);
-        }
-        let share = if square < *last { square / *last } else { 0.0 };
-        *last = square;
-        for place in self.first..self.points.len() {
-            let point = &mut self.points[place];
-            let (step, gradient) = (point.direction.map(|d| share * d), point.gradient());
-            point.direction = [step[0] - gradient[0], step[1] - gradient[1]];
-            point.impulse = [point.impulse[0] + step[0], point.impulse[1] + step[1]];
-            point.swept = point.impulse;
-            if step != [0.0; 2] {
-                let time = point.time;
-                self.push(on, place, step, [time; 2]);
-            }
-        }
-    }
-
     /// Solves a point, if it approaches fast enough or was hit before.
     fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
@@ -425,7 +334,6 @@ impl Spread {
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
             (point.role, point.target) = (Role::Stops, 0.0);
             (point.impulse, point.begun) = ([0.0; 2], [0.0; 2]);
-            (point.swept, point.left) = ([0.0; 2], [0.0; 2]);
         }
         if on.timed {
             for row in point.rows {

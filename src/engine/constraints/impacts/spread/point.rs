@@ -78,10 +78,6 @@ pub(super) struct HitPoint {
     pub impulse: [f32; 2],
     pub begun: [f32; 2],
     pub given: [f32; 2],
-    /// Impulses at the beginning of the sweep, the direction of the step after the last one, and impulses before all sweeps (N·s).
-    pub swept: [f32; 2],
-    pub direction: [f32; 2],
-    pub left: [f32; 2],
     /// Impulses of the last substep, along both (N·s).
     pub borne: [f32; 2],
     /// When it is hit (s).
@@ -266,11 +262,6 @@ impl HitPoint {
         let [of_a, of_b] = self.arms;
         let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
-    }
-
-    /// What a sweep has taken from its impulses (N·s).
-    pub fn gradient(&self) -> [f32; 2] {
-        [self.swept[0] - self.impulse[0], self.swept[1] - self.impulse[1]]
     }
 
     /// Gap as bodies are now (m).
