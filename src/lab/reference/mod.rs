@@ -7,6 +7,10 @@
 //! files, [`gallery`] has problems solved by hand, [`rates`] measures convergence in iterations and in the step size,
 //! [`baseline`] that of Gauss–Seidel.
 //!
+//! On a linear complementarity problem PATH, with which the literature compares, pivots along the path of one covering vector as Lemke's
+//! method does, so that stands for it. There is no interior-point method: one was built, and certified no problem that Newton's and
+//! Lemke's methods had left.
+//!
 //! Nothing here depends on the simulation's solvers, so that it can judge them, except that it shares Lemke's method
 //! with `direct` and certifies the result.
 
