@@ -7,7 +7,7 @@ use simpulse::lab::torture::{TortureVerdict, family, run_solver};
 use simpulse::lab::verify::{self, Lab};
 
 /// Scenes of a family that are drawn.
-const SCENES: u32 = 60;
+const SCENES: u32 = 120;
 
 /// A family's scenes count for a mechanism if at least so many more fail without it (1).
 const MORE: f64 = 1.3;
