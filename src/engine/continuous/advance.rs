@@ -53,7 +53,6 @@ const MOST_ADVANCES: u32 = 32;
 const FAR: f32 = 1e9;
 
 /// A body on its way through the step.
-#[derive(Clone, Copy)]
 pub struct Mover {
     /// Of the center of mass at the start.
     pub pose: Pose,
@@ -91,11 +90,11 @@ pub fn reach(shape: &Shape) -> f32 {
 /// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (4) if
 /// it is so at the start, if its middle would get through it afterward, and by (3) later if the first recedes; at most `limit`.
 pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], limit: f32) -> f32 {
-    let own = b.against(a);
-    let width = shape_b.min_half_extent().min(reach(shape_b));
+    let (own, reach) = (b.against(a), reach(shape_b));
+    let width = shape_b.min_half_extent().min(reach);
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
     let near = LINEAR_SLOP.min(0.1 * width);
-    let swing = own.turn.abs() * reach(shape_b);
+    let swing = own.turn.abs() * reach;
     let mut part = 0.0_f32;
     for _ in 0..MOST_ADVANCES {
         let manifold = collide(shape_a, &a.pose, shape_b, &own.at(part), FAR);
@@ -119,7 +118,7 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], limit: f32) 
             return limit;
         }
     }
-    limit.min(part)
+    part
 }
 
 /// (4): the part of the step that b takes against a, which it touches and which is at rest.
@@ -145,7 +144,6 @@ mod tests {
     use super::*;
 
     /// A shape and its way.
-    #[derive(Clone, Copy)]
     struct Moving<'s>(&'s Shape, Mover);
 
     fn mover(shape: &Shape, x: f32, y: f32, way: [f32; 2], turn: f32) -> Moving<'_> {
