@@ -71,7 +71,7 @@ const WAVES: [u32; 2] = [32, 4];
 
 /// Greatest number of visits of an island: a constant, and more for each of its points. With one for each, a ball that hits a wall of 1000
 /// bricks throws the last one out at 39 m/s.
-const VISITS: [usize; 2] = [180, 2];
+const VISITS: [usize; 2] = [200, 2];
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
