@@ -11,13 +11,13 @@
 //! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = W Aᵀ (A W Aᵀ + ε)⁻¹ b, with the weight of a
 //! friction as large as the load of its point: points with one normal reach their cones together. A first solution finds
 //! which points bear and how they share the load, since those that would pull are left out; a second one has frictions
-//! in proportion to that, cut off at their cones. No point gets more than [`GREATEST`] times the force, as wedges would
-//! ask for.
+//! in proportion to that, cut off at their cones.
+//!
+//! Where no loads balance f and τ, the best ones for τ may push more than f does: up to twice of it through two points, and
+//! the body below hands down twice of that again. In equilibrium their sum is −f. So it is scaled to be no longer than f, and
+//! then the sum that a body hands down is, by the triangle inequality, no longer than the weights of all that it bears.
 
 use glam::{DMat3, DVec2, DVec3};
-
-/// Greatest load of a point over the force on the body (1): without it loads of wedges throw bricks of a wall that is hit.
-const GREATEST: f64 = 2.0;
 
 /// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
 const RIDGE: f64 = 1e-6;
@@ -59,7 +59,6 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
     let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
     let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
-    let greatest = GREATEST * force.length();
     for is_last in [false, true] {
         let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
         let mut matrix = DMat3::from_diagonal(DVec3::splat(RIDGE));
@@ -71,11 +70,16 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
         }
         let solution = matrix.inverse() * all;
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
-            let normal = column(support, support.normal).dot(solution).max(0.0).min(greatest);
+            let normal = column(support, support.normal).dot(solution).max(0.0);
             let tangent = support.load[0] / most * column(support, support.tangent()).dot(solution);
             let bound = support.friction * normal;
             support.load = [normal, if is_last { tangent.max(-bound).min(bound) } else { 0.0 }];
         }
+    }
+    let total: DVec2 = supports.iter().map(Support::force).sum();
+    if total.length() > force.length() {
+        let share = force.length() / total.length();
+        supports.iter_mut().for_each(|support| support.load = support.load.map(|load| load * share));
     }
 }
 
@@ -124,15 +128,26 @@ mod tests {
         }
     }
 
-    /// Between two walls at 60° a disc of 10 N asks each for 10 N/(2 cos 60°); in a narrower wedge for more than is
-    /// given.
+    /// Between two frictionless walls at α to the horizontal a disc of 10 N asks each for 10 N/(2 cos α).
     #[test]
-    fn a_wedge_gets_what_it_asks_for_up_to_a_bound() {
-        for (angle, expected) in [(60f64, 10.0), (89.0, 20.0)] {
+    fn a_wedge_gets_what_it_asks_for() {
+        for (angle, expected) in [(60f64, 10.0), (80.0, 28.794)] {
             let (sin, cos) = angle.to_radians().sin_cos();
             let mut walls = [sin, -sin].map(|x| point(DVec2::new(x, cos), -0.5 * DVec2::new(x, cos), 0.0));
             load(&mut walls, DVec2::new(0.0, -10.0), 0.0, 0.35);
             assert!(walls.iter().all(|wall| close(wall.load[0], expected)), "{angle}: {walls:?}");
+        }
+    }
+
+    /// A torque that nothing balances asks for more than the force on the body.
+    #[test]
+    fn no_body_hands_down_more_than_it_bears() {
+        let corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.6));
+        for torque in [-100.0, -20.0, 7.0, 30.0] {
+            let mut corners = corners;
+            load(&mut corners, DVec2::new(0.0, -10.0), torque, 0.4);
+            let total: DVec2 = corners.iter().map(Support::force).sum();
+            assert!(total.length() < 10.0 + 1e-9 && total.length() > 5.0, "{torque}: {corners:?}");
         }
     }
 }

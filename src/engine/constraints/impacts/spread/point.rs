@@ -88,6 +88,8 @@ pub(super) struct HitPoint {
     pub round: Option<Round>,
     /// Whether a shape is round.
     pub is_round: bool,
+    /// Of the first point: whether it shares most of its effect with the second.
+    pub is_tight: bool,
 }
 
 /// The data that [`super::Spread::run`] works on.
@@ -262,6 +264,25 @@ impl HitPoint {
         let [of_a, of_b] = self.arms;
         let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
+    }
+
+    /// What a normal impulse at another point of its contact adds to its normal velocity (1/kg).
+    pub fn coupling(&self, other: &HitPoint, rows: &[BodyRow]) -> f32 {
+        let straight = self.normal[0].mul_add(other.normal[0], self.normal[1] * other.normal[1]);
+        let of = |body: usize| {
+            let BodyRow { velocity, delta } = &rows[self.rows[body] as usize];
+            velocity[3].mul_add(straight, delta[3] * self.arms[body][0] * other.arms[body][0])
+        };
+        of(1) + if self.pushes_a { of(0) } else { 0.0 }
+    }
+
+    /// Rounding error of its velocity (m/s).
+    pub fn rounding(&self, rows: &[BodyRow]) -> f32 {
+        let of = |body: usize| {
+            let [x, y, turn, _] = rows[self.rows[body] as usize].velocity.map(f32::abs);
+            turn.mul_add(self.arms[body][0].abs(), x + y)
+        };
+        if self.mass > 0.0 { f32::EPSILON * (of(0) + of(1)) } else { 0.0 }
     }
 
     /// Gap as bodies are now (m).
