@@ -64,7 +64,8 @@ impl Pace {
         for (place, &step) in order.iter().enumerate() {
             let begin = place.saturating_sub(NEAREST / 2).min(times.len().saturating_sub(NEAREST));
             let near = &order[begin..(begin + NEAREST).min(times.len())];
-            let of = |get: &dyn Fn(usize) -> f64| median(&near.iter().map(|&step| get(step)).collect::<Vec<_>>());
+            let of =
+                |get: &dyn Fn(usize) -> f64| median(&near.iter().map(|&step| get(step)).collect::<Vec<_>>());
             let more = contacts[step] as f64 / of(&|step| contacts[step] as f64).max(1.0);
             ratios[step] = times[step] / (more.max(1.0) * of(&|step| times[step])).max(1.0);
         }

@@ -1,4 +1,4 @@
-//! Ten kinds of scenes that are hard in ten ways, each drawn from a seed.
+//! Eleven kinds of scenes that are hard in as many ways, each drawn from a seed.
 
 use super::shapes::{body, capsule, driven, log_range, of_density, of_surface, once_in};
 use super::{Room, TortureCase};
@@ -50,6 +50,7 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "scales", summary: "centimeters beside a hundred meters", draw: scales },
     Family { name: "slender", summary: "plates and needles in layers", draw: slender },
     Family { name: "far", summary: "mixed shapes 10 km from the origin", draw: far },
+    Family { name: "struck", summary: "walls of bricks hit by something fast", draw: struck },
 ];
 
 impl Family {
@@ -263,6 +264,33 @@ fn slender(random: &mut Pcg64Mcg) -> Draft {
     let bodies: Vec<_> = bodies.collect();
     let height = f64::max(8.0, y + 2.0);
     Draft::new(Room { high: [room.high[0], height], ..room }, bodies, 12.0).resting()
+}
+
+fn struck(random: &mut Pcg64Mcg) -> Draft {
+    let (courses, columns) = (random.random_range(4..25), random.random_range(2..9));
+    let half = [0.5, random.random_range(0.15..0.35)];
+    let (top, side) = (2.0 * half[1] * f64::from(courses), half[0] * f64::from(columns));
+    let size = log_range(random, 0.25, 1.5);
+    let room = Room::new(0.0, side + 3.0 * size + 6.0, top + 3.0 * size + 6.0, 2.0);
+    let speed = log_range(random, 5.0, 60.0);
+    let (place, velocity) = if once_in(random, 3) {
+        ([-side - 1.0 - size, random.random_range(size..size + top)], [speed, 0.0])
+    } else {
+        ([side * random.random_range(-0.8..0.8), top + 1.0 + 1.5 * size], [0.0, -speed])
+    };
+    let shape = body(random, place, size, true).moving(velocity, 0.0);
+    let mut bodies = vec![of_density(shape, log_range(random, 1.0, 20.0))];
+    for course in 0..courses {
+        for column in 0..columns {
+            let x = half[0] * f64::from(2 * column + course % 2) - side;
+            let y = half[1] * f64::from(2 * course + 1);
+            bodies.push(SceneBody::dynamic([x, y], SceneShape::rectangle(half[0], half[1])));
+        }
+    }
+    let (friction, bounces) = (random.random_range(0.2..0.8), once_in(random, 3));
+    let restitution = if bounces { random.random_range(0.0..0.6) } else { 0.0 };
+    let bodies = bodies.into_iter().map(|body| of_surface(body, friction, restitution)).collect();
+    Draft::new(room, bodies, 3.0)
 }
 
 #[cfg(test)]
