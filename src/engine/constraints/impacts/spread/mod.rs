@@ -73,8 +73,11 @@ const BOUNCES: f32 = 0.1;
 /// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: a constant, and more for each of its points.
-const VISITS: [usize; 2] = [128, 1];
+/// Greatest number of visits of an island for each of its first points; each of the others adds one.
+const VISITS: usize = 16;
+
+/// How many are first.
+const FIRST: usize = 8;
 
 /// How much deeper a point of an island that reached its bound may end (m): bodies that touch end in each other by what is left of their
 /// approach.
@@ -328,7 +331,8 @@ impl Spread {
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
-            is_done = self.visits <= VISITS[0] + VISITS[1] * (self.points.len() - self.first);
+            let points = self.points.len() - self.first;
+            is_done = self.visits <= VISITS * points.min(FIRST) + points.saturating_sub(FIRST);
         }
         is_done
     }
