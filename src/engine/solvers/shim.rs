@@ -146,6 +146,7 @@ const MECHANISMS: [Mechanism; 11] = [
         lines: lines_of(include_str!("../constraints/impacts/spread/mod.rs"))
             + lines_of(include_str!("../constraints/impacts/spread/find.rs"))
             + lines_of(include_str!("../constraints/impacts/spread/law.rs"))
+            + lines_of(include_str!("../constraints/impacts/spread/pair.rs"))
             + lines_of(include_str!("../constraints/impacts/spread/point.rs"))
             + lines_of(include_str!("../constraints/impacts/touch.rs")),
     },

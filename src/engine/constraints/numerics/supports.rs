@@ -13,9 +13,9 @@
 //! which points bear and how they share the load, since those that would pull are left out; a second one has frictions
 //! in proportion to that, cut off at their cones.
 //!
-//! Where no loads balance f and τ, the best ones for τ may push more than f does: up to twice of it through two points, and
-//! the body below hands down twice of that again. In equilibrium their sum is −f. So it is scaled to be no longer than f, and
-//! then the sum that a body hands down is, by the triangle inequality, no longer than the weights of all that it bears.
+//! Where no loads balance f and τ, the best ones for τ may push up to twice as hard as f, and the body below hands down twice of that
+//! again. In equilibrium their sum is −f. So loads whose sum is longer than f are scaled down to that. By the triangle inequality a
+//! body then hands down no more than the weights of all that it bears.
 
 use glam::{DMat3, DVec2, DVec3};
 
