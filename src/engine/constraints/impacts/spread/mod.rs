@@ -74,7 +74,7 @@ const BOUNCES: f32 = 0.1;
 const WAVES: [u32; 2] = [32, 4];
 
 /// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of the others adds one.
-const VISITS: [usize; 2] = [16, 8];
+const VISITS: [usize; 2] = [17, 8];
 
 /// How much deeper a point of an island that reached its bound may end (m): bodies that touch end in each other by what is left of their
 /// approach.
@@ -213,8 +213,15 @@ impl Spread {
         is_done
     }
 
-    /// Bodies stay where they are if one of their points would end deeper.
+    /// Bodies stay where they are if one of their points would end deeper, visited or not.
     fn stay(&mut self, on: &mut SpreadInput<'_>) {
+        for i in 0..self.pushed.len() {
+            let mut end = self.bodies[self.pushed[i] as usize].first;
+            while end != NONE {
+                self.list(on, end / 2);
+                end = self.next[end as usize];
+            }
+        }
         self.pushed.clear();
         for point in self.points[self.first..].iter().filter(|point| point.mass > 0.0) {
             if point.gap(on.rows) < point.separation.min(0.0) - DEEPER {
