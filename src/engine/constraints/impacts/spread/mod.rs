@@ -74,7 +74,7 @@ const BOUNCES: f32 = 0.1;
 const WAVES: [u32; 2] = [32, 4];
 
 /// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of the others adds one.
-const VISITS: [usize; 2] = [17, 8];
+const VISITS: [usize; 2] = [18, 8];
 
 /// How much deeper a point of an island that reached its bound may end (m): bodies that touch end in each other by what is left of their
 /// approach.
