@@ -27,9 +27,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 ///
 /// Eleven families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
 /// stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from the origin,
-/// walls that are hit. Every scene runs under every solver, on all cores; only poses are checked, in double precision. A scene fails if
-/// it diverges, gains energy, flings a body, lets one escape from its walls, ends with bodies inside each other or
-/// does not come to rest when it should. The same seed gives the same scenes.
+/// walls that are hit. Every scene runs under every solver, on all cores; only poses are checked, in double
+/// precision. A scene fails if it diverges, gains energy, flings a body, lets one escape from its walls, ends with
+/// bodies inside each other or does not come to rest when it should. The same seed gives the same scenes.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

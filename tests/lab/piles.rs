@@ -6,7 +6,7 @@ use simpulse::engine::world::World;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 use simpulse::lab::torture::families::FAMILIES;
-use simpulse::lab::torture::run_solver;
+use simpulse::lab::torture::{family, run_solver};
 
 fn scene(name: &str) -> World {
     common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
@@ -260,14 +260,14 @@ fn impacts_of_a_step_stay_within_their_bound() {
             }
         }
     }
-    assert!(most > 144 && cut > 0, "no scene needs a bound: {most} visits, {cut} islands cut off");
+    assert!(most > 256 && cut > 0, "no scene needs a bound: {most} visits, {cut} islands cut off");
 }
 
 /// No body hands down more load than it bears, however a wall is compressed that something has hit. (Where each point gets up to
 /// twice the force on its body instead, walls of more courses blow up; without any limit a third of these do.)
 #[test]
 fn walls_that_are_hit_make_no_energy() {
-    let struck = FAMILIES.iter().find(|family| family.name == "struck").unwrap();
+    let struck = family("struck").unwrap();
     let settings = common::settings(solvers::find("shim").unwrap());
     for number in 0..60 {
         let outcome = run_solver(&struck.case(1, number), &settings).unwrap();
