@@ -115,6 +115,15 @@ impl<'a> IndexList<'a> {
         bytemuck::cast_slice(self.entries).iter().map(move |entries| LaneIndex { entries, bound })
     }
 
+    /// One batch of the list.
+    ///
+    /// # Panics
+    /// If the last batch is not whole, or before this one.
+    #[inline(always)]
+    pub fn batch<I: Pod>(self, batch: usize) -> LaneIndex<'a, I> {
+        LaneIndex { entries: &bytemuck::cast_slice(self.entries)[batch], bound: self.bound }
+    }
+
     /// The batch that begins at entry `first`. If the list ends before the batch does, it is made in
     /// `room` and filled up with that entry.
     ///

@@ -10,7 +10,7 @@
 //! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses, and gets no
 //!   faster than the piston can make it;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
-//! * joints that hang from what does not move are solved at once (`constraints/joints/trees`);
+//! * chains of joints that hang from what does not move are solved at once (`constraints/joints/chains`);
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them.
@@ -22,7 +22,7 @@
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
 //! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes, 1 elimination
-//! along trees of joints, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
+//! along chains of joints, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
 //! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.
@@ -33,7 +33,7 @@ mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::trees::Trees;
+use crate::engine::constraints::joints::chains::Chains;
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -101,7 +101,7 @@ mod part {
     pub const RELEASE: usize = 7;
     pub const JAMS: usize = 8;
     pub const HELD: usize = 9;
-    pub const TREES: usize = 10;
+    pub const CHAINS: usize = 10;
 }
 
 /// What a run can leave out, and what fails then.
@@ -175,10 +175,13 @@ const MECHANISMS: [Mechanism; 11] = [
         lines: 0,
     },
     Mechanism {
-        name: "trees",
-        meaning: "joints that hang from what does not move are solved at once",
+        name: "chains",
+        meaning: "chains of joints that hang from what does not move are solved at once",
         case: "B17.ratio",
-        lines: lines_of(include_str!("../constraints/joints/trees.rs")),
+        lines: lines_of(include_str!("../constraints/joints/chains/mod.rs"))
+            + lines_of(include_str!("../constraints/joints/chains/records.rs"))
+            + lines_of(include_str!("../constraints/joints/chains/system.rs"))
+            + lines_of(include_str!("../constraints/records/links.rs")),
     },
 ];
 
@@ -187,7 +190,7 @@ const MECHANISMS: [Mechanism; 11] = [
 struct Shim {
     hand_down: HandDown,
     jams: Jams,
-    trees: Trees,
+    chains: Chains,
     /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
     joined: Vec<bool>,
     /// The same of the last step.
@@ -243,10 +246,10 @@ impl Solver for Shim {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
-        if passes.has(part::TREES) {
-            passes.find_trees(&mut self.trees);
+        if passes.has(part::CHAINS) {
+            passes.find_chains(&mut self.chains);
         } else {
-            self.trees = Trees::default();
+            self.chains = Chains::default();
         }
         for substep in 0..budget.substeps {
             if substep == 0 {
@@ -255,7 +258,7 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
-            passes.solve_trees(&mut self.trees);
+            passes.solve_chains(&mut self.chains, self.gravity.length(), substep + 1 == budget.substeps);
             for _ in 0..budget.velocity_iterations {
                 if passes.has(part::BEARING) {
                     passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
@@ -272,7 +275,7 @@ impl Solver for Shim {
             self.jams.bound(passes);
             passes.end_substep(substep);
         }
-        passes.rejoin_trees();
+        passes.unlink_chains();
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 
@@ -281,7 +284,7 @@ impl Solver for Shim {
     }
 
     fn held_bytes(&self) -> usize {
-        let parts = [self.hand_down.held_bytes(), self.trees.held_bytes(), self.jams.held_bytes()];
+        let parts = [self.hand_down.held_bytes(), self.chains.held_bytes(), self.jams.held_bytes()];
         parts.iter().sum::<usize>() + held(&self.fields) + held(&self.joined) + held(&self.last_joined)
     }
 }

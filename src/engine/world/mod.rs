@@ -229,7 +229,7 @@ impl World {
                     broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));
                 },
                 joined: &|visit| {
-                    let rigid = types.iter().filter(|joined| joined.kind.is_rigid());
+                    let rigid = types.iter().filter(|joined| joined.kind.rigid_size() > 0);
                     rigid.for_each(|joined| joined.kind.ends().iter().for_each(|&ends| visit(ends)));
                 },
             };

@@ -4,23 +4,26 @@
 //! [`Joints`] makes a [`ConstraintType`], which joins the colors and passes of every solver: warm starts, velocity
 //! sweeps in any order, Jacobi sweeps, split masses, position sweeps.
 
+pub mod chains;
 pub mod rows;
-pub mod trees;
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
-use crate::engine::constraints::records::rows::ROWS;
-use crate::engine::lanes::{Block, LaneWidth, Lanes, Quad, RowStore, held};
+use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows};
+use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
+use crate::engine::narrowphase::lanes::PoseRow;
+use chains::records::Linked;
 use glam::Vec2;
 use rows::{
     Besides, Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart,
-    Places, RigidFinder, RigidRows, RowBlock, Vectors, Velocities, VelocityRule,
+    Places, RigidFinder, RowBlock, Vectors, Velocities, VelocityRule,
 };
 use std::f32::consts::TAU;
 use std::fmt;
+use std::ops::DerefMut;
 
 /// A type of joint between two bodies. `tests/engine/joints.rs` has one from outside.
 pub trait JointType: Clone + fmt::Debug + Send + 'static {
@@ -100,8 +103,9 @@ pub struct Joints<T: JointType> {
     summed: Vec<f32>,
     /// Substep that the impulses belong to (s).
     h: f32,
-    /// Rigid rows that sweeps leave alone; empty if there are none. `[joints]`
+    /// Links of chains, whose rigid rows sweeps leave alone; empty if there are none. `[joints]`
     aside: Vec<bool>,
+    linked: Linked,
     /// Where the impulses of the rigid block are among the kept numbers, and how many; none unless there is one block.
     rigid: Option<[usize; 2]>,
 }
@@ -112,6 +116,7 @@ impl<T: JointType> Joints<T> {
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
         let (booked, summed, aside, rigid) = (vec![], vec![], vec![], Self::rigid_block(form));
+        let linked = Linked::default();
         Joints {
             joints,
             form,
@@ -125,6 +130,7 @@ impl<T: JointType> Joints<T> {
             summed,
             h,
             aside,
+            linked,
             rigid,
         }
     }
@@ -134,9 +140,9 @@ impl<T: JointType> Joints<T> {
         let numbers = vec![0.0; T::numbers(form)];
         let mut kept: Vec<f32> = (0..T::kept(form)).map(|i| i as f32).collect();
         let pair = JointPair::new([[0.0; 8]; 2], &[0.0; ANCHORS]);
-        let mut found = RigidFinder { pair, rows: RigidRows::none([0; 2]), blocks: 0 };
+        let mut found = RigidFinder { pair, blocks: 0, rows: 0, first: 0.0 };
         rows_once::<T, f32>(form, &numbers, &mut kept, &mut found);
-        (found.blocks == 1).then_some([found.rows.impulses[0] as usize, found.rows.size])
+        (found.blocks == 1).then_some([found.first as usize, found.rows])
     }
 
     /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
@@ -166,7 +172,6 @@ impl<T: JointType> Joints<T> {
     fn fill<L: Lanes>(&self, on: TypeInput<'_>) {
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let stride = self.stride();
-        let poses: &[Quad] = bytemuck::cast_slice(on.poses);
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
@@ -177,15 +182,12 @@ impl<T: JointType> Joints<T> {
             {
                 let filled = segment.filled(batch, L::WIDTH);
                 let (a, b) = if self.swapped { (row_b, row_a) } else { (row_a, row_b) };
-                let [local_ax, local_ay, local_bx, local_by] = L::gather_quads::<1, 0>(&self.anchors, joints);
-                let turned = |row, [x, y]: [L; 2]| {
-                    let [cos, sin, ..] = L::gather_quads::<2, 1>(poses, row);
-                    [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
-                };
-                let (ra, rb) = (turned(a, [local_ax, local_ay]), turned(b, [local_bx, local_by]));
-                let (from, to) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
-                let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
-                record[..ANCHORS].copy_from_slice(&[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]);
+                record[..ANCHORS].copy_from_slice(&placed_anchors::<L>(
+                    &self.anchors,
+                    on.poses,
+                    joints,
+                    [a, b],
+                ));
                 let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
                 if filled < L::WIDTH {
                     // What the inert row has none of stays zero.
@@ -313,18 +315,35 @@ impl<T: JointType> Joints<T> {
     }
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
-        self.pass::<L, _>(on, false, |pair| JointWarmStart { pair, driving: false });
+        let of = |pair| JointWarmStart { pair, driving: false };
+        if self.aside.is_empty() {
+            self.pass::<L, _>(on, false, of)
+        } else {
+            self.pass_besides::<L, _>(on, of)
+        }
     }
 
     fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
-        self.pass::<L, _>(on, false, |pair| Velocities { pair, by });
+        let of = |pair| Velocities { pair, by };
+        if self.aside.is_empty() {
+            self.pass::<L, _>(on, false, of)
+        } else {
+            self.pass_besides::<L, _>(on, of)
+        }
     }
 
-    /// As [`Self::sweep`], without the rigid rows that are set aside.
+    /// As [`Self::pass`] over velocities, without the rigid rows that are set aside.
     #[inline(never)]
-    fn sweep_besides<L: Lanes>(&self, by: VelocityRule, mut on: TypeInput<'_>) {
+    fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
+        &self,
+        mut on: TypeInput<'_>,
+        of: impl Fn(JointPair<L>) -> P,
+    ) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
         let rigid_alone = self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form));
+        if rigid_alone && self.linked.count() == self.joints.len() {
+            return;
+        }
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
@@ -340,16 +359,15 @@ impl<T: JointType> Joints<T> {
                 if rigid_alone && joints.iter().all(|&joint| self.aside[joint as usize]) {
                     continue;
                 }
-                let mut solved = [L::splat(1.0)];
-                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut solved);
+                let mut taken = [L::splat(1.0)];
+                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
                 for (lane, &joint) in lanes.iter_mut().zip(joints) {
                     *lane = if self.aside[joint as usize] { 0.0 } else { 1.0 };
                 }
                 let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
                 let (numbers, kept) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
-                let pair = JointPair::new(bodies, anchors);
-                let mut pass = Besides { of: Velocities { pair, by }, solved: solved[0] };
+                let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
                 T::rows(self.form, numbers, kept, &mut pass);
                 let [a, b] = pass.bodies;
                 if pushes[1] {
@@ -438,17 +456,11 @@ impl<T: JointType> Joints<T> {
     fn pair(&self, joint: usize, Placed { rows, poses }: Placed<'_>) -> (JointPair<f32>, [u32; 2]) {
         let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
-        let [a, b] = names.map(|body| body as usize);
-        let Quad([ax, ay, bx, by]) = self.anchors[joint];
-        let turned = |body: usize, [x, y]: [f32; 2]| {
-            let [cos, sin, ..] = poses[body].rotation;
-            [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
-        };
-        let (ra, rb, from, to) =
-            (turned(a, [ax, ay]), turned(b, [bx, by]), poses[a].position, poses[b].position);
-        let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
-        let bodies = [a, b].map(|body| bytemuck::cast(rows[body]));
-        (JointPair::new(bodies, &[ra[0], ra[1], rb[0], rb[1], way[0], way[1]]), names)
+        let [at, of_a, of_b] = [joint as u32, names[0], names[1]].map(|i| [i; MOST_LANES]);
+        let [at, of_a, of_b] = [&at, &of_a, &of_b].map(LaneIndex::new);
+        let anchors = placed_anchors::<f32>(&self.anchors, poses, at, [of_a, of_b]);
+        let bodies = names.map(|body| bytemuck::cast(rows[body as usize]));
+        (JointPair::new(bodies, &anchors), names)
     }
 
     /// States the rows of one joint, in one lane, to a pass over `blocks`; `booked`: with the impulses of the step.
@@ -459,6 +471,26 @@ impl<T: JointType> Joints<T> {
         let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
         rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
     }
+}
+
+/// The numbers that every record begins with, [`ANCHORS`], of joints between these bodies.
+#[inline(always)]
+fn placed_anchors<L: Lanes>(
+    anchors: &[Quad],
+    poses: &[PoseRow],
+    joints: LaneIndex<L::Index>,
+    [a, b]: [LaneIndex<L::Index>; 2],
+) -> [L; ANCHORS] {
+    let poses: &[Quad] = bytemuck::cast_slice(poses);
+    let [local_ax, local_ay, local_bx, local_by] = L::gather_quads::<1, 0>(anchors, joints);
+    let turned = |row, [x, y]: [L; 2]| {
+        let [cos, sin, ..] = L::gather_quads::<2, 1>(poses, row);
+        [cos.mul_add(x, -(sin * y)), sin.mul_add(x, cos * y)]
+    };
+    let (ra, rb) = (turned(a, [local_ax, local_ay]), turned(b, [local_bx, local_by]));
+    let (from, to) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
+    let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
+    [ra[0], ra[1], rb[0], rb[1], way[0], way[1]]
 }
 
 /// [`JointType::rows`] where speed does not matter: compiled once.
@@ -541,11 +573,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
                     relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
                     inv_h,
                 };
-                if self.aside.is_empty() {
-                    at_width!(width, Self::sweep(self, by, on))
-                } else {
-                    at_width!(width, Self::sweep_besides(self, by, on))
-                }
+                at_width!(width, Self::sweep(self, by, on))
             }
             _ => {}
         }
@@ -564,29 +592,20 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.state(constraint, on, Blocks::To(to), true);
     }
 
-    fn is_rigid(&self) -> bool {
-        self.rigid.is_some()
+    fn rigid_size(&self) -> usize {
+        self.rigid.map_or(0, |[_, rows]| rows)
     }
 
-    fn rigid_rows(&mut self, constraint: usize, on: Placed<'_>) -> RigidRows {
-        let (pair, names) = self.pair(constraint, on);
-        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
-        let numbers = &self.numbers[constraint * numbers..][..numbers];
-        let mut found = RigidFinder { pair, rows: RigidRows::none(names), blocks: 0 };
-        T::rows(self.form, numbers, &mut self.kept[constraint * kept..][..kept], &mut found);
-        found.rows
+    fn link(&mut self, links: &[ChainLink], poses: &[PoseRow]) {
+        self.take_links(links, poses);
     }
 
-    fn add_to_rigid(&mut self, constraint: usize, increments: [f32; ROWS]) {
-        let Some([place, rows]) = self.rigid else { return };
-        let kept = T::kept(self.form);
-        let impulses = &mut self.kept[constraint * kept + place..][..rows];
-        impulses.iter_mut().zip(increments).for_each(|(impulse, more)| *impulse += more);
+    fn link_rows(&mut self, rows: &[BodyRow], inv_h: f32, to: &mut LinkRows) {
+        self.write_links(rows, inv_h, to);
     }
 
-    fn set_aside(&mut self, which: &[bool]) {
-        self.aside.clear();
-        self.aside.extend_from_slice(which);
+    fn set_linked(&mut self, impulses: &LinkImpulses) {
+        self.keep_links(impulses);
     }
 
     fn impulses(&self, constraint: usize) -> &[f32] {
@@ -611,6 +630,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
             + held(&self.summed)
             + held(&self.angles)
             + held(&self.aside)
+            + self.linked.held_bytes()
     }
 
     fn boxed(&self) -> Box<dyn ConstraintType> {

@@ -48,10 +48,10 @@ use crate::engine::constraints::kernels::pass::VectorTask;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::numerics::small::solve;
 use crate::engine::constraints::records::rows::ROWS;
-pub use crate::engine::constraints::records::rows::{Jacobian, RigidRows, RowBlock, RowLaw, cross};
+pub use crate::engine::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
 use crate::engine::lanes::Lanes;
 use std::f32::consts::TAU;
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 
 /// S and D of a spring of `hertz` and `damping_ratio` in substeps of `h` (s).
 pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
@@ -97,15 +97,22 @@ macro_rules! is_pair {
                 &self.pair
             }
         }
+
+        impl<$($generic),*> DerefMut for $pass<$($generic),*> {
+            #[inline(always)]
+            fn deref_mut(&mut self) -> &mut JointPair<L> {
+                &mut self.pair
+            }
+        }
     )*};
 }
 is_pair! { JointWarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
 
-impl<L> Deref for Besides<L> {
+impl<L, P: Deref<Target = JointPair<L>>> Deref for Besides<L, P> {
     type Target = JointPair<L>;
     #[inline(always)]
     fn deref(&self) -> &JointPair<L> {
-        &self.of.pair
+        &self.of
     }
 }
 
@@ -201,6 +208,12 @@ impl<L: Lanes> JointPair<L> {
         j.arms[1].mul_add(b[w], j.arms[0].neg_mul_add(a[w], along))
     }
 
+    /// J v (m/s or rad/s)
+    #[inline(always)]
+    pub(crate) fn speed(&self, j: &Jacobian<L>) -> L {
+        self.rate(j, VELOCITY)
+    }
+
     #[inline(always)]
     fn apply(&mut self, j: &Jacobian<L>, impulse: L, [x, y, w]: [usize; 3]) {
         let [a, b] = &mut self.bodies;
@@ -265,29 +278,29 @@ pub(super) struct Velocities<L> {
     pub by: VelocityRule,
 }
 
-/// Solves velocities of all rows but the rigid ones of some joints.
+/// A pass over velocities, without the rigid rows of some joints.
 #[derive(Debug)]
-pub(super) struct Besides<L> {
-    pub of: Velocities<L>,
-    /// 1 where rigid rows are solved, 0 where they are left alone.
-    pub solved: L,
+pub(super) struct Besides<L, P> {
+    pub of: P,
+    /// 1 where rigid rows take part, 0 where they are left alone.
+    pub taken: L,
 }
 
-impl<L: Lanes> JointPass<L> for Besides<L> {
+impl<L: Lanes, P: JointPass<L> + DerefMut> JointPass<L> for Besides<L, P> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
         if !matches!(law, RowLaw::Rigid) {
             return self.of.block(j, error, law, kept);
         }
-        let (mut before, bodies) = ([L::zero(); N], self.of.pair.bodies);
+        let (mut before, bodies) = ([L::zero(); N], self.of.bodies);
         before.copy_from_slice(&kept[..N]);
         self.of.block(j, error, law, kept);
         for (new, old) in kept.iter_mut().zip(before) {
-            *new = self.solved.select_positive(*new, old);
+            *new = self.taken.select_positive(*new, old);
         }
-        for (body, old) in self.of.pair.bodies.iter_mut().zip(bodies) {
+        for (body, old) in self.of.bodies.iter_mut().zip(bodies) {
             for k in VELOCITY {
-                body[k] = self.solved.select_positive(body[k], old[k]);
+                body[k] = self.taken.select_positive(body[k], old[k]);
             }
         }
     }
@@ -561,30 +574,25 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
     }
 }
 
-/// Finds the rigid rows of one joint.
+/// Finds the rigid blocks of a joint: how many there are, and rows and first kept number of the last one.
 #[derive(Debug)]
 pub(super) struct RigidFinder {
     pub pair: JointPair<f32>,
-    pub rows: RigidRows,
-    /// Blocks of them.
     pub blocks: usize,
+    pub rows: usize,
+    pub first: f32,
 }
 
 impl JointPass<f32> for RigidFinder {
-    #[inline(always)]
     fn block<const N: usize>(
         &mut self,
-        j: [Jacobian<f32>; N],
-        error: [f32; N],
+        _: [Jacobian<f32>; N],
+        _: [f32; N],
         law: RowLaw<f32>,
-        impulse: &mut [f32],
+        kept: &mut [f32],
     ) {
         if matches!(law, RowLaw::Rigid) {
-            self.blocks += 1;
-            self.rows.size = N;
-            self.rows.jacobians[..N].copy_from_slice(&j);
-            self.rows.errors[..N].copy_from_slice(&error);
-            self.rows.impulses[..N].copy_from_slice(&impulse[..N]);
+            (self.blocks, self.rows, self.first) = (self.blocks + 1, N, kept[0]);
         }
     }
 }

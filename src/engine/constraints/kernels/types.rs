@@ -16,8 +16,9 @@ use crate::engine::constraints::kernels::pass::{PassMode, PassWidth};
 use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
+use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows};
 use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::constraints::records::rows::{ROWS, RigidRows, RowBlock};
+use crate::engine::constraints::records::rows::RowBlock;
 use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::any::Any;
@@ -169,21 +170,20 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Takes over the impulses of its `blocks`, which are those of [`Self::collect`].
     fn replace(&mut self, _constraint: usize, _on: Placed<'_>, _blocks: &[RowBlock]) {}
 
-    /// Whether a constraint has one block of rigid rows, so that [`Self::rigid_rows`] has some.
-    fn is_rigid(&self) -> bool {
-        false
+    /// Rows of the rigid block that each constraint has; 0 if there is none, or more than one.
+    fn rigid_size(&self) -> usize {
+        0
     }
 
-    /// The rigid rows of a constraint as bodies are now: for solvers that solve those of many at once.
-    fn rigid_rows(&mut self, constraint: usize, _on: Placed<'_>) -> RigidRows {
-        RigidRows::none(self.ends()[constraint])
-    }
+    /// These constraints are links of chains from now on, and no others: the others' passes leave their rigid rows alone. In the
+    /// order of their slots; `poses` are those at the start of the step.
+    fn link(&mut self, _links: &[ChainLink], _poses: &[PoseRow]) {}
 
-    /// Adds to the accumulated impulses of the rigid rows; records take them up in [`PassMode::TakeUp`].
-    fn add_to_rigid(&mut self, _constraint: usize, _increments: [f32; ROWS]) {}
+    /// Writes the rigid rows of links as bodies are now, in a substep of 1/`inv_h` (s).
+    fn link_rows(&mut self, _rows: &[BodyRow], _inv_h: f32, _to: &mut LinkRows) {}
 
-    /// Velocity sweeps leave rigid rows of these constraints alone; empty: of none. `[constraints]`
-    fn set_aside(&mut self, _which: &[bool]) {}
+    /// Sets the impulses of links; records take them up in [`PassMode::TakeUp`].
+    fn set_linked(&mut self, _impulses: &LinkImpulses) {}
 
     /// Accumulated impulses of a constraint (N·s or N·m·s), for those who ask.
     fn impulses(&self, _constraint: usize) -> &[f32] {

@@ -2,7 +2,7 @@
 //!
 //! [`features`] says which numbers a scene needs and where a record keeps them, [`batches`] and [`segment`] how records
 //! follow each other, and [`order`] in which order a sweep visits them. [`rows`] are
-//! those of joints, one by one. [`graph`], [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
+//! those of joints, one by one, and [`links`] those of chains of joints. [`graph`], [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
 
 pub mod batches;
 #[doc(hidden)]
@@ -11,6 +11,7 @@ pub mod features;
 #[doc(hidden)]
 pub mod graph;
 pub mod kept;
+pub mod links;
 pub mod order;
 pub mod point_vector;
 pub mod rows;

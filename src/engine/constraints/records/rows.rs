@@ -92,34 +92,6 @@ pub struct RowBlock {
     pub reach: [f32; 2],
 }
 
-/// The rows of one joint that hold an error at zero, as bodies are now.
-#[derive(Clone, Copy, Debug)]
-pub struct RigidRows {
-    /// a and b.
-    pub bodies: [u32; 2],
-    /// Rows; none if the joint has no such block.
-    pub size: usize,
-    /// J. `[size]`
-    pub jacobians: [Jacobian<f32>; ROWS],
-    /// C (m or rad). `[size]`
-    pub errors: [f32; ROWS],
-    /// λ (N·s or N·m·s). `[size]`
-    pub impulses: [f32; ROWS],
-}
-
-impl RigidRows {
-    /// None of the bodies a and b.
-    pub fn none(bodies: [u32; 2]) -> Self {
-        let none = Jacobian { axis: [0.0; 2], arms: [0.0; 2] };
-        RigidRows { bodies, size: 0, jacobians: [none; ROWS], errors: [0.0; ROWS], impulses: [0.0; ROWS] }
-    }
-
-    /// Whether they hold two points together, along x and y.
-    pub fn is_point(&self) -> bool {
-        self.size == 2 && [self.jacobians[0].axis, self.jacobians[1].axis] == [[1.0, 0.0], [0.0, 1.0]]
-    }
-}
-
 /// Rows of the largest block.
 pub const ROWS: usize = 3;
 

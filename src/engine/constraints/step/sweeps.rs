@@ -2,7 +2,7 @@
 
 use super::{Passes, ROW, Workspace};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::trees::Trees;
+use crate::engine::constraints::joints::chains::Chains;
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
@@ -50,28 +50,33 @@ impl Passes<'_> {
         }
     }
 
-    /// Finds the joints that [`Self::solve_trees`] solves, which sweeps leave alone until [`Self::rejoin_trees`].
-    pub fn find_trees(&mut self, trees: &mut Trees) {
+    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until [`Self::unlink_chains`].
+    pub fn find_chains(&mut self, chains: &mut Chains) {
         if !self.work.types.is_empty() {
-            trees.find(&self.work.types, &self.work.rows);
-            trees.set_aside(&mut self.work.types);
+            chains.find(&self.work.types, &self.work.rows);
+            chains.set_aside(&mut self.work.types, &self.work.poses);
         }
     }
 
-    /// Pass over joints alone: solves the rigid rows of trees of joints at once.
-    pub fn solve_trees(&mut self, trees: &mut Trees) {
-        if !trees.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
-            let Workspace { rows, types, poses, .. } = &mut *self.work;
-            trees.solve(types, rows, poses, self.input.h);
-            // Types of the caller's own take it for what it is to them, storing.
-            self.over_types_alone(Phase::Store, PassMode::TakeUp);
+    /// Pass over joints alone: solves the rigid rows of chains of joints at once, under `gravity` (m/s²). `keeps`: their impulses
+    /// are kept, as those of the last substep are.
+    pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, keeps: bool) {
+        if !chains.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            let Workspace { rows, types, .. } = &mut *self.work;
+            chains.solve(types, rows, self.input.h, gravity);
+            if keeps || self.input.record_impulses {
+                chains.give_impulses(types);
+                // Types of the caller's own take it for what it is to them, storing.
+                self.over_types_alone(Phase::Store, PassMode::TakeUp);
+            }
             self.clock.lap(Phase::Solve);
         }
     }
 
     /// Sweeps solve all joints again.
-    pub fn rejoin_trees(&mut self) {
-        self.work.types.iter_mut().for_each(|joined| joined.kind.set_aside(&[]));
+    pub fn unlink_chains(&mut self) {
+        let Workspace { types, poses, .. } = &mut *self.work;
+        types.iter_mut().for_each(|joined| joined.kind.link(&[], poses));
     }
 
     /// Pass over joints alone: their records take up what [`ConstraintType::replace`] has changed.

@@ -1,0 +1,527 @@
+//! The block tridiagonal system of all chains, in lanes.
+//!
+//! # Partition
+//!
+//! The n links of a scene, chain after chain, are cut into eight runs of m, one for each lane. With the blocks D (diagonal, K_ii), C
+//! (to the next link) and E (to the last link of the lane before, which elimination fills in; at first that of the lane's first
+//! link), each lane eliminates all of its links but the last, in the order of their run (`wang1981`):
+//!
+//! ```text
+//! X = D⁻¹ C,   Y = D⁻¹ E,   z = D⁻¹ b
+//! D' ← D' − Cᵀ X,     E' = −Cᵀ Y,     b' ← b' − Cᵀ z         of the next link
+//! D'' ← D'' − Eᵀ Y,                   b'' ← b'' − Eᵀ z       of the last link of the lane before
+//! ```
+//!
+//! and, once their last links are known, λ = z − X λ' − Y λ''.
+//!
+//! # Last links
+//!
+//! What is left, one link a lane, is solved by cyclic reduction in three steps (`hockney1965`). With F the block to the lane d on, the
+//! transposed E of that lane, and p, q the lanes d before and d on,
+//!
+//! ```text
+//! D ← D − E D_p⁻¹ Eᵀ − F D_q⁻¹ Fᵀ,     b ← b − E D_p⁻¹ b_p − F D_q⁻¹ b_q,     E ← −E D_p⁻¹ E_p       d = 1, 2, 4
+//! ```
+//!
+//! Both need that D can be inverted; K is positive definite, and so are its Schur complements. The order is that of the links,
+//! whatever the width of the step: the same bits at any. A row that moves nothing, or is none, has 1 on the diagonal and no impulse.
+//!
+//! A link of two rows takes some 110 multiplications in `f64`, an eighth of them at a time; what waits for each other is m
+//! inverses of D. Bridges of 160 links take 0.8 µs a substep, and 0.45 µs for their rows, 8 ns a link (AVX-512).
+
+use crate::engine::constraints::records::links::{LINK_LANES, LinkImpulses, LinkRows};
+use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
+use wide::{f32x8, f64x8};
+
+/// The links of all chains.
+#[derive(Clone, Debug, Default)]
+pub struct ChainSystem {
+    /// Links in a lane; m.
+    groups: usize,
+    rows: LinkRows,
+    impulses: LinkImpulses,
+    /// Links of the chain of each, where it hangs at both ends; else 0. `[groups]`
+    spans: Vec<f64x8>,
+    /// Body of each slot away from where its chain hangs, or the inert one. `[groups × lanes]`
+    bodies: Indices,
+    /// X, Y and z. `[groups × (2 size² + size)]`
+    eliminated: Vec<f64x8>,
+}
+
+/// γ (1) at least.
+const LEAST_GIVE: f64 = 1e-6;
+
+type LaneVector<const N: usize> = [f64x8; N];
+type LaneMatrix<const N: usize> = [[f64x8; N]; N];
+
+impl ChainSystem {
+    /// Makes room for so many links of `size` rows at most.
+    pub fn begin(&mut self, links: usize, size: usize) {
+        // One row is solved as two.
+        let size = size.max(2);
+        let groups = links.div_ceil(LINK_LANES);
+        self.groups = groups;
+        self.rows.begin(size, groups);
+        self.impulses.begin(size, groups);
+        self.spans.clear();
+        self.spans.resize(groups, f64x8::ZERO);
+        self.eliminated.clear();
+        self.eliminated.resize(groups * (2 * size * size + size), f64x8::ZERO);
+    }
+
+    /// Slot of link `i`.
+    pub fn slot(&self, i: usize) -> usize {
+        i % self.groups * LINK_LANES + i / self.groups
+    }
+
+    /// Says that a slot is of a chain of so many links that hangs at both ends.
+    pub fn set_span(&mut self, slot: usize, links: usize) {
+        self.spans[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = links as f64;
+    }
+
+    /// Sets the bodies away from where chains hang, slot by slot, as many as there are slots.
+    pub fn set_bodies(&mut self, bodies: &[u32]) {
+        self.bodies.clear();
+        self.bodies.extend(bodies);
+    }
+
+    /// Slots: links, and lanes without one.
+    pub fn slots(&self) -> usize {
+        self.groups * LINK_LANES
+    }
+
+    /// Whether there are no links.
+    pub fn is_empty(&self) -> bool {
+        self.groups == 0
+    }
+
+    /// For types to fill.
+    pub fn rows(&mut self) -> &mut LinkRows {
+        &mut self.rows
+    }
+
+    /// After [`Self::solve`].
+    pub fn impulses(&self) -> &LinkImpulses {
+        &self.impulses
+    }
+
+    /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
+    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f64) {
+        match self.rows.size() {
+            2 => self.solve_rows::<2>(rows, fall),
+            _ => self.solve_rows::<3>(rows, fall),
+        }
+    }
+
+    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f64) {
+        let fall = f64x8::splat(fall * fall);
+        let stride = 2 * N * N + N;
+        let last = self.groups - 1;
+        let first = Link::<N>::of(self.rows.group(0));
+        let before = Link::<N>::of(self.rows.group(last)).shifted(up::<1>);
+        let mut here = first;
+        let (mut pivot, mut b) = here.diagonal(self.spans[0], fall);
+        let mut e = transposed(before.coupling(&first));
+        let (mut d_before, mut b_before) = ([[f64x8::ZERO; N]; N], [f64x8::ZERO; N]);
+        for k in 0..last {
+            let next = Link::<N>::of(self.rows.group(k + 1));
+            let c = here.coupling(&next);
+            let inverse = inverse(pivot);
+            let (x, y, z) = (product(&inverse, &c), product(&inverse, &e), times(&inverse, &b));
+            let to = &mut self.eliminated[k * stride..][..stride];
+            to[..N * N].copy_from_slice(x.as_flattened());
+            to[N * N..2 * N * N].copy_from_slice(y.as_flattened());
+            to[2 * N * N..].copy_from_slice(&z);
+            let e_transposed = transposed(e);
+            d_before = minus(d_before, &e_transposed, &y);
+            b_before = less(b_before, &e_transposed, &z);
+            let c = transposed(c);
+            (pivot, b) = next.diagonal(self.spans[k + 1], fall);
+            pivot = minus(pivot, &c, &x);
+            b = less(b, &c, &z);
+            e = minus([[f64x8::ZERO; N]; N], &c, &y);
+            here = next;
+        }
+        for r in 0..N {
+            b[r] += down::<1>(b_before[r]);
+            for c in 0..N {
+                pivot[r][c] += down::<1>(d_before[r][c]);
+            }
+        }
+        reduce::<1, N>(&mut pivot, &mut e, &mut b);
+        reduce::<2, N>(&mut pivot, &mut e, &mut b);
+        reduce::<4, N>(&mut pivot, &mut e, &mut b);
+        let mut impulse = times(&inverse(pivot), &b);
+        self.impulses.group_mut(last).copy_from_slice(&impulse);
+        let mut of_lane_before = impulse;
+        of_lane_before.iter_mut().for_each(|x| *x = up::<1>(*x));
+        let mut next = Link::<N>::of(self.rows.group(last));
+        for k in (0..last).rev() {
+            let from = &self.eliminated[k * stride..][..stride];
+            let of_next = impulse;
+            for r in 0..N {
+                impulse[r] = from[2 * N * N + r];
+                for c in 0..N {
+                    impulse[r] = from[r * N + c].mul_neg_add(of_next[c], impulse[r]);
+                    impulse[r] = from[N * N + r * N + c].mul_neg_add(of_lane_before[c], impulse[r]);
+                }
+            }
+            self.impulses.group_mut(k).copy_from_slice(&impulse);
+            let here = Link::<N>::of(self.rows.group(k));
+            push([&here, &next], [&impulse, &of_next], self.bodies_of(k), rows);
+            next = here;
+        }
+        // Of lanes' last links, the next are the first ones of the lanes after.
+        let here = Link::<N>::of(self.rows.group(last));
+        let mut of_last = impulse;
+        of_last.copy_from_slice(self.impulses.group(last));
+        let (next, mut of_next) = (first.shifted(down::<1>), impulse);
+        of_next.iter_mut().for_each(|x| *x = down::<1>(*x));
+        push([&here, &next], [&of_last, &of_next], self.bodies_of(last), rows);
+    }
+
+    fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
+        self.bodies.list().batch(group)
+    }
+
+    /// Bytes held.
+    pub fn held_bytes(&self) -> usize {
+        self.rows.held_bytes()
+            + self.impulses.held_bytes()
+            + held(&self.spans)
+            + self.bodies.held_bytes()
+            + held(&self.eliminated)
+    }
+}
+
+/// Links of a group.
+#[derive(Clone, Copy)]
+struct Link<const N: usize> {
+    axis: [[f64x8; 2]; N],
+    /// s_L and s_R.
+    arms: [LaneVector<N>; 2],
+    b: LaneVector<N>,
+    /// Inverse masses and inertias of L and R.
+    mass: [f64x8; 2],
+    inertia: [f64x8; 2],
+}
+
+impl<const N: usize> Link<N> {
+    #[inline(always)]
+    fn of(numbers: &[f32x8]) -> Self {
+        let zero = [f64x8::ZERO; N];
+        let mut link = Link {
+            axis: [[f64x8::ZERO; 2]; N],
+            arms: [zero; 2],
+            b: zero,
+            mass: [f64x8::ZERO; 2],
+            inertia: [f64x8::ZERO; 2],
+        };
+        for r in 0..N {
+            let at = |i: usize| widened(numbers[5 * r + i]);
+            link.axis[r] = [at(0), at(1)];
+            (link.arms[0][r], link.arms[1][r], link.b[r]) = (at(2), at(3), at(4));
+        }
+        let at = |i: usize| widened(numbers[5 * N + i]);
+        (link.mass, link.inertia) = ([at(0), at(1)], [at(2), at(3)]);
+        link
+    }
+
+    /// Of the lane before, or the one after.
+    #[inline(always)]
+    fn shifted(mut self, by: impl Fn(f64x8) -> f64x8) -> Self {
+        for r in 0..N {
+            self.axis[r] = [by(self.axis[r][0]), by(self.axis[r][1])];
+            (self.arms[0][r], self.arms[1][r]) = (by(self.arms[0][r]), by(self.arms[1][r]));
+        }
+        for side in 0..2 {
+            (self.mass[side], self.inertia[side]) = (by(self.mass[side]), by(self.inertia[side]));
+        }
+        self
+    }
+
+    /// (1 + γ) K_ii and b, with γ of chains that hang at both ends. `fall`: (g h²)² (m²).
+    #[inline(always)]
+    fn diagonal(&self, span: f64x8, fall: f64x8) -> (LaneMatrix<N>, LaneVector<N>) {
+        // The length of a link is that of two arms, each of which has s² = |r|² of two rows.
+        let mut square = f64x8::splat(1e-12);
+        for arms in self.arms {
+            square = arms[1].mul_add(arms[1], arms[0].mul_add(arms[0], square));
+        }
+        let grows = f64x8::splat(2.0 / 3.0) * fall * (span * span) / square;
+        let gives =
+            f64x8::ONE + span.simd_gt(f64x8::ZERO).select(grows + f64x8::splat(LEAST_GIVE), f64x8::ZERO);
+        let ([left, right], mass) = (self.arms, self.mass[0] + self.mass[1]);
+        let mut k = [[f64x8::ZERO; N]; N];
+        let mut b = self.b;
+        for r in 0..N {
+            for c in 0..=r {
+                let turning =
+                    (self.inertia[0] * left[r]).mul_add(left[c], (self.inertia[1] * right[r]) * right[c]);
+                k[r][c] = gives * mass.mul_add(along(self.axis[r], self.axis[c]), turning);
+                k[c][r] = k[r][c];
+            }
+            let moves = k[r][r].simd_gt(f64x8::ZERO);
+            k[r][r] = moves.select(k[r][r], f64x8::ONE);
+            b[r] = moves.select(b[r], f64x8::ZERO);
+        }
+        (k, b)
+    }
+
+    /// C, to the next link.
+    #[inline(always)]
+    fn coupling(&self, next: &Self) -> LaneMatrix<N> {
+        let mut block = [[f64x8::ZERO; N]; N];
+        for (r, row) in block.iter_mut().enumerate() {
+            let turn = -(next.inertia[0] * self.arms[1][r]);
+            for (c, entry) in row.iter_mut().enumerate() {
+                let turning = turn * next.arms[0][c];
+                *entry = next.mass[0].mul_neg_add(along(self.axis[r], next.axis[c]), turning);
+            }
+        }
+        block
+    }
+}
+
+/// Gives impulses to the bodies R of links: of these links, and of the next ones that hang from R.
+#[inline(always)]
+fn push<const N: usize>(
+    [here, next]: [&Link<N>; 2],
+    [own, others]: [&LaneVector<N>; 2],
+    bodies: LaneIndex<[u32; LINK_LANES]>,
+    rows: &mut [BodyRow],
+) {
+    let (mut of_own, mut of_others) = ([f64x8::ZERO; 3], [f64x8::ZERO; 3]);
+    for r in 0..N {
+        let [x, y] = here.axis[r];
+        for (sum, j) in of_own.iter_mut().zip([x, y, here.arms[1][r]]) {
+            *sum = j.mul_add(own[r], *sum);
+        }
+        let [x, y] = next.axis[r];
+        for (sum, j) in of_others.iter_mut().zip([x, y, next.arms[0][r]]) {
+            *sum = j.mul_add(others[r], *sum);
+        }
+    }
+    let of_side = |link: &Link<N>, side: usize| [link.mass[side], link.mass[side], link.inertia[side]];
+    let (here, next) = (of_side(here, 1), of_side(next, 0));
+    let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+    for (k, v) in velocity[..3].iter_mut().enumerate() {
+        let more = here[k] * of_own[k] - next[k] * of_others[k];
+        *v += narrowed(more);
+    }
+    f32x8::scatter_velocity(rows, bodies, velocity);
+}
+
+/// One step of cyclic reduction, between lanes `D` apart.
+#[inline(always)]
+fn reduce<const D: usize, const N: usize>(
+    d: &mut LaneMatrix<N>,
+    e: &mut LaneMatrix<N>,
+    b: &mut LaneVector<N>,
+) {
+    let inverse = inverse(*d);
+    let z = times(&inverse, b);
+    let (f, e_p) = (transposed(all_down::<D, N>(*e)), all_up::<D, N>(*e));
+    let to_p = product(e, &all_up::<D, N>(inverse));
+    let to_q = product(&f, &all_down::<D, N>(inverse));
+    *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
+    let (mut z_p, mut z_q) = (z, z);
+    for r in 0..N {
+        (z_p[r], z_q[r]) = (up::<D>(z[r]), down::<D>(z[r]));
+    }
+    *b = less(less(*b, e, &z_p), &f, &z_q);
+    *e = minus([[f64x8::ZERO; N]; N], &to_p, &e_p);
+}
+
+/// Of the lane `D` before, or 0.
+#[inline(always)]
+fn up<const D: usize>(x: f64x8) -> f64x8 {
+    let mut to = f64x8::ZERO;
+    to.as_mut_array()[D..].copy_from_slice(&x.as_array()[..LINK_LANES - D]);
+    to
+}
+
+/// Of the lane `D` on, or 0.
+#[inline(always)]
+fn down<const D: usize>(x: f64x8) -> f64x8 {
+    let mut to = f64x8::ZERO;
+    to.as_mut_array()[..LINK_LANES - D].copy_from_slice(&x.as_array()[D..]);
+    to
+}
+
+#[inline(always)]
+fn widened(x: f32x8) -> f64x8 {
+    let mut to = f64x8::ZERO;
+    to.as_mut_array().iter_mut().zip(x.as_array()).for_each(|(to, &x)| *to = f64::from(x));
+    to
+}
+
+#[inline(always)]
+fn narrowed(x: f64x8) -> f32x8 {
+    let mut to = f32x8::ZERO;
+    to.as_mut_array().iter_mut().zip(x.as_array()).for_each(|(to, &x)| *to = x as f32);
+    to
+}
+
+#[inline(always)]
+fn along(u: [f64x8; 2], v: [f64x8; 2]) -> f64x8 {
+    u[0].mul_add(v[0], u[1] * v[1])
+}
+
+#[inline(always)]
+fn transposed<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
+    let mut to = m;
+    for r in 0..N {
+        for c in 0..N {
+            to[r][c] = m[c][r];
+        }
+    }
+    to
+}
+
+/// A B
+#[inline(always)]
+fn product<const N: usize>(a: &LaneMatrix<N>, b: &LaneMatrix<N>) -> LaneMatrix<N> {
+    let mut to = *a;
+    for r in 0..N {
+        for c in 0..N {
+            to[r][c] = a[r][0] * b[0][c];
+            for k in 1..N {
+                to[r][c] = a[r][k].mul_add(b[k][c], to[r][c]);
+            }
+        }
+    }
+    to
+}
+
+/// A x
+#[inline(always)]
+fn times<const N: usize>(a: &LaneMatrix<N>, x: &LaneVector<N>) -> LaneVector<N> {
+    let mut to = *x;
+    for r in 0..N {
+        to[r] = a[r][0] * x[0];
+        for k in 1..N {
+            to[r] = a[r][k].mul_add(x[k], to[r]);
+        }
+    }
+    to
+}
+
+/// M − A B
+#[inline(always)]
+fn minus<const N: usize>(mut m: LaneMatrix<N>, a: &LaneMatrix<N>, b: &LaneMatrix<N>) -> LaneMatrix<N> {
+    for r in 0..N {
+        for c in 0..N {
+            for k in 0..N {
+                m[r][c] = a[r][k].mul_neg_add(b[k][c], m[r][c]);
+            }
+        }
+    }
+    m
+}
+
+/// x − A y
+#[inline(always)]
+fn less<const N: usize>(mut x: LaneVector<N>, a: &LaneMatrix<N>, y: &LaneVector<N>) -> LaneVector<N> {
+    for r in 0..N {
+        for k in 0..N {
+            x[r] = a[r][k].mul_neg_add(y[k], x[r]);
+        }
+    }
+    x
+}
+
+/// Each number of the lane `D` before.
+#[inline(always)]
+fn all_up<const D: usize, const N: usize>(mut m: LaneMatrix<N>) -> LaneMatrix<N> {
+    m.as_flattened_mut().iter_mut().for_each(|x| *x = up::<D>(*x));
+    m
+}
+
+/// Each number of the lane `D` on.
+#[inline(always)]
+fn all_down<const D: usize, const N: usize>(mut m: LaneMatrix<N>) -> LaneMatrix<N> {
+    m.as_flattened_mut().iter_mut().for_each(|x| *x = down::<D>(*x));
+    m
+}
+
+/// The inverse of a symmetric, positive definite matrix; zeros where rounding has made it none.
+#[inline(always)]
+fn inverse<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
+    let mut adjugate = m;
+    if N == 2 {
+        (adjugate[0][0], adjugate[1][1]) = (m[1][1], m[0][0]);
+        (adjugate[0][1], adjugate[1][0]) = (-m[0][1], -m[0][1]);
+    } else {
+        for r in 0..N {
+            for c in 0..=r {
+                let ([i, j], [k, l]) = (OTHERS[r], OTHERS[c]);
+                adjugate[r][c] = m[i][k].mul_add(m[j][l], -(m[i][l] * m[j][k]));
+                adjugate[c][r] = adjugate[r][c];
+            }
+        }
+    }
+    let mut determinant = m[0][0] * adjugate[0][0];
+    for k in 1..N {
+        determinant = m[0][k].mul_add(adjugate[k][0], determinant);
+    }
+    let scale = determinant.simd_gt(f64x8::ZERO).select(f64x8::ONE / determinant, f64x8::ZERO);
+    adjugate.as_flattened_mut().iter_mut().for_each(|x| *x *= scale);
+    adjugate
+}
+
+/// The other two of three.
+const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Bodies begin at rest; b says how fast rows shall be.
+        #[test]
+        fn rows_of_all_chains_hold_afterwards(
+            size in 2usize..=3,
+            links in 1usize..40,
+            numbers in prop::collection::vec(-1.0f32..1.0, 40 * 20),
+        ) {
+            let mut system = ChainSystem::default();
+            system.begin(links, size);
+            let mut bodies = vec![links as u32; system.slots()];
+            let mut rows = vec![BodyRow { velocity: [0.0; 4], delta: [0.0; 4] }; links + 1];
+            let of = |i: usize| &numbers[20 * i..][..20];
+            // A fifth of the chains end at each link; bodies differ in mass, up to a hundredfold.
+            let begins = |i: usize| i == 0 || of(i)[0] > 0.6;
+            let mass = |i: usize| [of(i)[1].abs() + 0.01, of(i)[2].abs() + 0.01];
+            let row = |i: usize, r: usize| {
+                let at = &of(i)[3 + 5 * r..][..5];
+                // Rows of a joint differ in direction.
+                let axis = if r < 2 { [[1.0, 0.5 * at[0]], [0.5 * at[1], 1.0]][r] } else { [0.0; 2] };
+                [axis[0], axis[1], 0.5 * at[2] + r as f32, 0.5 * at[3] + r as f32, at[4]]
+            };
+            for i in 0..links {
+                let slot = system.slot(i);
+                bodies[slot] = i as u32;
+                let left = if begins(i) { [0.0; 2] } else { mass(i - 1) };
+                let masses = [left[0], mass(i)[0], left[1], mass(i)[1]];
+                let group = system.rows().group_mut(slot / LINK_LANES);
+                for (k, x) in (0..size).flat_map(|r| row(i, r)).chain(masses).enumerate() {
+                    group[k].as_mut_array()[slot % LINK_LANES] = x;
+                }
+            }
+            system.set_bodies(&bodies);
+            system.solve(&mut rows, 0.0);
+            for i in 0..links {
+                let of_left = if begins(i) { [0.0; 4] } else { rows[i - 1].velocity };
+                for r in 0..size {
+                    let [x, y, left, right, b] = row(i, r);
+                    let speed = |v: [f32; 4], arm: f32| x * v[0] + y * v[1] + arm * v[2];
+                    let off = speed(rows[i].velocity, right) - speed(of_left, left) - b;
+                    prop_assert!(off.abs() < 1e-3, "{size} rows, link {i} of {links}: {off}");
+                }
+            }
+            prop_assert_eq!(rows[links].velocity, [0.0; 4]);
+        }
+    }
+}
