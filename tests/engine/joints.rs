@@ -309,6 +309,13 @@ fn a_heavy_chain_hangs_together_beside_what_sweeps_solve_with_the_same_bits_at_e
 }
 
 #[test]
+fn joined_bodies_are_kept_apart_before_the_first_step() {
+    let (mut world, ground) = empty(find("soft_step").unwrap());
+    chain(&mut world, ground, 2, 0.5);
+    assert!(world.keeps_apart(1, 2) && world.keeps_apart(2, 1) && !world.keeps_apart(1, 3));
+}
+
+#[test]
 fn a_bridge_between_two_pins_bears_its_weight_and_a_load() {
     let (mut world, ground) = empty(find("shim").unwrap());
     let (mut before, mut joints) = (ground, vec![]);

@@ -49,6 +49,13 @@ impl JointSlots {
         !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
     }
 
+    fn keep_apart(&mut self, joint: &Joint) {
+        if !joint.collide_connected {
+            let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
+            self.apart.insert([a.min(b), a.max(b)]);
+        }
+    }
+
     fn remove(&mut self, index: usize) {
         self.joints[index] = None;
         self.generation[index] = self.generation[index].wrapping_add(1);
@@ -63,6 +70,7 @@ impl JointSlots {
             self.generation.push(0);
             self.places.push(None);
         }
+        self.keep_apart(&joint);
         self.joints[index] = Some(joint);
         JointHandle { index: index as u32, generation: self.generation[index] }
     }
@@ -95,6 +103,7 @@ impl World {
         self.check_joint(joint)?;
         let joint = joint.placed(&self.bodies);
         joint.kind.check()?;
+        self.joints.keep_apart(&joint);
         self.joints.joints[handle.index()] = Some(joint);
         self.joints_changed();
         Ok(())
@@ -220,7 +229,7 @@ impl World {
         solved
     }
 
-    /// Whether a joint keeps two bodies from colliding.
+    /// Whether a joint keeps two bodies from colliding; one that was removed or changed still does until the next step.
     pub fn keeps_apart(&self, a: usize, b: usize) -> bool {
         self.joints.keeps_apart([a as u32, b as u32])
     }
