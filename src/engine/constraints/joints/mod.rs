@@ -103,8 +103,7 @@ pub struct Joints<T: JointType> {
     summed: Vec<f32>,
     /// Substep that the impulses belong to (s).
     h: f32,
-    /// Links of chains, whose rigid rows sweeps leave alone; empty if there are none. `[joints]`
-    aside: Vec<bool>,
+    /// Links of chains, whose rigid rows sweeps leave alone.
     linked: Linked,
     /// Where the impulses of the rigid block are among the kept numbers, and how many; none unless there is one block.
     rigid: Option<[usize; 2]>,
@@ -115,7 +114,7 @@ impl<T: JointType> Joints<T> {
     /// to (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        let (booked, summed, aside, rigid) = (vec![], vec![], vec![], Self::rigid_block(form));
+        let (booked, summed, rigid) = (vec![], vec![], Self::rigid_block(form));
         let linked = Linked::default();
         Joints {
             joints,
@@ -129,7 +128,6 @@ impl<T: JointType> Joints<T> {
             booked,
             summed,
             h,
-            aside,
             linked,
             rigid,
         }
@@ -316,7 +314,7 @@ impl<T: JointType> Joints<T> {
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
         let of = |pair| JointWarmStart { pair, driving: false };
-        if self.aside.is_empty() {
+        if !self.linked.is_active() {
             self.pass::<L, _>(on, false, of)
         } else {
             self.pass_besides::<L, _>(on, of)
@@ -325,14 +323,14 @@ impl<T: JointType> Joints<T> {
 
     fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
         let of = |pair| Velocities { pair, by };
-        if self.aside.is_empty() {
+        if !self.linked.is_active() {
             self.pass::<L, _>(on, false, of)
         } else {
             self.pass_besides::<L, _>(on, of)
         }
     }
 
-    /// As [`Self::pass`] over velocities, without the rigid rows that are set aside.
+    /// As [`Self::pass`] over velocities, without the rigid rows of links.
     #[inline(never)]
     fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
         &self,
@@ -356,13 +354,13 @@ impl<T: JointType> Joints<T> {
                 parts.records.chunks_exact_mut(stride).zip(indices)
             {
                 let joints = &joints.entries()[..segment.filled(batch, L::WIDTH)];
-                if rigid_alone && joints.iter().all(|&joint| self.aside[joint as usize]) {
+                if rigid_alone && joints.iter().all(|&joint| self.linked.has(joint)) {
                     continue;
                 }
                 let mut taken = [L::splat(1.0)];
                 let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
                 for (lane, &joint) in lanes.iter_mut().zip(joints) {
-                    *lane = if self.aside[joint as usize] { 0.0 } else { 1.0 };
+                    *lane = if self.linked.has(joint) { 0.0 } else { 1.0 };
                 }
                 let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
                 let (numbers, kept) = record.split_at_mut(first_kept);
@@ -380,9 +378,9 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Records take up impulses of the rigid rows that are set aside.
+    /// Records take up impulses of the rigid rows of links.
     fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
-        let Some([place, rows]) = self.rigid.filter(|_| !self.aside.is_empty()) else { return };
+        let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
         let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
@@ -392,7 +390,7 @@ impl<T: JointType> Joints<T> {
                 let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut record[first..][..rows]);
                 for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
                     let joint = joint as usize;
-                    if self.aside[joint] {
+                    if self.linked.has(joint as u32) {
                         let values = &self.kept[joint * kept + place..][..rows];
                         for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
                             to[lane] = value;
@@ -629,7 +627,6 @@ impl<T: JointType> ConstraintType for Joints<T> {
             + held(&self.kept)
             + held(&self.summed)
             + held(&self.angles)
-            + held(&self.aside)
             + self.linked.held_bytes()
     }
 

@@ -7,7 +7,7 @@ use wide::{f32x8, f64x8};
 pub const LINK_LANES: usize = 8;
 
 /// A joint that is a link.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChainLink {
     /// Its number in its type.
     pub joint: u32,

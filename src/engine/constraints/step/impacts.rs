@@ -28,6 +28,9 @@ impl Passes<'_> {
         let Spreading { timed, stops, lead, releases } = spreading;
         let (h, dt) = (self.h(), self.dt());
         let bounces = self.law() != ImpactLaw::None;
+        if self.contacts.is_empty() {
+            return;
+        }
         let Some([least_gain, fastest]) =
             spread::impact_speeds(&self.work.rows, self.work.motion.velocity_increments(), h, dt)
         else {

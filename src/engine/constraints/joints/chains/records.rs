@@ -5,7 +5,7 @@ use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, R
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors};
 use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::engine::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows};
-use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, MOST_LANES, held};
+use crate::engine::lanes::{BodyRow, Indices, Lanes, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::ops::Deref;
 use wide::f32x8;
@@ -16,78 +16,107 @@ const MOST_SPEED: f32 = 10.0;
 /// Links of one type, in batches of one group each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Linked {
+    /// They are solved as links now, and not by sweeps.
+    active: bool,
+    /// In the order of their slots.
+    links: Vec<ChainLink>,
     /// Of each batch.
     groups: Vec<u32>,
     /// Joints, or [`NONE`]. `[batches × lanes]`
     joints: Vec<u32>,
+    /// Joints, or any. `[batches × lanes]`
+    places: Indices,
     /// a and b, or the inert one. `[batches × lanes]`
     bodies: [Indices; 2],
     /// 1 if b is away from where the chain hangs, −1 if a is; 0 where there is no link. `[batches]`
     ways: Vec<f32x8>,
     /// Anchors at the start of the step, and numbers. `[batches × (ANCHORS + numbers)]`
     records: Vec<f32x8>,
-    /// Of all batches.
-    count: usize,
     /// Impulses: zeros, for passes that read none. `[kept]`
     kept: Vec<f32x8>,
+    /// Whether a joint is a link. `[joints]`
+    aside: Vec<bool>,
 }
 
 impl Linked {
+    /// Whether some joints are links now.
+    pub(crate) fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// Whether a joint is a link.
+    #[inline(always)]
+    pub(crate) fn has(&self, joint: u32) -> bool {
+        self.aside[joint as usize]
+    }
+
     /// How many links there are.
     pub(crate) fn count(&self) -> usize {
-        self.count
+        self.links.len()
     }
 
     pub(crate) fn held_bytes(&self) -> usize {
-        let Linked { groups, joints, bodies, ways, records, kept, count: _ } = self;
-        let bodies = bodies.iter().map(Indices::held_bytes).sum::<usize>();
-        held(groups) + held(joints) + bodies + held(ways) + held(records) + held(kept)
+        let Linked { active: _, links, groups, joints, places, bodies, ways, records, kept, aside } = self;
+        let indices = bodies.iter().chain([places]).map(Indices::held_bytes).sum::<usize>();
+        let lists = held(links) + held(groups) + held(joints) + held(aside);
+        indices + lists + held(ways) + held(records) + held(kept)
     }
 }
 
 impl<T: JointType> Joints<T> {
     /// Takes these joints, in the order of their slots, for links from now on, and no others.
     pub(crate) fn take_links(&mut self, links: &[ChainLink], poses: &[PoseRow]) {
-        self.aside.clear();
-        let Linked { groups, joints, bodies, ways, records, kept, count } = &mut self.linked;
-        *count = links.len();
-        groups.clear();
-        joints.clear();
-        ways.clear();
-        records.clear();
-        bodies.iter_mut().for_each(Indices::clear);
+        self.linked.active = !links.is_empty();
         if links.is_empty() {
             return;
         }
-        self.aside.resize(self.joints.len(), false);
+        if self.linked.links != links {
+            self.list_links(links, poses.len() as u32 - 1);
+        }
+        let Linked { joints, places, bodies: [a, b], records, .. } = &mut self.linked;
+        let count = T::numbers(self.form);
+        for batch in 0..places.len() / LINK_LANES {
+            let record = &mut records[batch * (ANCHORS + count)..][..ANCHORS + count];
+            let [at, a, b] = [&*places, &*a, &*b].map(|list| list.list().batch::<[u32; LINK_LANES]>(batch));
+            record[..ANCHORS].copy_from_slice(&placed_anchors::<f32x8>(&self.anchors, poses, at, [a, b]));
+            if count > 0 {
+                let joints = joints[batch * LINK_LANES..][..LINK_LANES].iter().enumerate();
+                for (lane, &joint) in joints.filter(|&(_, &joint)| joint != NONE) {
+                    let values = &self.numbers[joint as usize * count..][..count];
+                    for (to, &value) in record[ANCHORS..].iter_mut().zip(values) {
+                        to.as_mut_array()[lane] = value;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lists links in batches. `inert`: the row of no body.
+    fn list_links(&mut self, links: &[ChainLink], inert: u32) {
+        self.linked = Linked { active: true, links: links.to_vec(), ..Linked::default() };
+        let Linked { groups, joints, places, bodies, ways, records, kept, aside, .. } = &mut self.linked;
+        aside.resize(self.joints.len(), false);
         kept.resize(T::kept(self.form), f32x8::ZERO);
-        let (numbers, inert) = (T::numbers(self.form), poses.len() as u32 - 1);
         let group_of = |link: &ChainLink| link.slot / LINK_LANES as u32;
         for links in links.chunk_by(|one, other| group_of(one) == group_of(other)) {
-            let (mut of, mut at) = ([NONE; LINK_LANES], [[inert; MOST_LANES]; 2]);
-            let (mut way, mut index) = ([0.0; LINK_LANES], [links[0].joint; MOST_LANES]);
-            let first = records.len();
-            records.resize(first + ANCHORS + numbers, f32x8::ZERO);
+            let mut of = [NONE; LINK_LANES];
+            let (mut place, mut at) = ([links[0].joint; LINK_LANES], [[inert; LINK_LANES]; 2]);
+            let mut way = [0.0; LINK_LANES];
             for &ChainLink { joint, slot, forward } in links {
                 let lane = slot as usize % LINK_LANES;
                 let [a, b] = self.ends[joint as usize];
-                (of[lane], index[lane]) = (joint, joint);
+                (of[lane], place[lane]) = (joint, joint);
                 (at[0][lane], at[1][lane]) = if self.swapped { (b, a) } else { (a, b) };
                 way[lane] = if forward != self.swapped { 1.0 } else { -1.0 };
-                self.aside[joint as usize] = true;
-                let values = &self.numbers[joint as usize * numbers..][..numbers];
-                for (to, &value) in records[first + ANCHORS..].iter_mut().zip(values) {
-                    to.as_mut_array()[lane] = value;
-                }
+                aside[joint as usize] = true;
             }
-            let [index, a, b] = [&index, &at[0], &at[1]].map(LaneIndex::new);
-            let anchors = placed_anchors::<f32x8>(&self.anchors, poses, index, [a, b]);
-            records[first..][..ANCHORS].copy_from_slice(&anchors);
             groups.push(group_of(&links[0]));
             joints.extend(of);
+            places.extend(&place);
             ways.push(f32x8::new(way));
-            bodies.iter_mut().zip(at).for_each(|(bodies, at)| bodies.extend(&at[..LINK_LANES]));
+            bodies.iter_mut().zip(at).for_each(|(bodies, at)| bodies.extend(&at));
         }
+        records.resize(groups.len() * (ANCHORS + T::numbers(self.form)), f32x8::ZERO);
     }
 
     /// Writes the rows of the links as bodies are now.
