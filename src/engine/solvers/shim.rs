@@ -34,7 +34,7 @@ mod rest;
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::joints::chains::Chains;
-use crate::engine::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft};
+use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
@@ -86,6 +86,12 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
+/// Damping ratio of contacts between a body and a much lighter one, over that of others (1).
+const UNEQUAL_DAMPING: f32 = 10.0;
+
+/// Over-relaxation of their rigid rows (1).
+const UNEQUAL_RELAXATION: f32 = 1.4;
+
 /// Place among the parameters.
 const PUSH_SPEED: usize = 2;
 
@@ -102,10 +108,11 @@ mod part {
     pub const JAMS: usize = 8;
     pub const HELD: usize = 9;
     pub const CHAINS: usize = 10;
+    pub const UNEQUAL: usize = 11;
 }
 
 /// What a run can leave out, and what fails then.
-const MECHANISMS: [Mechanism; 11] = [
+const MECHANISMS: [Mechanism; 12] = [
     Mechanism {
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
@@ -183,6 +190,12 @@ const MECHANISMS: [Mechanism; 11] = [
             + lines_of(include_str!("../constraints/joints/chains/system.rs"))
             + lines_of(include_str!("../constraints/records/links.rs")),
     },
+    Mechanism {
+        name: "unequal",
+        meaning: "contacts between bodies of unequal masses are damped more and over-relaxed",
+        case: "torture ratios restless",
+        lines: 0,
+    },
 ];
 
 /// What it keeps.
@@ -237,6 +250,9 @@ impl Solver for Shim {
         let omega = TAU * stiffness / h;
         let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
         let rigid = Rigid::new(h);
+        let damped = Soft::new([omega, 2.0 * omega], UNEQUAL_DAMPING * damping_ratio, push_speed, h);
+        let relaxed = Relaxed { rule: rigid, factor: UNEQUAL_RELAXATION };
+        let by_mass = passes.has(part::UNEQUAL);
         if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
             passes.run(Phase::Prepare, &mut Roll { middle, dt });
@@ -260,17 +276,25 @@ impl Solver for Shim {
             }
             passes.solve_chains(&mut self.chains, self.gravity.length(), substep + 1 == budget.substeps);
             for _ in 0..budget.velocity_iterations {
-                if passes.has(part::BEARING) {
-                    passes.block_sweep_normal_first(Phase::Solve, Bearing(springs));
-                } else {
-                    passes.block_sweep_normal_first(Phase::Solve, springs);
+                match (passes.has(part::BEARING), by_mass) {
+                    (true, true) => {
+                        let rule = Between { equal: Bearing(springs), unequal: Bearing(damped) };
+                        passes.block_sweep_normal_first(Phase::Solve, rule);
+                    }
+                    (true, false) => passes.block_sweep_normal_first(Phase::Solve, Bearing(springs)),
+                    (false, _) => passes.block_sweep_normal_first(Phase::Solve, springs),
                 }
                 passes.iteration_done();
             }
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
-                passes.block_sweep_normal_first(Phase::Relax, rigid);
+                if by_mass {
+                    let rule = Between { equal: rigid, unequal: relaxed };
+                    passes.block_sweep_normal_first(Phase::Relax, rule);
+                } else {
+                    passes.block_sweep_normal_first(Phase::Relax, rigid);
+                }
             }
             self.jams.bound(passes);
             passes.end_substep(substep);

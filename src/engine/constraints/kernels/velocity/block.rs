@@ -44,7 +44,7 @@
 //! holds and what slides feels the load of now.
 
 use crate::engine::constraints::kernels::frame::{
-    BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
@@ -172,11 +172,27 @@ where
         }
         let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], [record[0], record[1]])[0];
         let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
+        let mut unequal = L::zero();
+        if R::BY_MASS && pushes_a {
+            let more = a[INV_MASS] - b[INV_MASS];
+            unequal = more * more;
+            // Equal masses need no division.
+            if unequal.any_positive() {
+                let sum = a[INV_MASS] + b[INV_MASS];
+                let part = unequal / (sum * sum);
+                // The inert row has no mass.
+                unequal = sum.select_positive(part * part, L::zero());
+            }
+        }
         for p in 0..N::POINTS {
             let s = separation::<L, N, O>(record, p, moved, [sine_a, sine_b], [versine_a, versine_b]);
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
-            [begun.constant[p], begun.slope[p]] = self.rule.line(!pushes_a, s, mass, old);
+            [begun.constant[p], begun.slope[p]] = if R::BY_MASS && unequal.any_positive() {
+                self.rule.line_by_mass(unequal, s, mass, old)
+            } else {
+                self.rule.line(!pushes_a, s, mass, old)
+            };
             let arm_n = arms::<L, N, O>(record, &layout, p, 0);
             begun.velocity[p] = with_arms::<L, N, O>(along_n, state.w, arm_n);
             if has_friction && NORMAL_FIRST {

@@ -73,6 +73,9 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     /// Whether arms turn with their bodies within the step.
     const TURNED: bool = false;
 
+    /// Whether it has [`Self::line_by_mass`]; block sweeps alone ask for it.
+    const BY_MASS: bool = false;
+
     /// Its treatment of position errors of equality rows, such as those of joints.
     fn of_errors(&self) -> Softness {
         Softness::RIGID
@@ -83,6 +86,13 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     ///
     /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
+
+    /// As [`Self::line`] between two bodies that move, by how unequal their masses are, from 0 to 1; see
+    /// [`Between`](crate::engine::constraints::kernels::velocity::rules::Between).
+    #[inline(always)]
+    fn line_by_mass<L: Lanes>(&self, _weight: L, separation: L, mass: L, old: L) -> [L; 2] {
+        self.line(false, separation, mass, old)
+    }
 
     /// The same slope (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
     #[inline(always)]

@@ -69,3 +69,49 @@ impl<R: NormalRule> NormalRule for Relaxed<R> {
         L::splat(self.factor) * self.rule.tangent_slope(mass)
     }
 }
+
+/// Between two rules, by how unequal the masses of a pair of bodies are.
+///
+/// A spring of stiffness k = m ω² and damper c = 2 ζ m ω, with m the mass of the lighter body, damps a body of mass M that rocks on it by
+/// ζ √(m/M) alone, and a sweep takes m/M of that body's speed. With
+///
+/// ```text
+/// w = ((m_a − m_b)/(m_a + m_b))⁴
+/// ```
+///
+/// the line is (1 − w) times that of `equal` and w times that of `unequal`: bodies of equal masses have the first, to the bit, a body on one of a tenth of
+/// its mass 0.45 of the second. The second damps more, or is [`Relaxed`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Between<R, S> {
+    /// For bodies of equal masses.
+    pub equal: R,
+    /// For a body that is much heavier than the other.
+    pub unequal: S,
+}
+
+impl<R: NormalRule, S: NormalRule> NormalRule for Between<R, S> {
+    const FRICTION: bool = R::FRICTION;
+    const SEPARATION: bool = R::SEPARATION;
+    const BY_MASS: bool = true;
+
+    fn of_errors(&self) -> Softness {
+        self.equal.of_errors()
+    }
+
+    #[inline(always)]
+    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
+        self.equal.line(against_static, separation, mass, old)
+    }
+
+    #[inline(always)]
+    fn line_by_mass<L: Lanes>(&self, weight: L, separation: L, mass: L, old: L) -> [L; 2] {
+        let equal = self.equal.line(false, separation, mass, old);
+        let unequal = self.unequal.line(false, separation, mass, old);
+        [0, 1].map(|k| weight.mul_add(unequal[k] - equal[k], equal[k]))
+    }
+
+    #[inline(always)]
+    fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
+        self.equal.tangent_slope(mass)
+    }
+}
