@@ -87,7 +87,7 @@ pub static SOLVER: Variant = Variant {
 };
 
 /// Damping ratio of contacts between a body and a much lighter one, over that of others (1).
-const UNEQUAL_DAMPING: f32 = 10.0;
+const UNEQUAL_DAMPING: f32 = 7.0;
 
 /// Over-relaxation of their rigid rows (1).
 const UNEQUAL_RELAXATION: f32 = 1.4;
