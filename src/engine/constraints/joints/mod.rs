@@ -18,12 +18,11 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use chains::records::Linked;
 use glam::Vec2;
 use rows::{
-    Besides, Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart,
-    Places, RigidFinder, RowBlock, Vectors, Velocities, VelocityRule,
+    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart, Places,
+    RigidFinder, RowBlock, Vectors, Velocities, VelocityRule,
 };
 use std::f32::consts::TAU;
 use std::fmt;
-use std::ops::DerefMut;
 
 /// A type of joint between two bodies. `tests/engine/joints.rs` has one from outside.
 pub trait JointType: Clone + fmt::Debug + Send + 'static {
@@ -327,77 +326,6 @@ impl<T: JointType> Joints<T> {
             self.pass::<L, _>(on, false, of)
         } else {
             self.pass_besides::<L, _>(on, of)
-        }
-    }
-
-    /// As [`Self::pass`] over velocities, without the rigid rows of links.
-    #[inline(never)]
-    fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
-        &self,
-        mut on: TypeInput<'_>,
-        of: impl Fn(JointPair<L>) -> P,
-    ) {
-        let (first_kept, stride) = (self.first_kept(), self.stride());
-        let rigid_alone = self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form));
-        if rigid_alone && self.linked.count() == self.joints.len() {
-            return;
-        }
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let [rows_a, rows_b] =
-                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
-            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
-            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
-            for (record, (batch, (joints, (row_a, row_b)))) in
-                parts.records.chunks_exact_mut(stride).zip(indices)
-            {
-                let joints = &joints.entries()[..segment.filled(batch, L::WIDTH)];
-                if rigid_alone && joints.iter().all(|&joint| self.linked.has(joint)) {
-                    continue;
-                }
-                let mut taken = [L::splat(1.0)];
-                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
-                for (lane, &joint) in lanes.iter_mut().zip(joints) {
-                    *lane = if self.linked.has(joint) { 0.0 } else { 1.0 };
-                }
-                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
-                let (numbers, kept) = record.split_at_mut(first_kept);
-                let (anchors, numbers) = numbers.split_at(ANCHORS);
-                let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
-                T::rows(self.form, numbers, kept, &mut pass);
-                let [a, b] = pass.bodies;
-                if pushes[1] {
-                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-                }
-                if pushes[0] {
-                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-                }
-            }
-        }
-    }
-
-    /// Records take up impulses of the rigid rows of links.
-    fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
-        let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
-        let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let lists = parts.contact.batches::<L::Index>();
-            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
-                let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut record[first..][..rows]);
-                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
-                    let joint = joint as usize;
-                    if self.linked.has(joint as u32) {
-                        let values = &self.kept[joint * kept + place..][..rows];
-                        for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
-                            to[lane] = value;
-                        }
-                    }
-                }
-            }
         }
     }
 

@@ -1,13 +1,14 @@
 //! Links of one type of joints: what they hold through a step, and their rows.
 
 use super::NONE;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
+use crate::engine::constraints::joints::rows::{Besides, Jacobian, JointPair, JointPass, RowLaw};
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors};
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
+use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
+use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
 use crate::engine::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows};
-use crate::engine::lanes::{BodyRow, Indices, Lanes, held};
+use crate::engine::lanes::{BodyRow, Indices, Lanes, RowStore, held};
 use crate::engine::narrowphase::lanes::PoseRow;
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 use wide::f32x8;
 
 /// Fastest speed at which errors of a joint are removed (m/s or rad/s).
@@ -130,6 +131,77 @@ impl<T: JointType> Joints<T> {
             let pair = JointPair::new(bodies, anchors);
             let mut pass = LinkPass { pair, way, inv_h, to: to.group_mut(group as usize) };
             T::rows(self.form, numbers, kept, &mut pass);
+        }
+    }
+
+    /// As [`Self::pass`] over velocities, without the rigid rows of links.
+    #[inline(never)]
+    pub(crate) fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
+        &self,
+        mut on: TypeInput<'_>,
+        of: impl Fn(JointPair<L>) -> P,
+    ) {
+        let (first_kept, stride) = (self.first_kept(), self.stride());
+        let rigid_alone = self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form));
+        if rigid_alone && self.linked.count() == self.joints.len() {
+            return;
+        }
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let [rows_a, rows_b] =
+                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
+            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
+            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
+            for (record, (batch, (joints, (row_a, row_b)))) in
+                parts.records.chunks_exact_mut(stride).zip(indices)
+            {
+                let joints = &joints.entries()[..segment.filled(batch, L::WIDTH)];
+                if rigid_alone && joints.iter().all(|&joint| self.linked.has(joint)) {
+                    continue;
+                }
+                let mut taken = [L::splat(1.0)];
+                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
+                for (lane, &joint) in lanes.iter_mut().zip(joints) {
+                    *lane = if self.linked.has(joint) { 0.0 } else { 1.0 };
+                }
+                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
+                let (numbers, kept) = record.split_at_mut(first_kept);
+                let (anchors, numbers) = numbers.split_at(ANCHORS);
+                let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
+                T::rows(self.form, numbers, kept, &mut pass);
+                let [a, b] = pass.bodies;
+                if pushes[1] {
+                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+                }
+                if pushes[0] {
+                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+                }
+            }
+        }
+    }
+
+    /// Records take up impulses of the rigid rows of links.
+    pub(crate) fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
+        let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
+        let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let lists = parts.contact.batches::<L::Index>();
+            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut record[first..][..rows]);
+                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
+                    let joint = joint as usize;
+                    if self.linked.has(joint as u32) {
+                        let values = &self.kept[joint * kept + place..][..rows];
+                        for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
+                            to[lane] = value;
+                        }
+                    }
+                }
+            }
         }
     }
 

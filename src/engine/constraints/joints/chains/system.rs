@@ -48,8 +48,8 @@ pub struct ChainSystem {
     eliminated: Vec<f64x8>,
 }
 
-/// γ (1) at least.
-const LEAST_GIVE: f64 = 1e-6;
+/// γ (1) at least: for what hits a chain, and is no weight that it bears.
+const LEAST_GIVE: f64 = 3e-5;
 
 type LaneVector<const N: usize> = [f64x8; N];
 type LaneMatrix<const N: usize> = [[f64x8; N]; N];
@@ -248,7 +248,8 @@ impl<const N: usize> Link<N> {
         for arms in self.arms {
             square = arms[1].mul_add(arms[1], arms[0].mul_add(arms[0], square));
         }
-        let grows = f64x8::splat(2.0 / 3.0) * fall * (span * span) / square;
+        // (4/3) (2 G)²
+        let grows = f64x8::splat(8.0 / 3.0) * fall * (span * span) / square;
         let gives =
             f64x8::ONE + span.simd_gt(f64x8::ZERO).select(grows + f64x8::splat(LEAST_GIVE), f64x8::ZERO);
         let ([left, right], mass) = (self.arms, self.mass[0] + self.mass[1]);
