@@ -309,6 +309,25 @@ fn a_heavy_chain_hangs_together_beside_what_sweeps_solve_with_the_same_bits_at_e
 }
 
 #[test]
+fn a_chain_hangs_on_when_other_bodies_come_and_go() {
+    let (mut world, ground) = empty(find("shim").unwrap());
+    let joints = chain(&mut world, ground, 9, 0.5);
+    let disc = ShapeDef::circle(0.1).unwrap();
+    for round in 0..6 {
+        let bodies: Vec<_> = (0..4)
+            .map(|i| {
+                world.add_body(&BodyDef::dynamic([100.0 + f64::from(i), 0.0]).with(disc.clone())).unwrap()
+            })
+            .collect();
+        world.step().unwrap();
+        bodies.into_iter().for_each(|body| world.remove_body(body).unwrap());
+        world.step().unwrap();
+        let gap = |&joint: &JointHandle| world.joint_state(joint).unwrap().gap;
+        assert!(joints.iter().map(gap).fold(0.0, f64::max) < 1e-4, "round {round}");
+    }
+}
+
+#[test]
 fn joined_bodies_are_kept_apart_before_the_first_step() {
     let (mut world, ground) = empty(find("soft_step").unwrap());
     chain(&mut world, ground, 2, 0.5);

@@ -21,6 +21,8 @@ pub(crate) struct Linked {
     active: bool,
     /// In the order of their slots.
     links: Vec<ChainLink>,
+    /// The row of no body.
+    inert: u32,
     /// Of each batch.
     groups: Vec<u32>,
     /// Joints, or [`NONE`]. `[batches × lanes]`
@@ -57,7 +59,8 @@ impl Linked {
     }
 
     pub(crate) fn held_bytes(&self) -> usize {
-        let Linked { active: _, links, groups, joints, places, bodies, ways, records, kept, aside } = self;
+        let Linked { active: _, inert: _, links, groups, joints, places, bodies, ways, records, kept, aside } =
+            self;
         let indices = bodies.iter().chain([places]).map(Indices::held_bytes).sum::<usize>();
         let lists = held(links) + held(groups) + held(joints) + held(aside);
         indices + lists + held(ways) + held(records) + held(kept)
@@ -71,8 +74,9 @@ impl<T: JointType> Joints<T> {
         if links.is_empty() {
             return;
         }
-        if self.linked.links != links {
-            self.list_links(links, poses.len() as u32 - 1);
+        let inert = poses.len() as u32 - 1;
+        if self.linked.links != links || self.linked.inert != inert {
+            self.list_links(links, inert);
         }
         let Linked { joints, places, bodies: [a, b], records, .. } = &mut self.linked;
         let count = T::numbers(self.form);
@@ -94,7 +98,7 @@ impl<T: JointType> Joints<T> {
 
     /// Lists links in batches. `inert`: the row of no body.
     fn list_links(&mut self, links: &[ChainLink], inert: u32) {
-        self.linked = Linked { active: true, links: links.to_vec(), ..Linked::default() };
+        self.linked = Linked { active: true, inert, links: links.to_vec(), ..Linked::default() };
         let Linked { groups, joints, places, bodies, ways, records, kept, aside, .. } = &mut self.linked;
         aside.resize(self.joints.len(), false);
         kept.resize(T::kept(self.form), f32x8::ZERO);
