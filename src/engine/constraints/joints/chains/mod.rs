@@ -36,7 +36,7 @@
 //! a load that hits a chain has to be caught (a plank under a heavy box leaves its hinge by 0.9 mm instead of 1.1 to 1.4 with 10⁻⁷ to 10⁻⁵).
 //!
 //! Chains have two links or more, and no body of theirs has a third rigid joint. All else is left to sweeps: the bodies of ragdolls
-//! differ little in mass. [`system`] solves the chains of a scene as one system, whose blocks between two chains are zero.
+//! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.
 
 pub(super) mod records;
 mod system;
