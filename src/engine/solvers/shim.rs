@@ -11,6 +11,7 @@
 //!   faster than the piston can make it;
 //! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
 //! * chains of joints that hang from what does not move are solved at once (`constraints/joints/chains`);
+//! * contacts between bodies of unequal masses are damped more and over-relaxed (`rules/variations.rs`, `Between`);
 //! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them.
@@ -25,7 +26,7 @@
 //! along chains of joints, `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
 //! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
-//! contact within a step (B23.release, B23.rolling). A heavy body that rocks on others keeps rocking for a long time.
+//! contact within a step (B23.release, B23.rolling). Some heavy bodies rock on light ones for many seconds.
 
 mod frames;
 mod jams;
@@ -34,7 +35,9 @@ mod rest;
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::joints::chains::Chains;
-use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
+use crate::engine::constraints::kernels::velocity::rules::{
+    Bearing, Between, NormalRule, Relaxed, Rigid, Soft,
+};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
@@ -137,7 +140,7 @@ const MECHANISMS: [Mechanism; 12] = [
     Mechanism {
         name: "bearing",
         meaning: "springs bear a load however deep their contact is",
-        case: "B4.heavy",
+        case: "B19.share",
         lines: 0,
     },
     Mechanism {
@@ -252,7 +255,6 @@ impl Solver for Shim {
         let rigid = Rigid::new(h);
         let damped = Soft::new([omega, 2.0 * omega], UNEQUAL_DAMPING * damping_ratio, push_speed, h);
         let relaxed = Relaxed { rule: rigid, factor: UNEQUAL_RELAXATION };
-        let by_mass = passes.has(part::UNEQUAL);
         if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
             passes.run(Phase::Prepare, &mut Roll { middle, dt });
@@ -276,25 +278,17 @@ impl Solver for Shim {
             }
             passes.solve_chains(&mut self.chains, self.gravity.length(), substep + 1 == budget.substeps);
             for _ in 0..budget.velocity_iterations {
-                match (passes.has(part::BEARING), by_mass) {
-                    (true, true) => {
-                        let rule = Between { equal: Bearing(springs), unequal: Bearing(damped) };
-                        passes.block_sweep_normal_first(Phase::Solve, rule);
-                    }
-                    (true, false) => passes.block_sweep_normal_first(Phase::Solve, Bearing(springs)),
-                    (false, _) => passes.block_sweep_normal_first(Phase::Solve, springs),
+                if passes.has(part::BEARING) {
+                    sweep(passes, Phase::Solve, Bearing(springs), Bearing(damped));
+                } else {
+                    sweep(passes, Phase::Solve, springs, damped);
                 }
                 passes.iteration_done();
             }
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
-                if by_mass {
-                    let rule = Between { equal: rigid, unequal: relaxed };
-                    passes.block_sweep_normal_first(Phase::Relax, rule);
-                } else {
-                    passes.block_sweep_normal_first(Phase::Relax, rigid);
-                }
+                sweep(passes, Phase::Relax, rigid, relaxed);
             }
             self.jams.bound(passes);
             passes.end_substep(substep);
@@ -310,6 +304,15 @@ impl Solver for Shim {
     fn held_bytes(&self) -> usize {
         let parts = [self.hand_down.held_bytes(), self.chains.held_bytes(), self.jams.held_bytes()];
         parts.iter().sum::<usize>() + held(&self.fields) + held(&self.joined) + held(&self.last_joined)
+    }
+}
+
+/// One sweep, by how unequal masses are.
+fn sweep<R: NormalRule, S: NormalRule>(passes: &mut Passes<'_>, phase: Phase, equal: R, unequal: S) {
+    if passes.has(part::UNEQUAL) {
+        passes.block_sweep_normal_first(phase, Between { equal, unequal });
+    } else {
+        passes.block_sweep_normal_first(phase, equal);
     }
 }
 

@@ -49,13 +49,6 @@ impl JointSlots {
         !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
     }
 
-    fn keep_apart(&mut self, joint: &Joint) {
-        if !joint.collide_connected {
-            let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
-            self.apart.insert([a.min(b), a.max(b)]);
-        }
-    }
-
     fn remove(&mut self, index: usize) {
         self.joints[index] = None;
         self.generation[index] = self.generation[index].wrapping_add(1);
@@ -70,9 +63,17 @@ impl JointSlots {
             self.generation.push(0);
             self.places.push(None);
         }
-        self.keep_apart(&joint);
+        keep_apart(&mut self.apart, &joint);
         self.joints[index] = Some(joint);
         JointHandle { index: index as u32, generation: self.generation[index] }
+    }
+}
+
+/// Notes the bodies of a joint, if it keeps them from colliding.
+fn keep_apart(apart: &mut BTreeSet<[u32; 2]>, joint: &Joint) {
+    if !joint.collide_connected {
+        let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
+        apart.insert([a.min(b), a.max(b)]);
     }
 }
 
@@ -103,7 +104,7 @@ impl World {
         self.check_joint(joint)?;
         let joint = joint.placed(&self.bodies);
         joint.kind.check()?;
-        self.joints.keep_apart(&joint);
+        keep_apart(&mut self.joints.apart, &joint);
         self.joints.joints[handle.index()] = Some(joint);
         self.joints_changed();
         Ok(())
@@ -294,10 +295,8 @@ impl World {
         for index in 0..self.joints.joints.len() {
             let place = self.joints.places[index].take();
             let Some(joint) = &self.joints.joints[index] else { continue };
+            keep_apart(&mut self.joints.apart, joint);
             let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
-            if !joint.collide_connected {
-                self.joints.apart.insert([a.min(b), a.max(b)]);
-            }
             let key = (joint.kind.name(), joint.kind.form(), !self.bodies.is_dynamic(b as usize));
             let was = place.map(|[group, i]| (&old[group as usize - first].kind, i as usize));
             let (kept, angle) = match (was, self.joints.read.get(index)) {

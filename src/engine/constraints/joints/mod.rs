@@ -11,7 +11,7 @@ use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput};
+use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
 use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
 use crate::engine::narrowphase::lanes::PoseRow;
@@ -300,12 +300,9 @@ impl<T: JointType> Joints<T> {
                 let mut pass = Vectors { pair, of, law, inv_h, vectors: [&mut *x, &mut *y], places };
                 rows_once::<T, L>(self.form, numbers, impulses, &mut pass);
                 slot += L::WIDTH;
-                let [a, b] = pass.pair.bodies;
-                if pushes && pushed[1] {
-                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-                }
-                if pushes && pushed[0] {
-                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
+                let bodies = pass.pair.bodies;
+                if pushes {
+                    write_velocities(&mut on.rows, [row_a, row_b], pushed, bodies);
                 }
             }
         }
@@ -365,12 +362,7 @@ impl<T: JointType> Joints<T> {
                     }
                     continue;
                 }
-                if pushes[1] {
-                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-                }
-                if pushes[0] {
-                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-                }
+                write_velocities(&mut on.rows, [row_a, row_b], pushes, [a, b]);
             }
         }
     }
@@ -396,6 +388,22 @@ impl<T: JointType> Joints<T> {
         let numbers = &self.numbers[joint * numbers..][..numbers];
         let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
         rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
+    }
+}
+
+/// Writes back the velocities of bodies a and b where they are pushed.
+#[inline(always)]
+fn write_velocities<L: Lanes>(
+    rows: &mut TypeRows<'_>,
+    [row_a, row_b]: [LaneIndex<L::Index>; 2],
+    pushes: [bool; 2],
+    [a, b]: [[L; 8]; 2],
+) {
+    if pushes[1] {
+        rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
+    }
+    if pushes[0] {
+        rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Rigid rows of joints that are links of chains, in lanes; see `constraints/joints/chains`.
 
 use crate::engine::lanes::held;
+use bytemuck::Pod;
 use wide::{f32x8, f64x8};
 
 /// Links that are worked on together: the same at any width of the step.
@@ -17,75 +18,38 @@ pub struct ChainLink {
     pub forward: bool,
 }
 
-/// The rows of all links, group by group. Of a lane without a link all is 0.
+/// Numbers of links, group by group: so many lane vectors each.
 #[derive(Clone, Debug, Default)]
-pub struct LinkRows {
-    size: usize,
-    numbers: Vec<f32x8>,
+pub struct LinkGroups<V> {
+    stride: usize,
+    values: Vec<V>,
 }
 
-impl LinkRows {
-    /// Links of `size` rows at most, in so many groups.
-    pub fn begin(&mut self, size: usize, groups: usize) {
-        self.size = size;
-        self.numbers.clear();
-        self.numbers.resize(groups * self.stride(), f32x8::ZERO);
-    }
+/// The rows of all links: of each row `[d_x, d_y, s_L, s_R, b]`, then `[m_L⁻¹, m_R⁻¹, I_L⁻¹, I_R⁻¹]`. The right side b = −(J v + C/h)
+/// in m/s or rad/s. Of a lane without a link all is 0.
+pub type LinkRows = LinkGroups<f32x8>;
 
-    fn stride(&self) -> usize {
-        5 * self.size + 4
-    }
+/// Impulses of all links, one lane vector per row (N·s or N·m·s).
+pub type LinkImpulses = LinkGroups<f64x8>;
 
-    /// Rows of the largest link.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
-    /// Numbers of a group: for each row `[d_x, d_y, s_L, s_R, b]`, then `[m_L⁻¹, m_R⁻¹, I_L⁻¹, I_R⁻¹]`. The right side b = −(J v + C/h)
-    /// in m/s or rad/s.
-    #[inline(always)]
-    pub fn group(&self, group: usize) -> &[f32x8] {
-        &self.numbers[group * self.stride()..][..self.stride()]
-    }
-
-    /// As [`Self::group`].
-    #[inline(always)]
-    pub fn group_mut(&mut self, group: usize) -> &mut [f32x8] {
-        let stride = self.stride();
-        &mut self.numbers[group * stride..][..stride]
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.numbers)
-    }
-}
-
-/// Impulses of all links, group by group, one lane vector per row (N·s or N·m·s).
-#[derive(Clone, Debug, Default)]
-pub struct LinkImpulses {
-    size: usize,
-    values: Vec<f64x8>,
-}
-
-impl LinkImpulses {
-    /// Zeros of links of `size` rows at most, in so many groups.
-    pub fn begin(&mut self, size: usize, groups: usize) {
-        self.size = size;
+impl<V: Pod> LinkGroups<V> {
+    /// Zeros, `stride` of them in each of so many groups.
+    pub fn begin(&mut self, stride: usize, groups: usize) {
+        self.stride = stride;
         self.values.clear();
-        self.values.resize(groups * size, f64x8::ZERO);
+        self.values.resize(groups * stride, V::zeroed());
     }
 
-    /// Of a group. `[size]`
+    /// Of a group. `[stride]`
     #[inline(always)]
-    pub fn group(&self, group: usize) -> &[f64x8] {
-        &self.values[group * self.size..][..self.size]
+    pub fn group(&self, group: usize) -> &[V] {
+        &self.values[group * self.stride..][..self.stride]
     }
 
     /// As [`Self::group`].
     #[inline(always)]
-    pub fn group_mut(&mut self, group: usize) -> &mut [f64x8] {
-        &mut self.values[group * self.size..][..self.size]
+    pub fn group_mut(&mut self, group: usize) -> &mut [V] {
+        &mut self.values[group * self.stride..][..self.stride]
     }
 
     /// Bytes held.

@@ -33,7 +33,7 @@
 //!
 //! and ω h = 1 asks for γ = (4/3) G²; with (4/3) (2 G)² a chain may bear as much again. A bridge of 160 links of a meter gives way by
 //! 1.4 mm a joint at h = 1/240 s. To that γ 3·10⁻⁵ are added: rows of a straight chain contradict each other without gravity, too, and
-//! a load that hits a chain has to be caught (a plank under a heavy box leaves its hinge by 0.9 mm instead of 1.1 to 1.4 with 10⁻⁷ to 10⁻⁵).
+//! a load that hits a chain has to be caught.
 //!
 //! Chains have two links or more, and no body of theirs has a third rigid joint. All else is left to sweeps: the bodies of ragdolls
 //! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.
@@ -206,13 +206,8 @@ impl ChainSearch {
             }
             joint = match *self.joints_of(body) {
                 [_] => return Some(first),
-                [one, other] => {
-                    if one == joint {
-                        other
-                    } else {
-                        one
-                    }
-                }
+                // The other one.
+                [one, other] => one ^ other ^ joint,
                 _ => return None,
             };
             let [a, b] = self.ends[joint as usize];

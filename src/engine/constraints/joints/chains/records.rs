@@ -1,12 +1,11 @@
 //! Links of one type of joints: what they hold through a step, and their rows.
 
-use super::NONE;
 use crate::engine::constraints::joints::rows::{Besides, Jacobian, JointPair, JointPass, RowLaw};
-use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors};
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
+use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
+use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
 use crate::engine::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows};
-use crate::engine::lanes::{BodyRow, Indices, Lanes, RowStore, held};
+use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
@@ -25,10 +24,8 @@ pub(crate) struct Linked {
     inert: u32,
     /// Of each batch.
     groups: Vec<u32>,
-    /// Joints, or [`NONE`]. `[batches × lanes]`
-    joints: Vec<u32>,
-    /// Joints, or any. `[batches × lanes]`
-    places: Indices,
+    /// Joints, and any where there is no link. `[batches × lanes]`
+    joints: Indices,
     /// a and b, or the inert one. `[batches × lanes]`
     bodies: [Indices; 2],
     /// 1 if b is away from where the chain hangs, −1 if a is; 0 where there is no link. `[batches]`
@@ -59,10 +56,9 @@ impl Linked {
     }
 
     pub(crate) fn held_bytes(&self) -> usize {
-        let Linked { active: _, inert: _, links, groups, joints, places, bodies, ways, records, kept, aside } =
-            self;
-        let indices = bodies.iter().chain([places]).map(Indices::held_bytes).sum::<usize>();
-        let lists = held(links) + held(groups) + held(joints) + held(aside);
+        let Linked { active: _, inert: _, links, groups, joints, bodies, ways, records, kept, aside } = self;
+        let indices = bodies.iter().chain([joints]).map(Indices::held_bytes).sum::<usize>();
+        let lists = held(links) + held(groups) + held(aside);
         indices + lists + held(ways) + held(records) + held(kept)
     }
 }
@@ -78,19 +74,18 @@ impl<T: JointType> Joints<T> {
         if self.linked.links != links || self.linked.inert != inert {
             self.list_links(links, inert);
         }
-        let Linked { joints, places, bodies: [a, b], records, .. } = &mut self.linked;
+        let Linked { joints, bodies: [a, b], ways, records, .. } = &mut self.linked;
         let count = T::numbers(self.form);
-        for batch in 0..places.len() / LINK_LANES {
-            let record = &mut records[batch * (ANCHORS + count)..][..ANCHORS + count];
-            let [at, a, b] = [&*places, &*a, &*b].map(|list| list.list().batch::<[u32; LINK_LANES]>(batch));
-            record[..ANCHORS].copy_from_slice(&placed_anchors::<f32x8>(&self.anchors, poses, at, [a, b]));
-            if count > 0 {
-                let joints = joints[batch * LINK_LANES..][..LINK_LANES].iter().enumerate();
-                for (lane, &joint) in joints.filter(|&(_, &joint)| joint != NONE) {
-                    let values = &self.numbers[joint as usize * count..][..count];
-                    for (to, &value) in record[ANCHORS..].iter_mut().zip(values) {
-                        to.as_mut_array()[lane] = value;
-                    }
+        let of = batches(joints).zip(batches(a).zip(batches(b))).zip(ways);
+        for (record, ((joints, (a, b)), way)) in records.chunks_exact_mut(ANCHORS + count).zip(of) {
+            record[..ANCHORS].copy_from_slice(&placed_anchors::<f32x8>(&self.anchors, poses, joints, [a, b]));
+            if count == 0 {
+                continue;
+            }
+            for (lane, &joint) in links_of(joints.array(), way) {
+                let values = &self.numbers[joint as usize * count..][..count];
+                for (to, &value) in record[ANCHORS..].iter_mut().zip(values) {
+                    to.as_mut_array()[lane] = value;
                 }
             }
         }
@@ -99,25 +94,23 @@ impl<T: JointType> Joints<T> {
     /// Lists links in batches. `inert`: the row of no body.
     fn list_links(&mut self, links: &[ChainLink], inert: u32) {
         self.linked = Linked { active: true, inert, links: links.to_vec(), ..Linked::default() };
-        let Linked { groups, joints, places, bodies, ways, records, kept, aside, .. } = &mut self.linked;
+        let Linked { groups, joints, bodies, ways, records, kept, aside, .. } = &mut self.linked;
         aside.resize(self.joints.len(), false);
         kept.resize(T::kept(self.form), f32x8::ZERO);
         let group_of = |link: &ChainLink| link.slot / LINK_LANES as u32;
         for links in links.chunk_by(|one, other| group_of(one) == group_of(other)) {
-            let mut of = [NONE; LINK_LANES];
-            let (mut place, mut at) = ([links[0].joint; LINK_LANES], [[inert; LINK_LANES]; 2]);
+            let (mut of, mut at) = ([links[0].joint; LINK_LANES], [[inert; LINK_LANES]; 2]);
             let mut way = [0.0; LINK_LANES];
             for &ChainLink { joint, slot, forward } in links {
                 let lane = slot as usize % LINK_LANES;
                 let [a, b] = self.ends[joint as usize];
-                (of[lane], place[lane]) = (joint, joint);
+                of[lane] = joint;
                 (at[0][lane], at[1][lane]) = if self.swapped { (b, a) } else { (a, b) };
                 way[lane] = if forward != self.swapped { 1.0 } else { -1.0 };
                 aside[joint as usize] = true;
             }
             groups.push(group_of(&links[0]));
-            joints.extend(of);
-            places.extend(&place);
+            joints.extend(&of);
             ways.push(f32x8::new(way));
             bodies.iter_mut().zip(at).for_each(|(bodies, at)| bodies.extend(&at));
         }
@@ -127,7 +120,7 @@ impl<T: JointType> Joints<T> {
     /// Writes the rows of the links as bodies are now.
     pub(crate) fn write_links(&mut self, rows: &[BodyRow], inv_h: f32, to: &mut LinkRows) {
         let Linked { groups, bodies: [a, b], ways, records, kept, .. } = &mut self.linked;
-        let bodies = a.list().batches::<[u32; LINK_LANES]>().zip(b.list().batches::<[u32; LINK_LANES]>());
+        let bodies = batches(a).zip(batches(b));
         let records = records.chunks_exact(ANCHORS + T::numbers(self.form));
         for (((&group, &way), record), (a, b)) in groups.iter().zip(&*ways).zip(records).zip(bodies) {
             let bodies = [f32x8::gather(rows, a), f32x8::gather(rows, b)];
@@ -175,13 +168,7 @@ impl<T: JointType> Joints<T> {
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
                 let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
                 T::rows(self.form, numbers, kept, &mut pass);
-                let [a, b] = pass.bodies;
-                if pushes[1] {
-                    on.rows.scatter_velocity::<L>(row_b, [b[VX], b[VY], b[W], b[INV_MASS]]);
-                }
-                if pushes[0] {
-                    on.rows.scatter_velocity::<L>(row_a, [a[VX], a[VY], a[W], a[INV_MASS]]);
-                }
+                write_velocities(&mut on.rows, [row_a, row_b], pushes, pass.bodies);
             }
         }
     }
@@ -214,15 +201,25 @@ impl<T: JointType> Joints<T> {
         let Some([place, rows]) = self.rigid else { return };
         let Linked { groups, joints, ways, .. } = &self.linked;
         let kept = T::kept(self.form);
-        for ((&group, way), joints) in groups.iter().zip(ways).zip(joints.chunks_exact(LINK_LANES)) {
-            for (r, impulses) in impulses.group(group as usize)[..rows].iter().enumerate() {
-                let lanes = joints.iter().zip(way.as_array()).zip(impulses.as_array());
-                for ((&joint, &way), &impulse) in lanes.filter(|((joint, _), _)| **joint != NONE) {
-                    self.kept[joint as usize * kept + place + r] = way * impulse as f32;
+        for ((&group, way), joints) in groups.iter().zip(ways).zip(batches(joints)) {
+            for (lane, &joint) in links_of(joints.array(), way) {
+                let values = &mut self.kept[joint as usize * kept + place..][..rows];
+                for (to, impulse) in values.iter_mut().zip(impulses.group(group as usize)) {
+                    *to = way.as_array()[lane] * impulse.as_array()[lane] as f32;
                 }
             }
         }
     }
+}
+
+/// A list batch by batch.
+fn batches(list: &Indices) -> impl Iterator<Item = LaneIndex<'_, [u32; LINK_LANES]>> {
+    list.list().batches()
+}
+
+/// The lanes with a link, and its joint.
+fn links_of<'a>(joints: &'a [u32; LINK_LANES], way: &'a f32x8) -> impl Iterator<Item = (usize, &'a u32)> {
+    joints.iter().enumerate().filter(|&(lane, _)| way.as_array()[lane] != 0.0)
 }
 
 /// Writes the rigid rows of a batch of links.

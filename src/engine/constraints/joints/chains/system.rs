@@ -29,7 +29,7 @@
 //! A link of two rows takes some 110 multiplications in `f64`, an eighth of them at a time; what waits for each other is m
 //! inverses of D. Bridges of 160 links take 0.8 µs a substep, and 0.45 µs for their rows, 8 ns a link (AVX-512).
 
-use crate::engine::constraints::records::links::{LINK_LANES, LinkImpulses, LinkRows};
+use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
 use wide::{f32x8, f64x8};
 
@@ -38,14 +38,16 @@ use wide::{f32x8, f64x8};
 pub struct ChainSystem {
     /// Links in a lane; m.
     groups: usize,
+    /// Rows of a link.
+    size: usize,
     rows: LinkRows,
     impulses: LinkImpulses,
     /// Links of the chain of each, where it hangs at both ends; else 0. `[groups]`
     spans: Vec<f64x8>,
     /// Body of each slot away from where its chain hangs, or the inert one. `[groups × lanes]`
     bodies: Indices,
-    /// X, Y and z. `[groups × (2 size² + size)]`
-    eliminated: Vec<f64x8>,
+    /// X, Y and z: 2 size² + size numbers.
+    eliminated: LinkGroups<f64x8>,
 }
 
 /// γ (1) at least: for what hits a chain, and is no weight that it bears.
@@ -60,13 +62,12 @@ impl ChainSystem {
         // One row is solved as two.
         let size = size.max(2);
         let groups = links.div_ceil(LINK_LANES);
-        self.groups = groups;
-        self.rows.begin(size, groups);
+        (self.groups, self.size) = (groups, size);
+        self.rows.begin(5 * size + 4, groups);
         self.impulses.begin(size, groups);
         self.spans.clear();
         self.spans.resize(groups, f64x8::ZERO);
-        self.eliminated.clear();
-        self.eliminated.resize(groups * (2 * size * size + size), f64x8::ZERO);
+        self.eliminated.begin(2 * size * size + size, groups);
     }
 
     /// Slot of link `i`.
@@ -107,7 +108,7 @@ impl ChainSystem {
 
     /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
     pub fn solve(&mut self, rows: &mut [BodyRow], fall: f64) {
-        match self.rows.size() {
+        match self.size {
             2 => self.solve_rows::<2>(rows, fall),
             _ => self.solve_rows::<3>(rows, fall),
         }
@@ -115,20 +116,19 @@ impl ChainSystem {
 
     fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f64) {
         let fall = f64x8::splat(fall * fall);
-        let stride = 2 * N * N + N;
         let last = self.groups - 1;
         let first = Link::<N>::of(self.rows.group(0));
-        let before = Link::<N>::of(self.rows.group(last)).shifted(up::<1>);
+        let end = Link::<N>::of(self.rows.group(last));
         let mut here = first;
         let (mut pivot, mut b) = here.diagonal(self.spans[0], fall);
-        let mut e = transposed(before.coupling(&first));
+        let mut e = transposed(end.shifted(up::<1>).coupling(&first));
         let (mut d_before, mut b_before) = ([[f64x8::ZERO; N]; N], [f64x8::ZERO; N]);
         for k in 0..last {
             let next = Link::<N>::of(self.rows.group(k + 1));
             let c = here.coupling(&next);
             let inverse = inverse(pivot);
             let (x, y, z) = (product(&inverse, &c), product(&inverse, &e), times(&inverse, &b));
-            let to = &mut self.eliminated[k * stride..][..stride];
+            let to = self.eliminated.group_mut(k);
             to[..N * N].copy_from_slice(x.as_flattened());
             to[N * N..2 * N * N].copy_from_slice(y.as_flattened());
             to[2 * N * N..].copy_from_slice(&z);
@@ -151,13 +151,12 @@ impl ChainSystem {
         reduce::<1, N>(&mut pivot, &mut e, &mut b);
         reduce::<2, N>(&mut pivot, &mut e, &mut b);
         reduce::<4, N>(&mut pivot, &mut e, &mut b);
-        let mut impulse = times(&inverse(pivot), &b);
-        self.impulses.group_mut(last).copy_from_slice(&impulse);
-        let mut of_lane_before = impulse;
-        of_lane_before.iter_mut().for_each(|x| *x = up::<1>(*x));
-        let mut next = Link::<N>::of(self.rows.group(last));
+        let of_end = times(&inverse(pivot), &b);
+        self.impulses.group_mut(last).copy_from_slice(&of_end);
+        let of_lane_before = each(of_end, up::<1>);
+        let (mut next, mut impulse) = (end, of_end);
         for k in (0..last).rev() {
-            let from = &self.eliminated[k * stride..][..stride];
+            let from = self.eliminated.group(k);
             let of_next = impulse;
             for r in 0..N {
                 impulse[r] = from[2 * N * N + r];
@@ -172,12 +171,8 @@ impl ChainSystem {
             next = here;
         }
         // Of lanes' last links, the next are the first ones of the lanes after.
-        let here = Link::<N>::of(self.rows.group(last));
-        let mut of_last = impulse;
-        of_last.copy_from_slice(self.impulses.group(last));
-        let (next, mut of_next) = (first.shifted(down::<1>), impulse);
-        of_next.iter_mut().for_each(|x| *x = down::<1>(*x));
-        push([&here, &next], [&of_last, &of_next], self.bodies_of(last), rows);
+        let (next, of_next) = (first.shifted(down::<1>), each(impulse, down::<1>));
+        push([&end, &next], [&of_end, &of_next], self.bodies_of(last), rows);
     }
 
     fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
@@ -190,7 +185,7 @@ impl ChainSystem {
             + self.impulses.held_bytes()
             + held(&self.spans)
             + self.bodies.held_bytes()
-            + held(&self.eliminated)
+            + self.eliminated.held_bytes()
     }
 }
 
@@ -322,15 +317,11 @@ fn reduce<const D: usize, const N: usize>(
 ) {
     let inverse = inverse(*d);
     let z = times(&inverse, b);
-    let (f, e_p) = (transposed(all_down::<D, N>(*e)), all_up::<D, N>(*e));
-    let to_p = product(e, &all_up::<D, N>(inverse));
-    let to_q = product(&f, &all_down::<D, N>(inverse));
+    let (f, e_p) = (transposed(each_of(*e, down::<D>)), each_of(*e, up::<D>));
+    let to_p = product(e, &each_of(inverse, up::<D>));
+    let to_q = product(&f, &each_of(inverse, down::<D>));
     *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
-    let (mut z_p, mut z_q) = (z, z);
-    for r in 0..N {
-        (z_p[r], z_q[r]) = (up::<D>(z[r]), down::<D>(z[r]));
-    }
-    *b = less(less(*b, e, &z_p), &f, &z_q);
+    *b = less(less(*b, e, &each(z, up::<D>)), &f, &each(z, down::<D>));
     *e = minus([[f64x8::ZERO; N]; N], &to_p, &e_p);
 }
 
@@ -432,17 +423,15 @@ fn less<const N: usize>(mut x: LaneVector<N>, a: &LaneMatrix<N>, y: &LaneVector<
     x
 }
 
-/// Each number of the lane `D` before.
 #[inline(always)]
-fn all_up<const D: usize, const N: usize>(mut m: LaneMatrix<N>) -> LaneMatrix<N> {
-    m.as_flattened_mut().iter_mut().for_each(|x| *x = up::<D>(*x));
-    m
+fn each<const N: usize>(mut x: LaneVector<N>, by: impl Fn(f64x8) -> f64x8) -> LaneVector<N> {
+    x.iter_mut().for_each(|x| *x = by(*x));
+    x
 }
 
-/// Each number of the lane `D` on.
 #[inline(always)]
-fn all_down<const D: usize, const N: usize>(mut m: LaneMatrix<N>) -> LaneMatrix<N> {
-    m.as_flattened_mut().iter_mut().for_each(|x| *x = down::<D>(*x));
+fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f64x8) -> f64x8) -> LaneMatrix<N> {
+    m.as_flattened_mut().iter_mut().for_each(|x| *x = by(*x));
     m
 }
 
