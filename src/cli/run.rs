@@ -361,6 +361,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
         "bodies": scene.bodies.len(),
         "steps": scene.steps,
         "dt": scene.dt,
+        "length_unit": scene.length_unit,
         "solver": s.solver.name,
         "budget": s.budget,
         "parameters": overrides::by_name(s.solver, &s.parameters),

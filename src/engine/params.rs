@@ -1,4 +1,7 @@
 //! Tuning constants with their units, and the budget of a step.
+//!
+//! Lengths and speeds are for bodies of about a meter. A world of others has a
+//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied.
 
 /// Overlap that position correction leaves alone (m), so that resting contacts stay contacts.
 /// Larger: visible overlap. Smaller: contacts flicker.

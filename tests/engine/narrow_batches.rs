@@ -9,7 +9,7 @@ use simpulse::engine::lanes::{LaneWidth, Quad};
 use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
 use simpulse::engine::narrowphase::lanes::Class;
 use simpulse::engine::narrowphase::lanes::PoseRow;
-use simpulse::engine::narrowphase::{collide, collide_in_step};
+use simpulse::engine::narrowphase::{Margins, collide, collide_in_step};
 use simpulse::engine::shapes::{Pose, Shape};
 
 const SPECULATIVE: f32 = 0.1;
@@ -47,8 +47,13 @@ impl Scene {
             (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
         });
         let ways = vec![Quad::default(); poses.len()];
-        let input =
-            Input { poses: &poses, ways: &ways, rolling: None, shapes: &self.rows, speculative: SPECULATIVE };
+        let input = Input {
+            poses: &poses,
+            ways: &ways,
+            rolling: None,
+            shapes: &self.rows,
+            margins: Margins::within(SPECULATIVE),
+        };
         let (mut changed, mut fresh) = (vec![], vec![]);
         let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
             changed.push(name);
@@ -78,7 +83,7 @@ impl Scene {
     fn expected(&self, pair: usize, poses: &[Pose], old: &Manifold) -> Manifold {
         let (a, b) = (2 * pair, 2 * pair + 1);
         let (shapes, poses) = ([&self.shapes[a], &self.shapes[b]], [&poses[a], &poses[b]]);
-        let mut m = collide_in_step(shapes, poses, [[0.0; 4]; 2], false, SPECULATIVE);
+        let mut m = collide_in_step(shapes, poses, [[0.0; 4]; 2], false, Margins::within(SPECULATIVE));
         for point in &mut m.points[..m.count as usize] {
             if let Some(same) = old.points().iter().find(|p| p.feature_id == point.feature_id) {
                 (point.normal_impulse, point.tangent_impulse) = (same.normal_impulse, same.tangent_impulse);

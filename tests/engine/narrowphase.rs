@@ -5,7 +5,7 @@ use glam::Vec2;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use simpulse::engine::contacts::Manifold;
-use simpulse::engine::narrowphase::{collide, collide_in_step, epa, gjk};
+use simpulse::engine::narrowphase::{Margins, collide, collide_in_step, epa, gjk};
 use simpulse::engine::shapes::{Pose, Shape};
 
 /// Shapes are within a few meters of each other, so this keeps every point.
@@ -479,7 +479,7 @@ fn faces_that_graze_each_other_are_no_contact_of_a_step() {
         let [a, b] = [Vec2::ZERO, Vec2::new(1.0 + gap, 1.0 - overlap)]
             .map(|position| Pose { position, rotation: Vec2::X });
         let geometry = collide(&unit, &a, &unit, &b, 0.02).count;
-        [geometry, collide_in_step([&unit; 2], [&a, &b], [[0.0; 4]; 2], false, 0.02).count]
+        [geometry, collide_in_step([&unit; 2], [&a, &b], [[0.0; 4]; 2], false, Margins::within(0.02)).count]
     };
     assert_eq!(found(0.004, 0.01), [2, 0]);
     assert_eq!(found(0.006, 0.01), [2, 2]);

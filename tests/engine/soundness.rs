@@ -19,6 +19,7 @@ use simpulse::engine::lanes::{
     BodyRow, Counted, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns,
     RowStore, prefetch, prefetch_records,
 };
+use simpulse::engine::narrowphase::Margins;
 use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
 use simpulse::engine::narrowphase::hull::{Hull, HullRow};
 use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
@@ -374,6 +375,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         features: Features::FULL,
         budget: Budget { substeps: 1, velocity_iterations: 1, relax_iterations: 1, position_iterations: 1 },
         h: 0.01,
+        length_unit: 1.0,
         parameters: [0.0; 8],
         without: Without::default(),
         phases: PhaseFilter::ALL,
@@ -411,7 +413,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
         ways: &[Quad::default()],
         rolling: None,
         shapes: &shapes,
-        speculative: 0.02,
+        margins: Margins::within(0.02),
     };
     let mut contacts = vec![Contact::default(); contacts];
     update(kind, width, &jobs, input, &mut contacts, &mut |_, _| {});

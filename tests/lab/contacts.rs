@@ -3,7 +3,7 @@
 use simpulse::engine::broadphase::{Proxy, all_pairs};
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::narrowphase::collide_in_step;
+use simpulse::engine::narrowphase::{Margins, collide_in_step};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
@@ -39,7 +39,8 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
         });
         let held = !proxies[a as usize].dynamic;
         let poses = [&pose_a, &pose_b];
-        let mut manifold = collide_in_step([shape_a, shape_b], poses, ways, held, SPECULATIVE_DISTANCE);
+        let mut manifold =
+            collide_in_step([shape_a, shape_b], poses, ways, held, Margins::within(SPECULATIVE_DISTANCE));
         if manifold.count == 0 {
             continue;
         }

@@ -101,7 +101,7 @@ fn scaled(scene: &Scene, factor: f64) -> Scene {
         }
     });
     long(&mut image.gravity);
-    image
+    Scene { length_unit: factor * scene.length_unit, ..image }
 }
 
 fn heavier(scene: &Scene, factor: f64) -> Scene {

@@ -405,6 +405,12 @@ fn bad_files_are_refused_with_place_and_value() {
         (r#""steps": 10"#, r#""steps": 4000000000"#, "steps: ", "at most 10000000, is 4000000000"),
         (r#""steps": 10"#, r#""steps": -1"#, "steps: ", "-1"),
         (r#""steps": 10"#, r#""steps": 1.5"#, "steps: ", "1.5"),
+        (
+            r#""steps": 10"#,
+            r#""steps": 10, "length_unit": 0"#,
+            "length_unit: ",
+            "at least 1e-6 m and at most 1e6 m, is 0.0 m",
+        ),
         ("[0, -10]", "[0, 1e39]", "gravity[1]: ", "1e39"),
         ("[0, -10]", "[0, 1e999]", "gravity[1]: ", "1e999"),
         ("[0, -10]", "[0, NaN]", "gravity[1]: ", "line 1 column"),
@@ -602,7 +608,7 @@ proptest! {
         steps in 1..=simpulse::lab::scenes::MAX_STEPS,
         bodies in prop::collection::vec(body(), 1..8),
     ) {
-        let scene = Scene { name, gravity, dt, steps, expect: None, bodies, joints: vec![] };
+        let scene = Scene { name, gravity, dt, steps, length_unit: 1.0, expect: None, bodies, joints: vec![] };
         let text = scene.to_json();
         let back = read(&text).map_err(|e| TestCaseError::fail(e.to_string()))?;
         prop_assert_eq!(format!("{:?}", back), format!("{:?}", scene));

@@ -97,7 +97,7 @@ fn joint_places() -> Vec<String> {
 
 fn scene() -> Value {
     json!({
-        "name": "x", "gravity": [0, -10], "dt": 0.01, "steps": 5,
+        "name": "x", "gravity": [0, -10], "dt": 0.01, "steps": 5, "length_unit": 2,
         "expect": {
             "catalog": "arch", "rests": true, "stands": false, "stays_stacked": true, "gains_no_energy": false,
             "stays_within": 0.5, "stays_inside": [[-5, -5], [5, 5]],
@@ -138,7 +138,7 @@ fn schema_and_reading_agree_on_every_member() {
     let body = "/bodies/1";
     let shape = |i: usize, name: &str| format!("{body}/shapes/{i}/{name}");
     let places = [
-        ["/name", "/gravity", "/dt", "/steps", "/bodies"].map(String::from).to_vec(),
+        ["/name", "/gravity", "/dt", "/steps", "/length_unit", "/bodies"].map(String::from).to_vec(),
         [
             "rests",
             "stands",

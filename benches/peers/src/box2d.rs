@@ -28,6 +28,7 @@ impl Box2d {
             if b2IsDoublePrecision() {
                 return Err("a build in double precision".into());
             }
+            b2SetLengthUnitsPerMeter(scene.length_unit as f32);
             let mut def = b2DefaultWorldDef();
             // The defaults cross the interface whole only if both sides agree on the layout.
             if (def.gravity.y, def.contactHertz) != (-10.0, 30.0) {

@@ -19,6 +19,7 @@ impl Rapier {
         let mut world = PhysicsWorld { gravity: vector(scene.gravity), ..PhysicsWorld::default() };
         let p = &mut world.integration_parameters;
         p.dt = scene.dt as f32;
+        p.length_unit = scene.length_unit as f32;
         p.num_solver_iterations = contender.substeps as usize;
         p.contact_softness.natural_frequency = contender.hertz;
         p.static_contact_softness.natural_frequency = 2.0 * contender.hertz;

@@ -110,11 +110,11 @@ impl FatBoxes {
     /// Renews the boxes of shapes that left theirs; returns those shapes, ascending.
     ///
     /// `dt` (s) is the step over which velocities are thought to last.
-    pub fn update(&mut self, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) -> &[u32] {
+    pub fn update(&mut self, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) -> &[u32] {
         self.moved.clear();
         self.find_failed(bodies);
         for i in 0..self.failed.len() {
-            self.look_at(self.failed[i] as usize, bodies, dt, proxies);
+            self.look_at(self.failed[i] as usize, bodies, [dt, unit], proxies);
         }
         &self.moved
     }
@@ -143,7 +143,7 @@ impl FatBoxes {
     }
 
     /// Renews the boxes of one body where needed, and makes its pose the reference.
-    fn look_at(&mut self, body: usize, bodies: &Bodies, dt: f32, proxies: &mut [Proxy]) {
+    fn look_at(&mut self, body: usize, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) {
         let pose = bodies.pose(body);
         let first = self.first_shape[body] as usize;
         let last = self.first_shape.get(body + 1).map_or(self.outlines.len(), |&next| next as usize);
@@ -151,10 +151,10 @@ impl FatBoxes {
         let spin = bodies.angular_velocity[body].abs();
         let mut slack = f32::INFINITY;
         for (i, proxy) in (first..last).zip(&mut proxies[first..last]) {
-            let tight = self.outlines[i].bounds(&pose).grown(SPECULATIVE_DISTANCE);
+            let tight = self.outlines[i].bounds(&pose).grown(unit * SPECULATIVE_DISTANCE);
             if self.slack[body] < 0.0 || !proxy.aabb.contains(&tight) {
                 let extent = tight.max - tight.min;
-                let margin = AABB_MARGIN.min(MARGIN_FRACTION * extent.max_element());
+                let margin = (unit * AABB_MARGIN).min(MARGIN_FRACTION * extent.max_element());
                 let path = (speed + spin * self.reach[body]) * dt;
                 let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
                 proxy.aabb = if lasts { tight.grown(margin) } else { tight };

@@ -42,7 +42,6 @@
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::narrowphase::collide;
-use crate::engine::params::LINEAR_SLOP;
 use crate::engine::shapes::{Pose, Shape};
 use glam::Vec2;
 
@@ -89,11 +88,11 @@ pub fn reach(shape: &Shape) -> f32 {
 
 /// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (4) if
 /// it is so at the start, if its middle would get through it afterward, and by (3) later if the first recedes; at most `limit`.
-pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], limit: f32) -> f32 {
+pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> f32 {
     let (own, reach) = (b.against(a), reach(shape_b));
     let width = shape_b.min_half_extent().min(reach);
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
-    let near = LINEAR_SLOP.min(0.1 * width);
+    let near = slop.min(0.1 * width);
     let swing = own.turn.abs() * reach;
     let mut part = 0.0_f32;
     for _ in 0..MOST_ADVANCES {

@@ -71,6 +71,8 @@ pub struct Moving<'w> {
     pub proxies: &'w [Proxy],
     /// Of the step.
     pub contacts: &'w [Contact],
+    /// Overlap that position correction leaves alone (m).
+    pub slop: f32,
     /// Whether two bodies do not collide.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
     pub near: &'w Near<'w>,
@@ -104,7 +106,7 @@ impl Continuous {
 
     /// Shortens the motions of fast bodies to where they meet what they would pass; returns how many are fast.
     pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) -> usize {
-        press::hold(moving.bodies, moving.contacts, &self.safe_squared, rows);
+        press::hold(moving.bodies, moving.contacts, &self.safe_squared, moving.slop, rows);
         self.fast.clear();
         for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
             let [x, y, ..] = row.delta;
@@ -211,7 +213,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
         Mover { pose, way: Vec2::new(x, y), turn }
     };
     let shapes = [a, b].map(|shape| &moving.shapes[shape as usize]);
-    impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], limit)
+    impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], moving.slop, limit)
 }
 
 /// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.

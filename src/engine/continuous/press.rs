@@ -15,19 +15,18 @@
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
-use crate::engine::params::LINEAR_SLOP;
 use glam::Vec2;
 
 /// Cuts ways into static shapes to (1); `safe_squared` is w² by body.
-pub fn hold(bodies: &Bodies, contacts: &[Contact], safe_squared: &[f32], rows: &mut [BodyRow]) {
+pub fn hold(bodies: &Bodies, contacts: &[Contact], safe_squared: &[f32], slop: f32, rows: &mut [BodyRow]) {
     for contact in contacts {
         let points = contact.manifold.points().iter();
         let depth = points.map(|p| -p.separation).fold(f32::NEG_INFINITY, f32::max);
         // Most contacts are not deep.
-        if depth <= LINEAR_SLOP || bodies.kind[contact.body_a as usize] != BodyKind::Static {
+        if depth <= slop || bodies.kind[contact.body_a as usize] != BodyKind::Static {
             continue;
         }
-        let limit = safe_squared[contact.body_b as usize].sqrt().max(2.0 * LINEAR_SLOP);
+        let limit = safe_squared[contact.body_b as usize].sqrt().max(2.0 * slop);
         let (row, n) = (&mut rows[contact.body_b as usize], contact.manifold.normal);
         let inward = -n.dot(Vec2::new(row.delta[0], row.delta[1]));
         let excess = (depth + inward - limit).min(inward);
@@ -46,6 +45,7 @@ mod tests {
     use super::*;
     use crate::engine::bodies::BodyDef;
     use crate::engine::contacts::{Manifold, ManifoldPoint};
+    use crate::engine::params::LINEAR_SLOP;
     use crate::engine::shapes::MassProperties;
 
     #[test]
@@ -63,7 +63,7 @@ mod tests {
             let contact = Contact { manifold, body_a, body_b: 2, ..Default::default() };
             let mut rows = vec![BodyRow::default(); 3];
             (rows[2].delta, rows[2].velocity) = ([1.0, y, 0.3, 0.0], [6.0, 60.0 * y, 2.0, 1.0]);
-            hold(&bodies, &[contact], &safe, &mut rows);
+            hold(&bodies, &[contact], &safe, LINEAR_SLOP, &mut rows);
             (rows[2].delta[1], rows[2].velocity[1], rows[2].delta[0])
         };
         let (y, v, x) = way(0, -0.45, -0.04);

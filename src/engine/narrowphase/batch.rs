@@ -1,5 +1,6 @@
 //! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
 
+use super::Margins;
 use super::circles::{self, Rolling};
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
@@ -145,8 +146,8 @@ pub struct Input<'a> {
     pub rolling: Option<Rolling>,
     /// Shapes by number.
     pub shapes: &'a Shapes,
-    /// Points farther apart are left out (m).
-    pub speculative: f32,
+    /// Which points are left out, and what is small.
+    pub margins: Margins,
 }
 
 /// Collides every job and updates its contact: geometry recomputed, impulses kept where the feature
@@ -229,19 +230,19 @@ fn run<L: Lanes, const KIND: usize>(
 ) -> usize {
     // Vectors that spill do so within cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, speculative } = input;
+    let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, margins } = input;
     match const { PairKind::ALL[KIND] } {
         PairKind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            (rectangles::collide(&pair, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
+            (rectangles::collide(&pair, margins).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
         }),
         PairKind::Circles => {
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::<L>::gather(poses, bodies);
                 let pair = ShapePair::gather(poses, rows, shapes);
                 let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                circles::in_step(&pair, ways, rolling, speculative)
+                circles::in_step(&pair, ways, rolling, margins)
             })
         }
         PairKind::Hulls => {
@@ -249,7 +250,7 @@ fn run<L: Lanes, const KIND: usize>(
             run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                (pair.collide(&poses, speculative).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
+                (pair.collide(&poses, margins).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
             })
         }
         PairKind::HullCircle => {
@@ -258,7 +259,7 @@ fn run<L: Lanes, const KIND: usize>(
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap, radii) = pair.in_step(&poses, ways, rolling, speculative);
+                let (touch, gap, radii) = pair.in_step(&poses, ways, rolling, margins);
                 (touch.on_held(poses.held[0]).with_gap(gap), radii)
             })
         }
@@ -268,7 +269,7 @@ fn run<L: Lanes, const KIND: usize>(
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
                 let ways = [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap, [hull, circle]) = pair.in_step(&poses, ways, rolling, speculative);
+                let (touch, gap, [hull, circle]) = pair.in_step(&poses, ways, rolling, margins);
                 (touch.swapped().on_held(poses.held[1]).with_gap(gap), [circle, hull])
             })
         }

@@ -13,9 +13,9 @@
 //! right at the end of the step, and circles that do not touch are left alone. Circles that graze each other less
 //! deeply, and have passed by the end of the step, may do so until the next step finds them.
 
+use super::Margins;
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, rotate};
 use crate::engine::lanes::Lanes;
-use crate::engine::params::LINEAR_SLOP;
 
 /// Shares of the slop: from which term on circles pass, and what gap they then have at the end (1).
 pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
@@ -23,8 +23,8 @@ pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
 /// The gap (m) of two circles whose centers are `distance` apart (m) and that move by `way` against each other in the
 /// coming step (m); see the [module](self).
 #[inline(always)]
-pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
-    let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(LINEAR_SLOP));
+pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) -> L {
+    let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(slop));
     let gap = touch.separation[0];
     let [nx, ny] = touch.normal;
     let along = nx.mul_add(way[0], ny * way[1]);
@@ -40,7 +40,7 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2]) -> L {
     let until = part.max(zero).min(one);
     let closest = length(until.mul_add(along, distance), until * across) - (distance - gap);
     let raised = gap + bend;
-    let free = L::splat(PASSING[1] * LINEAR_SLOP) - along;
+    let free = slop * L::splat(PASSING[1]) - along;
     let has_passed = (one - part).min(bend - slop * L::splat(PASSING[0]));
     let raised = has_passed.select_positive(raised.max(free), raised);
     gap.min(closest + slop).select_positive(raised, gap)
@@ -82,12 +82,12 @@ pub fn in_step<L: Lanes>(
     pair: &ShapePair<L>,
     ways: [[L; 4]; 2],
     rolling: Option<Rolling>,
-    speculative: f32,
+    margins: Margins,
 ) -> (Touch<L>, [L; 2]) {
-    let (touch, distance) = with_distance(pair, speculative);
+    let (touch, distance) = with_distance(pair, margins.speculative);
     let way = pair.way(ways);
     let held = pair.poses.held[0];
-    let gap = passing(&touch, distance, way);
+    let gap = passing(&touch, distance, way, margins.slop);
     let touch = touch.on_held(held);
     let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
     let gap = rolling.rolls(dot(touch.normal, way)).select_positive(touch.separation[0], gap);

@@ -17,22 +17,22 @@
 //!
 //! Source: Sutherland, Hodgman 1974 (clipping).
 
+use super::Margins;
 use super::lanes::{Touch, perp};
 use crate::engine::lanes::Lanes;
-use crate::engine::params::LINEAR_SLOP;
 
 /// Between flush faces, b's becomes the reference only if it is better
-/// by this much (m). They tie in exact arithmetic; without a preference their
+/// by this share of the slop (1). They tie in exact arithmetic; without a preference their
 /// roles, and with them normal and separations, would follow the rounding.
-pub const REFERENCE_TOLERANCE: f32 = 0.1 * LINEAR_SLOP;
+pub const REFERENCE_TOLERANCE: f32 = 0.1;
 
 /// Faces are flush if the cosine between their normals is below this (1): 0.01 rad, by
 /// which the preference above then turns the normal at most.
 pub const FLUSH: f32 = -0.99995;
 
-/// Vertices closer than this (m) do not define a normal: its rounding, about 1e-7 of
+/// Vertices closer than this share of the slop (1) do not define a normal: its rounding, about 1e-7 of
 /// the coordinates over this length, would show. Points closer than this are one.
-const VERTEX_TOLERANCE: f32 = 0.01 * LINEAR_SLOP;
+const VERTEX_TOLERANCE: f32 = 0.01;
 
 /// Part of a face (1) that is a graze, if it is less than the slop; see [`Touch::without_grazes`].
 const GRAZE: f32 = 0.25;
@@ -63,18 +63,19 @@ pub struct Faces<L> {
     pub radii: [L; 2],
 }
 
-/// The contact of two faces; points farther apart than `speculative` (m) are left out.
+/// The contact of two faces; points farther apart than `margins.speculative` (m) are left out.
 ///
 /// `nearest(end, wanted)` is the way from `end` to the nearest point of the incident hull, in
 /// (N, T); only where `wanted` is positive does it matter.
 #[inline(always)]
 pub fn touch<L: Lanes>(
     faces: &Faces<L>,
-    speculative: f32,
+    margins: Margins,
     nearest: impl FnOnce([L; 2], L) -> [L; 2],
 ) -> Touch<L> {
     let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
-    let (none, speculative) = (-one, L::splat(speculative));
+    let (none, speculative) = (-one, L::splat(margins.speculative));
+    let same = L::splat(VERTEX_TOLERANCE * margins.slop);
     let Faces { normal: n, flip, top, range: [low, high], ends: [left, right], .. } = *faces;
     let [[first, second], [left_name, right_name]] = faces.names;
     let [r_radius, i_radius] = faces.radii;
@@ -120,7 +121,7 @@ pub fn touch<L: Lanes>(
     let end = [top, past_low.select_positive(low, high)];
     let g = nearest(end, apart.min(-faces.beyond));
     let distance = g[0].mul_add(g[0], g[1] * g[1]).sqrt();
-    let away = distance - L::splat(VERTEX_TOLERANCE);
+    let away = distance - same;
     let inverse = one / away.select_positive(distance, one);
     let g = [away.select_positive(g[0] * inverse, one), away.select_positive(g[1] * inverse, zero)];
     let s_past = distance - radii;
@@ -131,11 +132,11 @@ pub fn touch<L: Lanes>(
 
     // Flush faces that pass each other by less than a graze.
     let width = t_left - t_right;
-    let graze = L::splat(LINEAR_SLOP).min(L::splat(GRAZE) * extent.min(high - low));
+    let graze = L::splat(margins.slop).min(L::splat(GRAZE) * extent.min(high - low));
     let passes = parallel.min(graze - width).min(s_0.min(s_1));
 
     // Which points there are. A cut that leaves next to nothing leaves the deeper end.
-    let one_point = L::splat(VERTEX_TOLERANCE) - width;
+    let one_point = same - width;
     // To keep the far point of a pair whose other point is near was tried: it changes overlaps in
     // piles by −4 % to +4 % and gives the solver a seventh more points.
     let near = |s: L| (s - speculative).select_positive(none, one);

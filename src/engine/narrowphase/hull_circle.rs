@@ -5,11 +5,11 @@
 //! is past one of its ends, the center is h n + o n⊥ from it: along n itself over the face, so
 //! that long segments round nothing, and inside the core.
 
+use super::Margins;
 use super::circles::{PASSING, Rolling, arrival};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
-use crate::engine::params::LINEAR_SLOP;
 
 /// Hulls as a, circles as b.
 pub struct HullCircle<L> {
@@ -43,7 +43,7 @@ impl<L: Lanes> HullCircle<L> {
     }
 
     /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
-    /// than `speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
+    /// than `margins.speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
     /// And their radii of curvature, where `rolling` requests them, of the hull and of the circle.
     #[inline(always)]
     pub fn in_step(
@@ -51,7 +51,7 @@ impl<L: Lanes> HullCircle<L> {
         poses: &Poses<L>,
         ways: [[L; 4]; 2],
         rolling: Option<Rolling>,
-        speculative: f32,
+        margins: Margins,
     ) -> (Touch<L>, L, [L; 2]) {
         let way = self.way(poses, ways);
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
@@ -85,7 +85,7 @@ impl<L: Lanes> HullCircle<L> {
         let separation = distance - (self.hull.head[0] + radius);
         let way = unrotate(rotation_a, way);
         let gap = {
-            let slop = L::splat(LINEAR_SLOP);
+            let slop = L::splat(margins.slop);
             let (up, aside) = (dot(n, way), dot(t, way));
             let toward = height.mul_add(up, past * aside);
             let length_of = |x: L, y: L| x.mul_add(x, y * y).sqrt();
@@ -131,7 +131,7 @@ impl<L: Lanes> HullCircle<L> {
         let anchor_a = [anchor_b[0] + between[0], anchor_b[1] + between[1]];
         let touch = Touch {
             normal,
-            count: (separation - L::splat(speculative)).select_positive(zero, one),
+            count: (separation - L::splat(margins.speculative)).select_positive(zero, one),
             anchor_a: [anchor_a; 2],
             anchor_b: [anchor_b; 2],
             separation: [separation; 2],

@@ -16,6 +16,7 @@
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
+use super::Margins;
 use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, Touch, dot, perp, rotate, unrotate};
@@ -53,13 +54,13 @@ impl<L: Lanes> Hulls<L> {
 
     /// Their contacts; points farther apart than `speculative` (m) are left out.
     #[inline(always)]
-    pub fn collide(&mut self, poses: &Poses<L>, speculative: f32) -> Touch<L> {
+    pub fn collide(&mut self, poses: &Poses<L>, margins: Margins) -> Touch<L> {
         let (zero, count) = (L::zero(), self.count);
         let [a, b] = &self.hulls;
         let (corners_a, corners_b) = (&a.corners[..count], &b.corners[..count]);
         let (face_a, face_b) = (HullFace::best(corners_a, corners_b), HullFace::best(corners_b, corners_a));
         let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
-        let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE), zero);
+        let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE * margins.slop), zero);
         // Where positive, b's face is the reference.
         let flip = face_b.gap - (face_a.gap + preference);
         let pick = |b: L, a: L| flip.select_positive(b, a);
@@ -81,7 +82,7 @@ impl<L: Lanes> Hulls<L> {
             origin: [zero; 2],
             centers: poses.centers,
             flip,
-            beyond: face_a.gap.max(face_b.gap) - (L::splat(speculative) + (radii[0] + radii[1])),
+            beyond: face_a.gap.max(face_b.gap) - (L::splat(margins.speculative) + (radii[0] + radii[1])),
             top: dot(v_1, n),
             range: [dot(v_1, t), dot(v_2, t)],
             ends: [left, right],
@@ -92,7 +93,7 @@ impl<L: Lanes> Hulls<L> {
             ],
             radii,
         };
-        clip::touch(&faces, speculative, |end, wanted| {
+        clip::touch(&faces, margins, |end, wanted| {
             if !wanted.any_positive() {
                 return [zero; 2];
             }

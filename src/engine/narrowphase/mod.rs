@@ -38,6 +38,7 @@ pub mod lanes;
 pub mod rectangles;
 
 use crate::engine::contacts::Manifold;
+use crate::engine::params::{LINEAR_SLOP, SPECULATIVE_DISTANCE};
 use crate::engine::shapes::{Pose, Shape};
 use batch::PairKind;
 use hull::HullRow;
@@ -63,7 +64,7 @@ use lanes::{Poses, ShapePair, ShapeRow, Touch};
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
-    touch([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, speculative_distance)
+    touch([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, Margins::within(speculative_distance))
         .map_or_else(Manifold::default, |touch| touch.manifold())
 }
 
@@ -75,10 +76,31 @@ pub fn collide_in_step(
     [pose_a, pose_b]: [&Pose; 2],
     ways: [[f32; 4]; 2],
     a_is_held: bool,
-    speculative_distance: f32,
+    margins: Margins,
 ) -> Manifold {
-    touch([a, b], [pose_a, pose_b], ways, a_is_held, speculative_distance)
+    touch([a, b], [pose_a, pose_b], ways, a_is_held, margins)
         .map_or_else(Manifold::default, |touch| touch.without_grazes().manifold())
+}
+
+/// Small distances of a collision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Points farther apart are left out (m).
+    pub speculative: f32,
+    /// Overlap that position correction leaves alone (m).
+    pub slop: f32,
+}
+
+impl Margins {
+    /// Of bodies of about `length_unit` (m).
+    pub fn of(length_unit: f32) -> Self {
+        Margins { speculative: SPECULATIVE_DISTANCE * length_unit, slop: LINEAR_SLOP * length_unit }
+    }
+
+    /// Of bodies of about a meter, to points that are so far apart (m).
+    pub fn within(speculative: f32) -> Self {
+        Margins { speculative, slop: LINEAR_SLOP }
+    }
 }
 
 /// The result of [`collide_in_step`], including grazes; none for two segments.
@@ -87,7 +109,7 @@ fn touch(
     [pose_a, pose_b]: [&Pose; 2],
     ways: [[f32; 4]; 2],
     a_is_held: bool,
-    speculative_distance: f32,
+    margins: Margins,
 ) -> Option<Touch<f32>> {
     // What lanes do in a step is done here with one lane: the same bits.
     let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
@@ -96,23 +118,23 @@ fn touch(
     let held = f32::from(u8::from(a_is_held));
     let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
     let touch = match kind {
-        PairKind::Rectangles => rectangles::collide(&pair, speculative_distance).on_held(held),
+        PairKind::Rectangles => rectangles::collide(&pair, margins).on_held(held),
         PairKind::Circles => {
             let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
-            circles::in_step(&pair, ways, None, speculative_distance).0
+            circles::in_step(&pair, ways, None, margins).0
         }
         PairKind::Hulls => {
             let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
-            hulls.collide(&poses, speculative_distance).on_held(held)
+            hulls.collide(&poses, margins).on_held(held)
         }
         PairKind::HullCircle => {
             let pair = HullCircle::new(HullRow::new(a), row_b);
-            let (touch, gap, _) = pair.in_step(&poses, ways, None, speculative_distance);
+            let (touch, gap, _) = pair.in_step(&poses, ways, None, margins);
             touch.on_held(held).with_gap(gap)
         }
         PairKind::CircleHull => {
             let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
-            let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, speculative_distance);
+            let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, margins);
             touch.swapped().on_held(held).with_gap(gap)
         }
     };

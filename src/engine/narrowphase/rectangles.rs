@@ -15,13 +15,14 @@
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
+use super::Margins;
 use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, perp, rotate};
 use crate::engine::lanes::Lanes;
 
-/// Contacts of the rectangles of `pair`; points farther apart than `speculative` (m) are left out.
+/// Contacts of the rectangles of `pair`; points farther apart than `margins.speculative` (m) are left out.
 #[inline(always)]
-pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
+pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     let (zero, one) = (L::zero(), L::splat(1.0));
     let [[place_a, place_b], [size_a, size_b]] = [pair.place, pair.size];
     let Poses { centers, rotation: [rotation_a, rotation_b], .. } = pair.poses;
@@ -32,7 +33,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let d = [centers[0] + (offset_b[0] - offset_a[0]), centers[1] + (offset_b[1] - offset_a[1])];
     let [h_a, h_b] = [[size_a[0], size_a[1]], [size_b[0], size_b[1]]];
     let radii = size_a[2] + size_b[2];
-    let reach = L::splat(speculative) + radii;
+    let reach = L::splat(margins.speculative) + radii;
 
     // (1) for every axis. |u_a·u_b| and |u_a·u_b⊥| are all the projections there are.
     let (c, s) = (abs(dot(u_a, u_b)), abs(dot(perp(u_a), u_b)));
@@ -48,7 +49,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     let (gap_a, gap_b) = (gap_ax.max(gap_ay), gap_bx.max(gap_by));
 
     let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
-    let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE), zero);
+    let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE * margins.slop), zero);
     // Where positive, b's face is the reference.
     let flip = gap_b - (gap_a + preference);
     let pick = |b: L, a: L| flip.select_positive(b, a);
@@ -97,7 +98,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
         radii: [r_radius, i_radius],
     };
     // The nearest point of a rectangle to a point e is e clamped to it.
-    clip::touch(&faces, speculative, |end, _| {
+    clip::touch(&faces, margins, |end, _| {
         let e = [end[0] - i_center[0], end[1] - i_center[1]];
         let e = [dot(e, u), dot(e, perp(u))];
         let clamp = |x: L, h: L| x.min(h).max(-h) - x;

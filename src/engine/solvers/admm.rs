@@ -51,7 +51,7 @@ use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::body_matrix::{BodyMatrix, velocities};
 use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, System, numerics::cone};
 use crate::engine::lanes::Lanes;
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -142,7 +142,7 @@ impl Solver for Admm {
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h) = (passes.budget(), passes.h());
         let [fraction, penalty, every, limit] = [0, 1, 2, 3].map(|i| passes.parameter(i));
-        let rule = Baumgarte::new(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, h);
+        let rule = Baumgarte::new(fraction, passes.slop(), passes.push_speed(), h);
         self.penalty = f64::from(penalty);
         for substep in 0..budget.substeps {
             passes.integrate_velocities();

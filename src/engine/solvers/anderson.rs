@@ -35,7 +35,7 @@ use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::numerics::matrix::solve_in_place;
 use crate::engine::constraints::records::point_vector::{difference, dot, plus_scaled, update};
 use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -68,7 +68,7 @@ const GROWTH: f64 = 4.0;
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::rule(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     let depth = passes.parameter(1) as usize;
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

@@ -37,7 +37,7 @@ use crate::engine::constraints::records::point_vector::{
 };
 use crate::engine::constraints::vectors::spectral::ImpulseProblem;
 use crate::engine::constraints::{ImpactLaw, Passes, Solver, numerics::cone};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -79,7 +79,7 @@ impl Solver for Apgd {
 
 fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
     let (budget, h) = (passes.budget(), passes.h());
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), h);
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

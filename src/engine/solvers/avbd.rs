@@ -208,6 +208,7 @@ impl Avbd {
                 poses,
                 graph: &self.graph,
                 h: input.h,
+                length_unit: input.length_unit,
             },
         );
         // Each contact is looked at from both of its bodies, and the numbers of its points are kept.

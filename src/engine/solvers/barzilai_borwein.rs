@@ -28,7 +28,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -45,7 +45,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

@@ -52,7 +52,7 @@ use crate::engine::constraints::vectors::system::{Pair, PointRows};
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule, System};
 use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::BodyRow;
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 use law::IslandLaw;
 
 /// See the [module](self).
@@ -116,8 +116,8 @@ const TOLERANCE: f64 = 1e-10;
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
-    let sweep = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+    let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), h);
+    let sweep = Baumgarte::rule(passes.parameter(0), passes.slop(), passes.push_speed(), h);
     let [sweeps, largest] = [1, 2].map(|i| passes.parameter(i) as usize);
     let by_pivots = passes.parameter(3) >= 0.5;
     for substep in 0..budget.substeps {

@@ -52,7 +52,7 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::lanes::{BodyRow, Lanes};
-use crate::engine::params::{LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::Parameter;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -67,7 +67,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

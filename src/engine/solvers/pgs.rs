@@ -42,7 +42,7 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -58,7 +58,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::rule(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

@@ -22,7 +22,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Soft;
 use crate::engine::constraints::{Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_POSITION_CORRECTION, Parameter};
+use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -45,8 +45,8 @@ fn step(passes: &mut Passes<'_>) {
     let rigid = Soft::without_springs(passes.h());
     let positions = PositionSweep {
         fraction: passes.parameter(0),
-        slop: LINEAR_SLOP,
-        max_correction: MAX_POSITION_CORRECTION,
+        slop: passes.slop(),
+        max_correction: MAX_POSITION_CORRECTION * passes.length_unit(),
         turned: true,
     };
     for substep in 0..budget.substeps {

@@ -82,7 +82,7 @@ struct PhysX {
 
 impl Solver for PhysX {
     fn step(&mut self, passes: &mut Passes<'_>) {
-        let (budget, h) = (passes.budget(), passes.h());
+        let (budget, h, reach) = (passes.budget(), passes.h(), REACH * passes.length_unit());
         let [baumgarte, push_speed] = [0, 1].map(|i| passes.parameter(i));
         let fraction = baumgarte.min(2.0 / (budget.substeps as f32).sqrt());
         let sticky = Sticky {
@@ -90,7 +90,7 @@ impl Solver for PhysX {
             fraction,
             push_speed,
             stick: fraction,
-            reach: REACH,
+            reach,
             patch: Some(Patch { ease: fraction, shallowest: f32::MIN }),
         };
         let velocity = Sticky { patch: Some(Patch { ease: fraction, shallowest: 0.0 }), ..sticky };
@@ -118,7 +118,7 @@ impl Solver for PhysX {
         passes.bounce(budget.substeps - 1);
         // Impulses add up over the whole step, as nothing is applied twice.
         passes.book_impulses();
-        self.drifts.book(passes, REACH);
+        self.drifts.book(passes, reach);
     }
 
     fn boxed(&self) -> Box<dyn Solver> {

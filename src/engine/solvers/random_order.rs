@@ -23,7 +23,7 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::{Passes, Schedule, SweepOrder};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -49,7 +49,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::rule(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     let seed = u64::from(passes.parameter(1).to_bits()) << 32;
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

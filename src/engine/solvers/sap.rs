@@ -32,7 +32,7 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 use convex::Convex;
 
 /// See the [module](self).
@@ -71,7 +71,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
-    let rule = Baumgarte::new(passes.parameter(0), 0.0, MAX_PUSH_SPEED, h);
+    let rule = Baumgarte::new(passes.parameter(0), 0.0, passes.push_speed(), h);
     let [softness, millions] = [1, 2].map(|i| f64::from(passes.parameter(i)));
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

@@ -224,7 +224,7 @@ struct Shim {
 impl Solver for Shim {
     fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         if !scene.without.leaves_out(part::FRAMES) {
-            collision.rolling = Some(Rolling { limit: frames::STEADY });
+            collision.rolling = Some(Rolling { limit: frames::STEADY * scene.length_unit });
         }
     }
 
@@ -257,7 +257,8 @@ impl Solver for Shim {
         let relaxed = Relaxed { rule: rigid, factor: UNEQUAL_RELAXATION };
         if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
-            passes.run(Phase::Prepare, &mut Roll { middle, dt });
+            passes
+                .run(Phase::Prepare, &mut Roll { middle, dt, steady: frames::STEADY * passes.length_unit() });
         }
         self.impacts(passes);
         if passes.runs(Phase::Prepare) && passes.has(part::STATICS) {

@@ -31,7 +31,7 @@ use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::constraints::{Passes, Solver, SweepOrder};
 use crate::engine::contacts::Contact;
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -65,7 +65,7 @@ impl Solver for Shock {
 
     fn step(&mut self, passes: &mut Passes<'_>) {
         let budget = passes.budget();
-        let rule = Baumgarte::rule(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+        let rule = Baumgarte::rule(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
         let Shock { graph, masses } = self;
         for substep in 0..budget.substeps {
             passes.integrate_velocities();

@@ -21,7 +21,7 @@ use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -48,7 +48,7 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
     let [fraction, relaxation] = [0, 1].map(|i| passes.parameter(i));
-    let rule = Baumgarte::relaxed(fraction, LINEAR_SLOP, MAX_PUSH_SPEED, passes.h(), relaxation);
+    let rule = Baumgarte::relaxed(fraction, passes.slop(), passes.push_speed(), passes.h(), relaxation);
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

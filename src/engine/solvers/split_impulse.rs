@@ -23,7 +23,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
 use crate::engine::constraints::{Passes, Solver};
 use crate::engine::lanes::{BodyRow, held};
-use crate::engine::params::{Budget, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -65,7 +65,7 @@ impl Solver for SplitImpulse {
 fn step(passes: &mut Passes<'_>, before: &mut Vec<BodyRow>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rigid = Rigid::rule(h);
-    let push = Soft::baumgarte(passes.parameter(0), MAX_PUSH_SPEED, h).frictionless();
+    let push = Soft::baumgarte(passes.parameter(0), passes.push_speed(), h).frictionless();
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();

@@ -36,7 +36,7 @@ use crate::engine::constraints::records::point_vector::{PointEntry, Wide};
 use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
 use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
 use crate::engine::lanes::Lanes;
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -66,7 +66,7 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+    let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), passes.h());
     let inner = passes.parameter(1) as usize;
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

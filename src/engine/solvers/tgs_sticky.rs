@@ -79,9 +79,9 @@ struct TgsSticky {
 
 impl Solver for TgsSticky {
     fn step(&mut self, passes: &mut Passes<'_>) {
-        let (budget, h) = (passes.budget(), passes.h());
+        let (budget, h, reach) = (passes.budget(), passes.h(), REACH * passes.length_unit());
         let [fraction, stick, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-        let sticky = Sticky { h, fraction, push_speed, stick, reach: REACH, patch: None };
+        let sticky = Sticky { h, fraction, push_speed, stick, reach, patch: None };
         passes.forget_impulses();
         self.drifts.load(passes);
         for substep in 0..budget.substeps {
@@ -103,7 +103,7 @@ impl Solver for TgsSticky {
         }
         // Impulses add up over the whole step, as nothing is applied twice.
         passes.book_impulses();
-        self.drifts.book(passes, REACH);
+        self.drifts.book(passes, reach);
     }
 
     fn boxed(&self) -> Box<dyn Solver> {

@@ -26,7 +26,7 @@ use crate::engine::constraints::records::graph::Graph;
 use crate::engine::constraints::vectors::conjugate::Conjugate;
 use crate::engine::constraints::vectors::levels::Levels;
 use crate::engine::constraints::{Passes, Solver};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -49,7 +49,7 @@ struct TwoLevel {
 impl Solver for TwoLevel {
     fn step(&mut self, passes: &mut Passes<'_>) {
         let (budget, h) = (passes.budget(), passes.h());
-        let rule = Baumgarte::new(passes.parameter(0), LINEAR_SLOP, MAX_PUSH_SPEED, h);
+        let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), h);
         let TwoLevel { graph, levels } = self;
         passes.build_graph(graph);
         for substep in 0..budget.substeps {

@@ -28,7 +28,7 @@ impl World {
                 None => {
                     let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };
                     let [sa, sb] = [a, b].map(|shape| &self.surfaces[shape as usize]);
-                    let reach = sa.reach + sb.reach + SPECULATIVE_DISTANCE;
+                    let reach = sa.reach + sb.reach + self.settings.length_unit * SPECULATIVE_DISTANCE;
                     Candidate {
                         shapes: [a, b],
                         bodies: [a, b].map(|shape| self.shape_body[shape as usize]),

@@ -5,11 +5,11 @@ use crate::engine::constraints::Solver;
 use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Quad, held};
+use crate::engine::narrowphase::Margins;
 use crate::engine::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
 use crate::engine::narrowphase::candidate::{Candidate, Candidates};
 use crate::engine::narrowphase::circles::Rolling;
 use crate::engine::narrowphase::lanes::PoseRow;
-use crate::engine::params::SPECULATIVE_DISTANCE;
 use glam::Vec2;
 
 /// State of the narrow phase between steps.
@@ -105,7 +105,7 @@ impl World {
         };
         // Ways are longer than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input = Input { poses, ways, rolling, shapes, speculative: SPECULATIVE_DISTANCE };
+        let input = Input { poses, ways, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
         }
@@ -151,10 +151,11 @@ impl World {
             candidates: Candidates { all: candidates, of_kind, poses },
             contacts_changed: *is_changed,
             step_index: self.step_index,
-            parameters: &self.settings.parameters,
+            parameters: self.settings.scaled_parameters(),
             without: self.settings.without,
             gravity: Vec2::from(self.settings.gravity),
             dt: self.settings.dt,
+            length_unit: self.settings.length_unit,
             substeps: self.settings.budget.substeps,
         };
         hook(self.solver.as_mut(), &mut scene);

@@ -196,7 +196,7 @@ impl World {
                 }
             }
             let impulse = contact.step_impulse[0][0] + contact.step_impulse[1][0];
-            if approach_speed > HIT_SPEED && impulse > 0.0 {
+            if approach_speed > HIT_SPEED * self.settings.length_unit && impulse > 0.0 {
                 let (normal, point) = (contact.manifold.normal, point.to_array());
                 list.push(ContactEvent::Hit { bodies, shapes, point, normal, approach_speed, impulse });
             }

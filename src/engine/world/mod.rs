@@ -15,7 +15,7 @@ use crate::engine::contacts::Contact;
 use crate::engine::continuous::{Continuous, Moving};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::lanes::{Class, PoseRow};
-use crate::engine::params::DIVERGED_SPEED;
+use crate::engine::params::{DIVERGED_SPEED, LINEAR_SLOP};
 use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
@@ -210,7 +210,9 @@ impl World {
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
-            let World { bodies, shapes, proxies, contacts, slots, joints, broadphase, work, .. } = self;
+            let World {
+                bodies, shapes, proxies, contacts, slots, joints, broadphase, work, settings, ..
+            } = self;
             if std::mem::take(&mut self.continuous_is_stale) {
                 let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes);
                 let each = lives.zip(&bodies.kind).map(|(((&lives, &first), &count), &kind)| {
@@ -224,6 +226,7 @@ impl World {
                 shapes,
                 proxies,
                 contacts,
+                slop: LINEAR_SLOP * settings.length_unit,
                 apart: &|pair| joints.keeps_apart(pair),
                 near: &|area, visit| {
                     broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));
@@ -316,7 +319,8 @@ impl World {
             features: self.kernel_features(),
             budget: s.budget,
             h: s.h(),
-            parameters: s.parameters,
+            length_unit: s.length_unit,
+            parameters: s.scaled_parameters(),
             without: s.without,
             phases,
             record_impulses: s.record_impulses || s.contact_events,

@@ -5,8 +5,8 @@ use super::World;
 impl World {
     /// Renews the bounds of shapes that left theirs; if any did, brings the pairs up to date.
     pub(super) fn update_pairs(&mut self) {
-        let World { bodies, proxies, pairs, .. } = self;
-        let moved = self.fat_boxes.update(bodies, self.settings.dt, proxies);
+        let World { bodies, proxies, pairs, settings, .. } = self;
+        let moved = self.fat_boxes.update(bodies, [settings.dt, settings.length_unit], proxies);
         if self.pairs_are_stale {
             self.broadphase.pairs(proxies, pairs);
         } else if !moved.is_empty() {

@@ -31,6 +31,8 @@ struct SavedSettings {
     budget: Budget,
     gravity: [f32; 2],
     dt: f32,
+    #[serde(default = "one")]
+    length_unit: f32,
     parameters: Parameters,
     /// Names of mechanisms that are left out.
     #[serde(default)]
@@ -58,6 +60,7 @@ impl Serialize for Settings {
             budget: s.budget,
             gravity: s.gravity,
             dt: s.dt,
+            length_unit: s.length_unit,
             parameters: s.parameters,
             without: {
                 let names = s.solver.mechanisms.iter().enumerate();
@@ -76,6 +79,11 @@ impl Serialize for Settings {
         };
         saved.serialize(to)
     }
+}
+
+/// A meter.
+fn one() -> f32 {
+    1.0
 }
 
 /// Errors: a solver that is not in the table, a number of lanes that is none of 1, 4, 8 and 16.
@@ -98,6 +106,7 @@ impl<'de> Deserialize<'de> for Settings {
             budget: s.budget,
             gravity: s.gravity,
             dt: s.dt,
+            length_unit: s.length_unit,
             parameters: s.parameters,
             impacts: s.impacts,
             record_impulses: s.record_impulses,

@@ -75,6 +75,10 @@ pub struct Settings {
     pub gravity: [f32; 2],
     /// Step (s).
     pub dt: f32,
+    /// Size of typical bodies (m). Lengths and speeds of the engine's own, such as the slop and the push speed
+    /// ([`crate::engine::params`]), are for bodies of about a meter, and are multiplied by this, as are `parameters` in m
+    /// and m/s. So a scene moves in the same way at any scale.
+    pub length_unit: f32,
     /// The solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out, see [`Variant::mechanism`].
@@ -114,6 +118,7 @@ impl Settings {
             budget: solver.budget,
             gravity: [0.0, -10.0],
             dt: 1.0 / 60.0,
+            length_unit: 1.0,
             parameters: solver.defaults(),
             without: Without::default(),
             impacts: Impacts::Own,
@@ -137,6 +142,15 @@ impl Settings {
     /// The impact law of a step.
     pub fn impact_law(&self) -> ImpactLaw {
         self.impacts.law(self.solver.impacts)
+    }
+
+    /// The solver's parameters; those in m and m/s times the length unit.
+    pub(crate) fn scaled_parameters(&self) -> Parameters {
+        let mut values = self.parameters;
+        for (value, parameter) in values.iter_mut().zip(self.solver.parameters) {
+            *value *= if matches!(parameter.unit, "m" | "m/s") { self.length_unit } else { 1.0 };
+        }
+        values
     }
 
     /// Substep (s).

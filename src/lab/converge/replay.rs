@@ -174,6 +174,7 @@ impl<'a> Replay<'a> {
             features,
             budget,
             h,
+            length_unit: 1.0,
             parameters,
             without: Without::default(),
             phases,

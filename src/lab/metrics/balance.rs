@@ -246,6 +246,7 @@ mod tests {
             gap: 0.0,
             friction: 1.0,
             restitution: 0.0,
+            slowest: 1.0,
             impulse,
         }
     }

@@ -25,7 +25,6 @@
 //!   Newton's law, u_n = J v⁺ + e J v⁻.
 
 use super::state::BodyState;
-use crate::engine::params::RESTITUTION_THRESHOLD;
 use glam::DVec2;
 
 /// A contact point over one step; geometry at its start.
@@ -43,6 +42,8 @@ pub struct PointStep {
     pub friction: f64,
     /// Restitution.
     pub restitution: f64,
+    /// Slowest approach that bounces (m/s).
+    pub slowest: f64,
     /// Normal and tangential impulse on b over the step (N·s).
     pub impulse: [f64; 2],
 }
@@ -95,9 +96,8 @@ impl PointStep {
         let [approach, _] = self.relative_velocity(&a.before, &b.before);
         // A slow approach may bounce, or end at rest: it is held to what it did.
         let has_left = approach < 0.0 && end > -0.5 * self.restitution * approach;
-        let bounces = self.restitution > 0.0
-            && self.impulse[0] > 0.0
-            && (has_left || approach < -(RESTITUTION_THRESHOLD as f64));
+        let bounces =
+            self.restitution > 0.0 && self.impulse[0] > 0.0 && (has_left || approach < -self.slowest);
         let un = if bounces {
             end + self.restitution * approach
         } else if self.gap > 0.0 {
@@ -147,6 +147,7 @@ pub(super) mod tests {
             gap,
             friction: 0.5,
             restitution: 0.0,
+            slowest: 1.0,
             impulse,
         }
     }

@@ -56,6 +56,7 @@ pub mod violation;
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, pair_key};
+use crate::engine::params::RESTITUTION_THRESHOLD;
 use crate::engine::world::{Criterion, Divergence, Quantity, World};
 use balance::{Balance, ratio, weight};
 use distribution::Distribution;
@@ -524,6 +525,7 @@ fn snapshot(world: &World) -> Vec<BodyState> {
 /// Every contact point of the last step, with its bodies.
 fn contact_points(world: &World) -> Vec<([usize; 2], PointStep)> {
     let wide = |v: Vec2| v.as_dvec2();
+    let slowest = f64::from(RESTITUTION_THRESHOLD * world.settings.length_unit);
     let mut points = Vec::with_capacity(world.counts.points);
     for contact in &world.contacts {
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
@@ -534,6 +536,7 @@ fn contact_points(world: &World) -> Vec<([usize; 2], PointStep)> {
                 gap: point.separation as f64,
                 friction: contact.friction as f64,
                 restitution: contact.restitution as f64,
+                slowest,
                 impulse: impulse.map(f64::from),
             };
             points.push(([contact.body_a as usize, contact.body_b as usize], step));

@@ -29,14 +29,14 @@ impl Overlaps {
     /// Calls `each` with every pair of shapes that is as near as a contact, in a contact's order (the
     /// second is that of a dynamic body; no joint keeps them apart) and ascending by [pair](crate::engine::contacts::pair_key).
     pub fn find(&mut self, world: &World, mut each: impl FnMut([u32; 2], &Manifold)) {
-        let bodies = &world.bodies;
+        let (bodies, near) = (&world.bodies, SPECULATIVE_DISTANCE * world.settings.length_unit);
         // Bounds are relative to the first body: far from the origin they would round.
         let origin = if bodies.is_empty() { DVec2::ZERO } else { DVec2::from(bodies.center(0)) };
         let proxy = |(shape, &body): (&crate::engine::shapes::Shape, &u32)| {
             let i = body as usize;
             let position = (DVec2::from(bodies.center(i)) - origin).as_vec2();
             let pose = Pose { position, rotation: Vec2::new(bodies.rotation_cos[i], bodies.rotation_sin[i]) };
-            let aabb = shape.aabb(&pose).grown(SPECULATIVE_DISTANCE);
+            let aabb = shape.aabb(&pose).grown(near);
             Proxy { aabb, body, group: bodies.group[i], dynamic: bodies.is_dynamic(i) }
         };
         self.proxies.clear();
@@ -50,7 +50,7 @@ impl Overlaps {
             }
             let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
             let [shape_a, shape_b] = [a, b].map(|s| &world.shapes[s as usize]);
-            let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, SPECULATIVE_DISTANCE);
+            let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, near);
             if manifold.count > 0 {
                 each([a, b], &manifold);
             }

@@ -20,6 +20,9 @@ pub const MIN_DT: f64 = 1e-9;
 /// metrics that square them are no numbers.
 pub const MAX_DT: f64 = 1e3;
 
+/// Sizes of typical bodies (m): from cells to planets.
+pub const LENGTH_UNITS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
 /// Most steps of a run: 46 hours at 60 steps a second.
 pub const MAX_STEPS: u32 = 10_000_000;
 
@@ -27,7 +30,8 @@ impl Scene {
     /// Whether a world can be made of this scene.
     ///
     /// Errors, naming place and value: a name that is empty or has control characters;
-    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; no steps, or more than [`MAX_STEPS`];
+    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; `length_unit` outside
+    /// [`LENGTH_UNITS`]; no steps, or more than [`MAX_STEPS`];
     /// no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
     /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
     /// constructors refuse; a dynamic body without mass; a joint to a body that is not there, to itself or between two
@@ -55,6 +59,12 @@ impl Scene {
         if self.dt > MAX_DT {
             return Err(Error::invalid("dt", format!("must be at most {MAX_DT} s, is {:e} s", self.dt)));
         }
+        if !LENGTH_UNITS.contains(&self.length_unit) {
+            let [least, most] = [LENGTH_UNITS.start(), LENGTH_UNITS.end()];
+            let message =
+                format!("must be at least {least:e} m and at most {most:e} m, is {:?} m", self.length_unit);
+            return Err(Error::invalid("length_unit", message));
+        }
         if !(1..=MAX_STEPS).contains(&self.steps) {
             let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);
             return Err(Error::invalid("steps", message));
@@ -79,12 +89,12 @@ impl Scene {
         self.bodies.iter().enumerate().map(def).collect()
     }
 
-    /// A world with these bodies, in their order; gravity and step are the
+    /// A world with these bodies, in their order; gravity, step and length unit are the
     /// scene's, everything else is that of `settings`. Errors: as [`Scene::validate`].
     pub fn build(&self, settings: Settings) -> Result<World, Error> {
         let bodies = self.body_defs()?;
-        let gravity = self.gravity.map(|g| g as f32);
-        let mut world = World::new(Settings { gravity, dt: self.dt as f32, ..settings });
+        let (gravity, length_unit) = (self.gravity.map(|g| g as f32), self.length_unit as f32);
+        let mut world = World::new(Settings { gravity, dt: self.dt as f32, length_unit, ..settings });
         self.check_joints()?;
         let handles = bodies.iter().map(|body| world.add_body(body)).collect::<Result<Vec<_>, _>>()?;
         for joint in self.joint_defs(&handles) {

@@ -50,6 +50,9 @@ pub struct Scene {
     /// Number of steps of a run, ≥ 1.
     #[serde(default = "default_steps")]
     pub steps: u32,
+    /// Size of typical bodies (m), in [`LENGTH_UNITS`](super::LENGTH_UNITS), see [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub length_unit: f64,
     /// Conditions on a run; none: it is not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
@@ -312,10 +315,13 @@ impl Scene {
         } else {
             format!(", \"joints\": [\n{}\n]", joints.join(",\n"))
         };
+        let unit = line(serde_json::to_string(&self.length_unit));
+        let unit =
+            if is_one(&self.length_unit) { String::new() } else { format!("\"length_unit\": {unit}, ") };
         let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));
         let expect = expect.map_or(String::new(), |text| format!("\"expect\": {text}, "));
         format!(
-            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {expect}\"bodies\": [\n{}\n]{joints}}}\n",
+            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {unit}{expect}\"bodies\": [\n{}\n]{joints}}}\n",
             line(serde_json::to_string(&self.name)),
             line(serde_json::to_string(&self.gravity)),
             line(serde_json::to_string(&self.dt)),

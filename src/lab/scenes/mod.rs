@@ -43,7 +43,7 @@ mod washer;
 /// JSON schema of scene files (2020-12).
 pub const SCHEMA: &str = include_str!("scene.schema.json");
 
-pub use check::{MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
+pub use check::{LENGTH_UNITS, MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use expect::Measure;
 pub use expected::loaded as expecting;
 pub use format::{

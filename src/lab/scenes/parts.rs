@@ -14,6 +14,7 @@ impl Scene {
             gravity: DEFAULT_GRAVITY,
             dt: DEFAULT_DT,
             steps: DEFAULT_STEPS,
+            length_unit: 1.0,
             expect: None,
             bodies,
             joints: Vec::new(),

@@ -20,7 +20,6 @@ use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes};
-use crate::engine::params::RESTITUTION_THRESHOLD;
 
 /// Side record: per point u (m/s; zero where it does not bounce) and its effective mass (kg).
 pub(super) const fn stride(points: usize) -> usize {
@@ -33,6 +32,8 @@ pub struct FindBounces {
     pub h: f32,
     /// There are no masses to give back.
     pub is_first: bool,
+    /// The slowest approach that bounces (m/s).
+    pub slowest: f32,
     /// The fastest rebound (m/s); zero if nothing bounces.
     pub fastest: f32,
 }
@@ -90,7 +91,7 @@ fn begin<L: Lanes>(
             }
             let [v, gap] = point::<L>(rows, record, layout, p, row_a, row_b);
             let reaches = -v.mul_add(h, gap);
-            let is_hit = (L::splat(-RESTITUTION_THRESHOLD) - v).min(reaches).min(record[at]);
+            let is_hit = (L::splat(-to.slowest) - v).min(reaches).min(record[at]);
             let target = is_hit.select_positive(-(e * v), zero);
             (side[2 * p], side[2 * p + 1]) = (target, record[at]);
             record[at] = target.select_positive(zero, record[at]);

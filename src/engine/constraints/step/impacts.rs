@@ -8,6 +8,7 @@ use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::bounces::Bounces;
+use crate::engine::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread, see [`spread`].
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +27,7 @@ impl Passes<'_> {
     /// Lets what comes in bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
         let Spreading { timed, stops, lead, releases } = spreading;
-        let (h, dt) = (self.h(), self.dt());
+        let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
             return;
@@ -53,6 +54,7 @@ impl Passes<'_> {
             leads,
             dt,
             h,
+            slop,
             timed,
             releases,
             record_impulses: self.input.record_impulses,
@@ -74,6 +76,7 @@ impl Passes<'_> {
             ImpactLaw::None | ImpactLaw::Solver { .. } => {}
             ImpactLaw::Bias => self.begin_bias(true, self.input.h),
             ImpactLaw::EndPass { threshold, only_new } => {
+                let threshold = threshold * self.length_unit();
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
@@ -111,7 +114,8 @@ impl Passes<'_> {
 
     /// Finds what bounces within `h` (s).
     fn begin_bias(&mut self, is_first: bool, h: f32) {
-        let mut begin = bias::FindBounces { h, is_first, fastest: 0.0 };
+        let slowest = RESTITUTION_THRESHOLD * self.length_unit();
+        let mut begin = bias::FindBounces { h, is_first, slowest, fastest: 0.0 };
         self.over_contacts(&mut begin);
         self.biased = begin.fastest > 0.0;
     }

@@ -31,7 +31,7 @@ use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::constraints::vectors::system::Others;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::params::Budget;
+use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED};
 
 /// One step's problem, prepared.
 ///
@@ -126,6 +126,21 @@ impl<'a> Passes<'a> {
     /// Step (s).
     pub fn dt(&self) -> f32 {
         self.input.h * self.input.budget.substeps as f32
+    }
+
+    /// Size of typical bodies (m), [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
+    pub fn length_unit(&self) -> f32 {
+        self.input.length_unit
+    }
+
+    /// Overlap that position correction leaves alone (m).
+    pub fn slop(&self) -> f32 {
+        LINEAR_SLOP * self.input.length_unit
+    }
+
+    /// Fastest speed at which Baumgarte stabilization pushes overlap apart (m/s).
+    pub fn push_speed(&self) -> f32 {
+        MAX_PUSH_SPEED * self.input.length_unit
     }
 
     /// The solver's own parameter of this index in `Variant::parameters`.

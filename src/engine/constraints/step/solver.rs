@@ -63,13 +63,15 @@ pub struct CollisionScene<'a> {
     /// Steps taken.
     pub step_index: u64,
     /// The solver's own parameters.
-    pub parameters: &'a Parameters,
+    pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
     pub without: Without,
     /// m/s²
     pub gravity: Vec2,
     /// Step (s).
     pub dt: f32,
+    /// Size of typical bodies (m).
+    pub length_unit: f32,
     /// Substeps in it.
     pub substeps: u32,
 }

@@ -108,6 +108,8 @@ pub struct StepInput {
     pub budget: Budget,
     /// Substep (s).
     pub h: f32,
+    /// Size of typical bodies (m).
+    pub length_unit: f32,
     /// The solver's own parameters.
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.

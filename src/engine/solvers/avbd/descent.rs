@@ -179,7 +179,7 @@ fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut DescentInput<'_>)
     use quad::*;
     let quads: &[Quad] = bytemuck::cast_slice(on.contacts);
     let kept = on.kept.by_point().map(|points| bytemuck::cast_slice::<f32, Quad>(points));
-    let margin = L::splat(MARGIN);
+    let margin = L::splat(MARGIN * on.length_unit);
     let records: &mut [L] = bytemuck::cast_slice_mut(records);
     let sides: &[f32] = &ends.side;
     let bodies = ends.own.list().batches().zip(ends.other.list().batches());
@@ -405,7 +405,7 @@ fn raise<L: Lanes>(ends: &Ends, records: &[Block], on: &mut DescentInput<'_>, al
 fn hold<L: Lanes>(ends: &Ends, records: &[Block], on: &mut DescentInput<'_>) {
     let records: &[L] = bytemuck::cast_slice(records);
     let mut kept = on.kept.by_point().map(bytemuck::cast_slice_mut::<f32, Quad>);
-    let (zero, reach) = (L::zero(), L::splat(REACH));
+    let (zero, reach) = (L::zero(), L::splat(REACH * on.length_unit));
     let bodies = ends.own.list().batches().zip(ends.other.list().batches());
     let batches = ends.contact.list().batches().zip(bodies);
     for (record, (contact, (own, other))) in records.chunks_exact(RECORD).zip(batches) {

@@ -27,4 +27,6 @@ pub(crate) struct DescentInput<'a> {
     pub graph: &'a Graph,
     /// Substep (s).
     pub h: f32,
+    /// Size of typical bodies (m).
+    pub length_unit: f32,
 }

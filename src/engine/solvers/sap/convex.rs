@@ -605,7 +605,7 @@ mod tests {
     static WATCHED: Variant = Variant { name: "watched", make: || Schedule::boxed(step), ..Variant::BASE };
 
     fn step(passes: &mut Passes<'_>) {
-        let rule = Baumgarte::new(0.3, LINEAR_SLOP, MAX_PUSH_SPEED, passes.h());
+        let rule = Baumgarte::new(0.3, passes.slop(), passes.push_speed(), passes.h());
         passes.integrate_velocities();
         let (h, most) = (passes.h(), MOST_WORK.with_borrow(|most| *most));
         passes.with_system(Phase::Solve, |system| {

@@ -60,6 +60,8 @@ pub(super) struct Roll {
     pub middle: f32,
     /// Step (s).
     pub dt: f32,
+    /// See [`STEADY`] (m).
+    pub steady: f32,
 }
 
 impl Pass for Roll {
@@ -84,12 +86,12 @@ fn roll<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     kept: &mut [f32],
-    &Roll { middle, dt }: &Roll,
+    &Roll { middle, dt, steady }: &Roll,
 ) {
     let contacts: &[Quad] = bytemuck::cast_slice(contacts);
     let kept: &mut [Quad] = bytemuck::cast_slice_mut(kept);
     let (zero, one) = (L::zero(), L::splat(1.0));
-    let (tau, steady) = (L::splat(middle), L::splat(STEADY / dt));
+    let (tau, steady) = (L::splat(middle), L::splat(steady / dt));
     // The point is on b's surface if a is held, else in the middle of the gap.
     let of_gap = L::splat(if segment.pushes_a() { 0.5 } else { 0.0 });
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);

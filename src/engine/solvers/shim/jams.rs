@@ -69,7 +69,12 @@ impl Jams {
         self.pressed.clear();
         self.jammed.clear();
         for (i, contact) in contacts.iter().enumerate() {
-            if contact.manifold.points().iter().any(|point| point.separation < -LINEAR_SLOP) {
+            if contact
+                .manifold
+                .points()
+                .iter()
+                .any(|point| point.separation < -LINEAR_SLOP * scene.length_unit)
+            {
                 self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
             }
             for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {

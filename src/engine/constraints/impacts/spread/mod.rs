@@ -48,7 +48,6 @@ mod point;
 
 use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
-use crate::engine::params::LINEAR_SLOP;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 use point::{Body, HitPoint, Role, STILL};
@@ -76,9 +75,9 @@ const WAVES: [u32; 2] = [32, 4];
 /// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of the others adds one.
 const VISITS: [usize; 2] = [18, 8];
 
-/// How much deeper a point of an island that reached its bound may end (m): bodies that touch end in each other by what is left of their
+/// How much deeper a point of an island that reached its bound may end, as a share of the slop (1): bodies that touch end in each other by what is left of their
 /// approach.
-const DEEPER: f32 = 0.1 * LINEAR_SLOP;
+const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -215,6 +214,7 @@ impl Spread {
 
     /// Bodies stay where they are if one of their points would end deeper, visited or not.
     fn stay(&mut self, on: &mut SpreadInput<'_>) {
+        let deeper = DEEPER * on.slop;
         for i in 0..self.pushed.len() {
             let mut end = self.bodies[self.pushed[i] as usize].first;
             while end != NONE {
@@ -224,7 +224,7 @@ impl Spread {
         }
         self.pushed.clear();
         for point in self.points[self.first..].iter().filter(|point| point.mass > 0.0) {
-            if point.gap(on.rows) < point.separation.min(0.0) - DEEPER {
+            if point.gap(on.rows) < point.separation.min(0.0) - deeper {
                 self.pushed.extend(&point.rows[usize::from(!point.pushes_a)..]);
             }
         }

@@ -106,6 +106,8 @@ pub(crate) struct SpreadInput<'a> {
     /// Step and substep (s).
     pub dt: f32,
     pub h: f32,
+    /// Overlap that is left alone (m).
+    pub slop: f32,
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
     /// Points that an impact releases have borne their body until then.

@@ -37,6 +37,8 @@ pub(in super::super) struct Close<'a> {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
+    /// Size of typical bodies (m).
+    pub length_unit: f32,
 }
 
 impl Pass for Close<'_> {
@@ -60,14 +62,14 @@ fn close<L: Lanes>(
     layout: &Layout,
     kept: &mut [f32],
     increments: &[[f32; 4]],
-    &mut Close { ref mut fields, h, dt }: &mut Close<'_>,
+    &mut Close { ref mut fields, h, dt, length_unit }: &mut Close<'_>,
 ) {
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride).zip(contact.batches::<L::Index>());
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
     let increments: &[Quad] = bytemuck::cast_slice(increments);
     let (zero, one, open) = (L::zero(), L::splat(1.0), L::splat(OPEN));
-    let (closed, half_step) = (L::splat(CLOSED), L::splat(0.5 * dt));
+    let (closed, half_step) = (L::splat(CLOSED * length_unit), L::splat(0.5 * dt));
     let (per_step, per_substep, h) = (L::splat(dt / h), L::splat(1.0 / h), L::splat(h));
     let rows_of = row_a.batches().zip(row_b.batches());
     for (batch, ((record, index), (row_a, row_b))) in records.zip(rows_of).enumerate() {
@@ -128,7 +130,7 @@ fn close<L: Lanes>(
         }
         store::<L, 0>(quads, index, segment.filled(batch, L::WIDTH), loads);
         let calm = (calm + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
-        let calm = (L::splat(CALM_SPEED) - fastest).select_positive(calm, zero);
+        let calm = (L::splat(CALM_SPEED * length_unit) - fastest).select_positive(calm, zero);
         let at_once = calm - L::splat(CALM_TIME);
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let at_once = is_pair.select_positive(is_short.select_positive(zero, at_once), zero);

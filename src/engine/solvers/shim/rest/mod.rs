@@ -67,7 +67,7 @@ const OPEN: f32 = -1.0;
 impl Shim {
     /// Finds the loads of closed contacts and shortens `springs` by their sag.
     pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
-        let (h, dt) = (passes.h(), passes.dt());
+        let (h, dt, length_unit) = (passes.h(), passes.dt(), passes.length_unit());
         let [hands_down, rises, holds] =
             [part::HAND_DOWN, part::RISING, part::HELD].map(|part| passes.has(part));
         let fields = &mut self.fields;
@@ -80,7 +80,7 @@ impl Shim {
         for (field, _) in fields.iter_mut().zip(&self.joined).filter(|(_, joined)| **joined) {
             field.delta[JOINED - 4] = 1.0;
         }
-        passes.over_contacts(&mut closed::Close { fields, h, dt });
+        passes.over_contacts(&mut closed::Close { fields, h, dt, length_unit });
         if load_sweeps > 0 {
             let StepParts { work, contacts, .. } = passes.parts();
             let Workspace { kept, motion, .. } = work;
