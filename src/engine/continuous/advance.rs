@@ -141,6 +141,7 @@ fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::params::LINEAR_SLOP;
 
     /// A shape and its way.
     struct Moving<'s>(&'s Shape, Mover);
@@ -155,7 +156,7 @@ mod tests {
     }
 
     fn impact(a: &Moving<'_>, b: &Moving<'_>, limit: f32) -> f32 {
-        super::impact([a.0, b.0], [&a.1, &b.1], limit)
+        super::impact([a.0, b.0], [&a.1, &b.1], LINEAR_SLOP, limit)
     }
 
     fn rectangle(w: f32, h: f32) -> Shape {

@@ -287,8 +287,7 @@ impl Levels {
         }
         for (level, diagonal) in diagonal.iter().enumerate() {
             let mut shift = [[0.0; MODES]; MODES];
-            let whole: f64 = diagonal.iter().sum();
-            (0..MODES).for_each(|m| shift[m][m] = if whole > 0.0 { SHIFT * whole } else { 1.0 });
+            (0..MODES).for_each(|m| shift[m][m] = if diagonal[m] > 0.0 { SHIFT * diagonal[m] } else { 1.0 });
             self.envelope.add_block::<MODES>(level, level, shift);
         }
         self.moved = diagonal;

@@ -592,7 +592,6 @@ mod tests {
     use crate::engine::bodies::{BodyDef, ShapeDef};
     use crate::engine::clock::Phase;
     use crate::engine::constraints::{Passes, Schedule};
-    use crate::engine::params::{LINEAR_SLOP, MAX_PUSH_SPEED};
     use crate::engine::solvers::Variant;
     use crate::engine::world::{Settings, World};
     use std::cell::RefCell;
