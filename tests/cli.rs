@@ -52,6 +52,18 @@ fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
 }
 
 #[test]
+fn a_scene_in_pixels_is_told_to_set_its_length_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    for (unit, is_told) in [("1", true), ("100", false)] {
+        let bodies = r#"[{"type": "dynamic", "position": [0, 0], "shapes": [{"circle": {"radius": 50}}]}]"#;
+        let scene = format!(r#"{{"name": "x", "steps": 1, "length_unit": {unit}, "bodies": {bodies}}}"#);
+        std::fs::write(folder.path().join("x.json"), scene).unwrap();
+        let told = errors(&simpulse(folder.path(), &["run", "x.json"]));
+        assert_eq!(told.contains("set \"length_unit\""), is_told, "{told}");
+    }
+}
+
+#[test]
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let table: &[(&[&str], &[&str])] = &[

@@ -104,6 +104,20 @@ struct RunResult {
     rests: bool,
 }
 
+/// A line on bodies that are far from the length unit.
+fn size_note(world: &World) -> Option<String> {
+    let dynamic = |pair: &(_, &u32)| world.bodies.is_dynamic(*pair.1 as usize);
+    let shapes = world.shapes.iter().zip(&world.shape_body).filter(dynamic);
+    let widths = shapes.map(|(shape, _)| 2.0 * shape.min_half_extent());
+    let mut widths: Vec<f32> = widths.filter(|width| width.is_finite()).collect();
+    widths.sort_by(f32::total_cmp);
+    let (width, unit) = (*widths.get(widths.len() / 2)?, world.settings.length_unit);
+    (!(0.02 * unit..=50.0 * unit).contains(&width)).then(|| {
+        let [width, unit] = [width, unit].map(|length| si(f64::from(length), "m"));
+        format!("note: bodies are about {width} wide and the length unit is {unit}: set \"length_unit\" in the scene file\n")
+    })
+}
+
 /// Runs the scene; writes its files once all of it has run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = settings(&args.setting, args.order, args.lanes)?;
@@ -134,6 +148,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let scene = &loaded.scene;
     note(&estimate(scene, &settings).note("run", free_memory())?);
     let mut world = scene.build(settings)?;
+    note(&size_note(&world).unwrap_or_default());
     let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
     let mut contacts =
         args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
