@@ -1,7 +1,8 @@
 //! Tuning constants with their units, and the budget of a step.
 //!
 //! Lengths and speeds are for bodies of about a meter. A world of others has a
-//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied.
+//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied; not so
+//! [`DIVERGED_SPEED`], gravity and density.
 
 /// Overlap that position correction leaves alone (m), so that resting contacts stay contacts.
 /// Larger: visible overlap. Smaller: contacts flicker.

@@ -22,7 +22,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Soft;
 use crate::engine::constraints::{Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, Parameter};
+use crate::engine::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -46,7 +46,7 @@ fn step(passes: &mut Passes<'_>) {
     let positions = PositionSweep {
         fraction: passes.parameter(0),
         slop: passes.slop(),
-        max_correction: MAX_POSITION_CORRECTION * passes.length_unit(),
+        max_correction: passes.max_correction(),
         turned: true,
     };
     for substep in 0..budget.substeps {

@@ -21,7 +21,7 @@ use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Touching;
 use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, MAX_POSITION_CORRECTION};
+use crate::engine::params::Budget;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -38,12 +38,8 @@ pub static SOLVER: Variant = Variant {
 
 fn step(passes: &mut Passes<'_>) {
     let budget = passes.budget();
-    let positions = PositionSweep {
-        fraction: 1.0,
-        slop: 0.0,
-        max_correction: MAX_POSITION_CORRECTION * passes.length_unit(),
-        turned: false,
-    };
+    let positions =
+        PositionSweep { fraction: 1.0, slop: 0.0, max_correction: passes.max_correction(), turned: false };
     let touching = Touching::rule(passes.slop());
     for substep in 0..budget.substeps {
         passes.forget_impulses();

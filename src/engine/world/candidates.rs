@@ -21,17 +21,23 @@ impl World {
         let mut last = narrow.last_candidates.iter().peekable();
         let mut kept = 0;
         for &[i, j] in &self.pairs {
+            let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };
+            let [sa, sb] = [a, b].map(|shape| &self.surfaces[shape as usize]);
+            let bodies = [a, b].map(|shape| self.shape_body[shape as usize]);
+            // Two segments never touch.
+            let Some(kind) = PairKind::of(sa.class, sb.class) else { continue };
+            if self.joints.keeps_apart(bodies) {
+                continue;
+            }
             let key = pair_key(i, j);
             while last.next_if(|old| old.pair() < key).is_some() {}
             let candidate = match last.next_if(|old| old.pair() == key) {
                 Some(old) => *old,
                 None => {
-                    let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };
-                    let [sa, sb] = [a, b].map(|shape| &self.surfaces[shape as usize]);
                     let reach = sa.reach + sb.reach + self.settings.length_unit * SPECULATIVE_DISTANCE;
                     Candidate {
                         shapes: [a, b],
-                        bodies: [a, b].map(|shape| self.shape_body[shape as usize]),
+                        bodies,
                         numbers: [sa.number, sb.number],
                         reach_squared: reach * reach * REACH_ROUNDING,
                         friction: (sa.friction * sb.friction).sqrt(),
@@ -41,13 +47,6 @@ impl World {
                 }
             };
             kept += usize::from(candidate.contact != NO_CONTACT);
-            let [a, b] = candidate.shapes.map(|shape| self.surfaces[shape as usize].class);
-            // Two segments never touch.
-            let Some(kind) = PairKind::of(a, b) else { continue };
-            if self.joints.keeps_apart(candidate.bodies) {
-                kept -= usize::from(candidate.contact != NO_CONTACT);
-                continue;
-            }
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
         }

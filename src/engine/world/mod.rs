@@ -14,8 +14,9 @@ use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCou
 use crate::engine::contacts::Contact;
 use crate::engine::continuous::{Continuous, Moving};
 use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::Margins;
 use crate::engine::narrowphase::lanes::{Class, PoseRow};
-use crate::engine::params::{DIVERGED_SPEED, LINEAR_SLOP};
+use crate::engine::params::DIVERGED_SPEED;
 use crate::engine::shapes::Shape;
 use crate::engine::solvers::{self, Variant};
 use collide::Narrow;
@@ -226,7 +227,7 @@ impl World {
                 shapes,
                 proxies,
                 contacts,
-                slop: LINEAR_SLOP * settings.length_unit,
+                slop: Margins::of(settings.length_unit).slop,
                 apart: &|pair| joints.keeps_apart(pair),
                 near: &|area, visit| {
                     broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));

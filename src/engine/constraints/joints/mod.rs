@@ -12,7 +12,7 @@ use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
-use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows};
+use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 use chains::records::Linked;
@@ -534,8 +534,8 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.take_links(links, poses);
     }
 
-    fn link_rows(&mut self, rows: &[BodyRow], inv_h: f32, to: &mut LinkRows) {
-        self.write_links(rows, inv_h, to);
+    fn link_rows(&mut self, rows: &[BodyRow], by: LinkRule, to: &mut LinkRows) {
+        self.write_links(rows, by, to);
     }
 
     fn set_linked(&mut self, impulses: &LinkImpulses) {

@@ -16,7 +16,7 @@ use crate::engine::constraints::kernels::pass::{PassMode, PassWidth};
 use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::Batches;
-use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows};
+use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
 use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::constraints::records::rows::RowBlock;
 use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
@@ -179,8 +179,8 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// order of their slots; `poses` are those at the start of the step.
     fn link(&mut self, _links: &[ChainLink], _poses: &[PoseRow]) {}
 
-    /// Writes the rigid rows of links as bodies are now, in a substep of 1/`inv_h` (s).
-    fn link_rows(&mut self, _rows: &[BodyRow], _inv_h: f32, _to: &mut LinkRows) {}
+    /// Writes the rigid rows of links as bodies are now.
+    fn link_rows(&mut self, _rows: &[BodyRow], _by: LinkRule, _to: &mut LinkRows) {}
 
     /// Sets the impulses of links; records take them up in [`PassMode::TakeUp`].
     fn set_linked(&mut self, _impulses: &LinkImpulses) {}

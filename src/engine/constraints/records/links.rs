@@ -2,7 +2,7 @@
 
 use crate::engine::lanes::held;
 use bytemuck::Pod;
-use wide::{f32x8, f64x8};
+use wide::f32x8;
 
 /// Links that are worked on together: the same at any width of the step.
 pub const LINK_LANES: usize = 8;
@@ -18,6 +18,15 @@ pub struct ChainLink {
     pub forward: bool,
 }
 
+/// How errors of links are removed.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkRule {
+    /// 1/h (1/s)
+    pub inv_h: f32,
+    /// Fastest speed at which the error of a joint is removed (m/s or rad/s).
+    pub most_speed: f32,
+}
+
 /// Numbers of links, group by group: so many lane vectors each.
 #[derive(Clone, Debug, Default)]
 pub struct LinkGroups<V> {
@@ -30,7 +39,7 @@ pub struct LinkGroups<V> {
 pub type LinkRows = LinkGroups<f32x8>;
 
 /// Impulses of all links, one lane vector per row (N·s or N·m·s).
-pub type LinkImpulses = LinkGroups<f64x8>;
+pub type LinkImpulses = LinkGroups<f32x8>;
 
 impl<V: Pod> LinkGroups<V> {
     /// Zeros, `stride` of them in each of so many groups.

@@ -31,7 +31,8 @@ use crate::engine::constraints::records::order::SweepOrder;
 use crate::engine::constraints::vectors::system::Others;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::params::{Budget, LINEAR_SLOP, MAX_PUSH_SPEED};
+use crate::engine::narrowphase::Margins;
+use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
 
 /// One step's problem, prepared.
 ///
@@ -135,12 +136,17 @@ impl<'a> Passes<'a> {
 
     /// Overlap that position correction leaves alone (m).
     pub fn slop(&self) -> f32 {
-        LINEAR_SLOP * self.input.length_unit
+        Margins::of(self.input.length_unit).slop
     }
 
     /// Fastest speed at which Baumgarte stabilization pushes overlap apart (m/s).
     pub fn push_speed(&self) -> f32 {
         MAX_PUSH_SPEED * self.input.length_unit
+    }
+
+    /// Largest overlap that one position sweep removes at a point (m).
+    pub fn max_correction(&self) -> f32 {
+        MAX_POSITION_CORRECTION * self.input.length_unit
     }
 
     /// The solver's own parameter of this index in `Variant::parameters`.

@@ -63,7 +63,7 @@ impl Passes<'_> {
     pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, keeps: bool) {
         if !chains.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
             let Workspace { rows, types, .. } = &mut *self.work;
-            chains.solve(types, rows, self.input.h, gravity);
+            chains.solve(types, rows, [self.input.h, gravity, self.input.length_unit]);
             if keeps || self.input.record_impulses {
                 chains.give_impulses(types);
                 // Types of the caller's own take it for what it is to them, storing.

@@ -43,7 +43,7 @@ use crate::engine::constraints::Passes;
 use crate::engine::constraints::step::CollisionScene;
 use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::lanes::held;
-use crate::engine::params::LINEAR_SLOP;
+use crate::engine::narrowphase::Margins;
 
 /// Normals with a smaller product oppose each other (1).
 const OPPOSED: f32 = -0.5;
@@ -64,17 +64,13 @@ pub(super) struct Jams {
 impl Jams {
     /// Zeroes the impulses of contacts that push against each other, and finds bodies in a jam. `push_speed`: m/s.
     pub fn release(&mut self, scene: &mut CollisionScene<'_>, push_speed: f32) {
+        let slop = Margins::of(scene.length_unit).slop;
         let (contacts, bodies) = (&mut *scene.contacts, scene.bodies);
         self.deep.clear();
         self.pressed.clear();
         self.jammed.clear();
         for (i, contact) in contacts.iter().enumerate() {
-            if contact
-                .manifold
-                .points()
-                .iter()
-                .any(|point| point.separation < -LINEAR_SLOP * scene.length_unit)
-            {
+            if contact.manifold.points().iter().any(|point| point.separation < -slop) {
                 self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
             }
             for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {

@@ -72,11 +72,12 @@ const BOUNCES: f32 = 0.1;
 /// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of the others adds one.
+/// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of
+/// the others adds one.
 const VISITS: [usize; 2] = [18, 8];
 
-/// How much deeper a point of an island that reached its bound may end, as a share of the slop (1): bodies that touch end in each other by what is left of their
-/// approach.
+/// How much deeper a point of an island that reached its bound may end, as a share of the slop (1): bodies that touch
+/// end in each other by what is left of their approach.
 const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.

@@ -42,10 +42,13 @@ pub(super) mod records;
 mod system;
 
 use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::links::ChainLink;
+use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 use system::ChainSystem;
+
+/// Fastest speed at which the error of a joint is removed (m/s or rad/s).
+const MOST_SPEED: f32 = 10.0;
 
 /// No body.
 const NONE: u32 = u32::MAX;
@@ -133,14 +136,16 @@ impl Chains {
         }
     }
 
-    /// Changes velocities so that the rows hold at the end of the substep of `h` (s), under `gravity` (m/s²).
-    pub fn solve(&mut self, types: &mut [Joined], rows: &mut [BodyRow], h: f32, gravity: f32) {
+    /// Changes velocities so that the rows hold at the end of the substep of `h` (s), under `gravity` (m/s²), of bodies of
+    /// about `length_unit` (m).
+    pub fn solve(&mut self, types: &mut [Joined], rows: &mut [BodyRow], [h, gravity, length_unit]: [f32; 3]) {
+        let by = LinkRule { inv_h: 1.0 / h, most_speed: MOST_SPEED * length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
-                joined.kind.link_rows(rows, 1.0 / h, self.system.rows());
+                joined.kind.link_rows(rows, by, self.system.rows());
             }
         }
-        self.system.solve(rows, f64::from(gravity * h * h));
+        self.system.solve(rows, gravity * h * h);
     }
 
     /// Types take over the impulses.

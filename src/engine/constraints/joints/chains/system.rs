@@ -26,12 +26,12 @@
 //! Both need that D can be inverted; K is positive definite, and so are its Schur complements. The order is that of the links,
 //! whatever the width of the step: the same bits at any. A row that moves nothing, or is none, has 1 on the diagonal and no impulse.
 //!
-//! A link of two rows takes some 110 multiplications in `f64`, an eighth of them at a time; what waits for each other is m
+//! A link of two rows takes some 110 multiplications, eight of them at a time; what waits for each other is m
 //! inverses of D. Bridges of 160 links take 0.8 µs a substep, and 0.45 µs for their rows, 8 ns a link (AVX-512).
 
 use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
-use wide::{f32x8, f64x8};
+use wide::f32x8;
 
 /// The links of all chains.
 #[derive(Clone, Debug, Default)]
@@ -43,18 +43,18 @@ pub struct ChainSystem {
     rows: LinkRows,
     impulses: LinkImpulses,
     /// Links of the chain of each, where it hangs at both ends; else 0. `[groups]`
-    spans: Vec<f64x8>,
+    spans: Vec<f32x8>,
     /// Body of each slot away from where its chain hangs, or the inert one. `[groups × lanes]`
     bodies: Indices,
     /// X, Y and z: 2 size² + size numbers.
-    eliminated: LinkGroups<f64x8>,
+    eliminated: LinkGroups<f32x8>,
 }
 
 /// γ (1) at least: for what hits a chain, and is no weight that it bears.
-const LEAST_GIVE: f64 = 3e-5;
+const LEAST_GIVE: f32 = 3e-5;
 
-type LaneVector<const N: usize> = [f64x8; N];
-type LaneMatrix<const N: usize> = [[f64x8; N]; N];
+type LaneVector<const N: usize> = [f32x8; N];
+type LaneMatrix<const N: usize> = [[f32x8; N]; N];
 
 impl ChainSystem {
     /// Makes room for so many links of `size` rows at most.
@@ -66,7 +66,7 @@ impl ChainSystem {
         self.rows.begin(5 * size + 4, groups);
         self.impulses.begin(size, groups);
         self.spans.clear();
-        self.spans.resize(groups, f64x8::ZERO);
+        self.spans.resize(groups, f32x8::ZERO);
         self.eliminated.begin(2 * size * size + size, groups);
     }
 
@@ -77,7 +77,7 @@ impl ChainSystem {
 
     /// Says that a slot is of a chain of so many links that hangs at both ends.
     pub fn set_span(&mut self, slot: usize, links: usize) {
-        self.spans[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = links as f64;
+        self.spans[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = links as f32;
     }
 
     /// Sets the bodies away from where chains hang, slot by slot, as many as there are slots.
@@ -107,22 +107,22 @@ impl ChainSystem {
     }
 
     /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
-    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f64) {
+    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f32) {
         match self.size {
             2 => self.solve_rows::<2>(rows, fall),
             _ => self.solve_rows::<3>(rows, fall),
         }
     }
 
-    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f64) {
-        let fall = f64x8::splat(fall * fall);
+    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f32) {
+        let fall = f32x8::splat(fall * fall);
         let last = self.groups - 1;
         let first = Link::<N>::of(self.rows.group(0));
         let end = Link::<N>::of(self.rows.group(last));
         let mut here = first;
         let (mut pivot, mut b) = here.diagonal(self.spans[0], fall);
         let mut e = transposed(end.shifted(up::<1>).coupling(&first));
-        let (mut d_before, mut b_before) = ([[f64x8::ZERO; N]; N], [f64x8::ZERO; N]);
+        let (mut d_before, mut b_before) = ([[f32x8::ZERO; N]; N], [f32x8::ZERO; N]);
         for k in 0..last {
             let next = Link::<N>::of(self.rows.group(k + 1));
             let c = here.coupling(&next);
@@ -139,7 +139,7 @@ impl ChainSystem {
             (pivot, b) = next.diagonal(self.spans[k + 1], fall);
             pivot = minus(pivot, &c, &x);
             b = less(b, &c, &z);
-            e = minus([[f64x8::ZERO; N]; N], &c, &y);
+            e = minus([[f32x8::ZERO; N]; N], &c, &y);
             here = next;
         }
         for r in 0..N {
@@ -192,39 +192,39 @@ impl ChainSystem {
 /// Links of a group.
 #[derive(Clone, Copy)]
 struct Link<const N: usize> {
-    axis: [[f64x8; 2]; N],
+    axis: [[f32x8; 2]; N],
     /// s_L and s_R.
     arms: [LaneVector<N>; 2],
     b: LaneVector<N>,
     /// Inverse masses and inertias of L and R.
-    mass: [f64x8; 2],
-    inertia: [f64x8; 2],
+    mass: [f32x8; 2],
+    inertia: [f32x8; 2],
 }
 
 impl<const N: usize> Link<N> {
     #[inline(always)]
     fn of(numbers: &[f32x8]) -> Self {
-        let zero = [f64x8::ZERO; N];
+        let zero = [f32x8::ZERO; N];
         let mut link = Link {
-            axis: [[f64x8::ZERO; 2]; N],
+            axis: [[f32x8::ZERO; 2]; N],
             arms: [zero; 2],
             b: zero,
-            mass: [f64x8::ZERO; 2],
-            inertia: [f64x8::ZERO; 2],
+            mass: [f32x8::ZERO; 2],
+            inertia: [f32x8::ZERO; 2],
         };
         for r in 0..N {
-            let at = |i: usize| widened(numbers[5 * r + i]);
+            let at = |i: usize| numbers[5 * r + i];
             link.axis[r] = [at(0), at(1)];
             (link.arms[0][r], link.arms[1][r], link.b[r]) = (at(2), at(3), at(4));
         }
-        let at = |i: usize| widened(numbers[5 * N + i]);
+        let at = |i: usize| numbers[5 * N + i];
         (link.mass, link.inertia) = ([at(0), at(1)], [at(2), at(3)]);
         link
     }
 
     /// Of the lane before, or the one after.
     #[inline(always)]
-    fn shifted(mut self, by: impl Fn(f64x8) -> f64x8) -> Self {
+    fn shifted(mut self, by: impl Fn(f32x8) -> f32x8) -> Self {
         for r in 0..N {
             self.axis[r] = [by(self.axis[r][0]), by(self.axis[r][1])];
             (self.arms[0][r], self.arms[1][r]) = (by(self.arms[0][r]), by(self.arms[1][r]));
@@ -237,18 +237,18 @@ impl<const N: usize> Link<N> {
 
     /// (1 + γ) K_ii and b, with γ of chains that hang at both ends. `fall`: (g h²)² (m²).
     #[inline(always)]
-    fn diagonal(&self, span: f64x8, fall: f64x8) -> (LaneMatrix<N>, LaneVector<N>) {
-        // The length of a link is that of two arms, each of which has s² = |r|² of two rows.
-        let mut square = f64x8::splat(1e-12);
+    fn diagonal(&self, span: f32x8, fall: f32x8) -> (LaneMatrix<N>, LaneVector<N>) {
+        // The length of a link is that of two arms, each of which has s² = |r|² of two rows; g h² at least.
+        let mut square = fall + f32x8::splat(f32::MIN_POSITIVE);
         for arms in self.arms {
             square = arms[1].mul_add(arms[1], arms[0].mul_add(arms[0], square));
         }
         // (4/3) (2 G)²
-        let grows = f64x8::splat(8.0 / 3.0) * fall * (span * span) / square;
+        let grows = f32x8::splat(8.0 / 3.0) * fall * (span * span) / square;
         let gives =
-            f64x8::ONE + span.simd_gt(f64x8::ZERO).select(grows + f64x8::splat(LEAST_GIVE), f64x8::ZERO);
+            f32x8::ONE + span.simd_gt(f32x8::ZERO).select(grows + f32x8::splat(LEAST_GIVE), f32x8::ZERO);
         let ([left, right], mass) = (self.arms, self.mass[0] + self.mass[1]);
-        let mut k = [[f64x8::ZERO; N]; N];
+        let mut k = [[f32x8::ZERO; N]; N];
         let mut b = self.b;
         for r in 0..N {
             for c in 0..=r {
@@ -257,9 +257,9 @@ impl<const N: usize> Link<N> {
                 k[r][c] = gives * mass.mul_add(along(self.axis[r], self.axis[c]), turning);
                 k[c][r] = k[r][c];
             }
-            let moves = k[r][r].simd_gt(f64x8::ZERO);
-            k[r][r] = moves.select(k[r][r], f64x8::ONE);
-            b[r] = moves.select(b[r], f64x8::ZERO);
+            let moves = k[r][r].simd_gt(f32x8::ZERO);
+            k[r][r] = moves.select(k[r][r], f32x8::ONE);
+            b[r] = moves.select(b[r], f32x8::ZERO);
         }
         (k, b)
     }
@@ -267,7 +267,7 @@ impl<const N: usize> Link<N> {
     /// C, to the next link.
     #[inline(always)]
     fn coupling(&self, next: &Self) -> LaneMatrix<N> {
-        let mut block = [[f64x8::ZERO; N]; N];
+        let mut block = [[f32x8::ZERO; N]; N];
         for (r, row) in block.iter_mut().enumerate() {
             let turn = -(next.inertia[0] * self.arms[1][r]);
             for (c, entry) in row.iter_mut().enumerate() {
@@ -287,7 +287,7 @@ fn push<const N: usize>(
     bodies: LaneIndex<[u32; LINK_LANES]>,
     rows: &mut [BodyRow],
 ) {
-    let (mut of_own, mut of_others) = ([f64x8::ZERO; 3], [f64x8::ZERO; 3]);
+    let (mut of_own, mut of_others) = ([f32x8::ZERO; 3], [f32x8::ZERO; 3]);
     for r in 0..N {
         let [x, y] = here.axis[r];
         for (sum, j) in of_own.iter_mut().zip([x, y, here.arms[1][r]]) {
@@ -303,7 +303,7 @@ fn push<const N: usize>(
     let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
     for (k, v) in velocity[..3].iter_mut().enumerate() {
         let more = here[k] * of_own[k] - next[k] * of_others[k];
-        *v += narrowed(more);
+        *v += more;
     }
     f32x8::scatter_velocity(rows, bodies, velocity);
 }
@@ -322,41 +322,25 @@ fn reduce<const D: usize, const N: usize>(
     let to_q = product(&f, &each_of(inverse, down::<D>));
     *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
     *b = less(less(*b, e, &each(z, up::<D>)), &f, &each(z, down::<D>));
-    *e = minus([[f64x8::ZERO; N]; N], &to_p, &e_p);
+    *e = minus([[f32x8::ZERO; N]; N], &to_p, &e_p);
 }
 
 /// Of the lane `D` before, or 0.
 #[inline(always)]
-fn up<const D: usize>(x: f64x8) -> f64x8 {
-    let mut to = f64x8::ZERO;
-    to.as_mut_array()[D..].copy_from_slice(&x.as_array()[..LINK_LANES - D]);
-    to
+fn up<const D: usize>(x: f32x8) -> f32x8 {
+    let x = x.to_array();
+    f32x8::new(std::array::from_fn(|lane| if lane < D { 0.0 } else { x[lane - D] }))
 }
 
 /// Of the lane `D` on, or 0.
 #[inline(always)]
-fn down<const D: usize>(x: f64x8) -> f64x8 {
-    let mut to = f64x8::ZERO;
-    to.as_mut_array()[..LINK_LANES - D].copy_from_slice(&x.as_array()[D..]);
-    to
+fn down<const D: usize>(x: f32x8) -> f32x8 {
+    let x = x.to_array();
+    f32x8::new(std::array::from_fn(|lane| if lane + D < LINK_LANES { x[lane + D] } else { 0.0 }))
 }
 
 #[inline(always)]
-fn widened(x: f32x8) -> f64x8 {
-    let mut to = f64x8::ZERO;
-    to.as_mut_array().iter_mut().zip(x.as_array()).for_each(|(to, &x)| *to = f64::from(x));
-    to
-}
-
-#[inline(always)]
-fn narrowed(x: f64x8) -> f32x8 {
-    let mut to = f32x8::ZERO;
-    to.as_mut_array().iter_mut().zip(x.as_array()).for_each(|(to, &x)| *to = x as f32);
-    to
-}
-
-#[inline(always)]
-fn along(u: [f64x8; 2], v: [f64x8; 2]) -> f64x8 {
+fn along(u: [f32x8; 2], v: [f32x8; 2]) -> f32x8 {
     u[0].mul_add(v[0], u[1] * v[1])
 }
 
@@ -424,44 +408,44 @@ fn less<const N: usize>(mut x: LaneVector<N>, a: &LaneMatrix<N>, y: &LaneVector<
 }
 
 #[inline(always)]
-fn each<const N: usize>(mut x: LaneVector<N>, by: impl Fn(f64x8) -> f64x8) -> LaneVector<N> {
+fn each<const N: usize>(mut x: LaneVector<N>, by: impl Fn(f32x8) -> f32x8) -> LaneVector<N> {
     x.iter_mut().for_each(|x| *x = by(*x));
     x
 }
 
 #[inline(always)]
-fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f64x8) -> f64x8) -> LaneMatrix<N> {
+fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f32x8) -> f32x8) -> LaneMatrix<N> {
     m.as_flattened_mut().iter_mut().for_each(|x| *x = by(*x));
     m
 }
 
-/// The inverse of a symmetric, positive definite matrix; zeros where rounding has made it none.
+/// The inverse of a symmetric, positive definite matrix; zeros where rounding has made it none. A third row is added to the
+/// inverse of the first two, so that what is multiplied is of one unit: with A, u = A⁻¹ v and s = m − vᵀ u,
+///
+/// ```text
+/// [A v; vᵀ m]⁻¹ = [A⁻¹ + u uᵀ/s, −u/s; −uᵀ/s, 1/s]
+/// ```
 #[inline(always)]
 fn inverse<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
-    let mut adjugate = m;
-    if N == 2 {
-        (adjugate[0][0], adjugate[1][1]) = (m[1][1], m[0][0]);
-        (adjugate[0][1], adjugate[1][0]) = (-m[0][1], -m[0][1]);
-    } else {
-        for r in 0..N {
-            for c in 0..=r {
-                let ([i, j], [k, l]) = (OTHERS[r], OTHERS[c]);
-                adjugate[r][c] = m[i][k].mul_add(m[j][l], -(m[i][l] * m[j][k]));
-                adjugate[c][r] = adjugate[r][c];
+    let one_over = |x: f32x8| x.simd_gt(f32x8::ZERO).select(f32x8::ONE / x, f32x8::ZERO);
+    let scale = one_over(m[0][0].mul_add(m[1][1], -(m[0][1] * m[0][1])));
+    let mut to = m;
+    (to[0][0], to[1][1]) = (scale * m[1][1], scale * m[0][0]);
+    (to[0][1], to[1][0]) = (-(scale * m[0][1]), -(scale * m[0][1]));
+    if N == 3 {
+        let u = [0, 1].map(|r| to[r][0].mul_add(m[0][2], to[r][1] * m[1][2]));
+        let s = one_over(m[1][2].mul_neg_add(u[1], m[0][2].mul_neg_add(u[0], m[2][2])));
+        let of_third = u.map(|u| -(s * u));
+        for r in 0..2 {
+            for c in 0..2 {
+                to[r][c] = of_third[r].mul_neg_add(u[c], to[r][c]);
             }
+            (to[r][2], to[2][r]) = (of_third[r], of_third[r]);
         }
+        to[2][2] = s;
     }
-    let mut determinant = m[0][0] * adjugate[0][0];
-    for k in 1..N {
-        determinant = m[0][k].mul_add(adjugate[k][0], determinant);
-    }
-    let scale = determinant.simd_gt(f64x8::ZERO).select(f64x8::ONE / determinant, f64x8::ZERO);
-    adjugate.as_flattened_mut().iter_mut().for_each(|x| *x *= scale);
-    adjugate
+    to
 }
-
-/// The other two of three.
-const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 #[cfg(test)]
 mod tests {
