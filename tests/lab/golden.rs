@@ -10,8 +10,10 @@
 use crate::common::settings;
 use simpulse::engine::solvers::{VARIANTS, Variant};
 use simpulse::lab::scenes::{self, CATALOG};
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// FNV-1a over whole words.
 fn fold(hash: u64, word: u64) -> u64 {
@@ -26,8 +28,12 @@ fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
     if scene.runs_on(variant).is_err() {
         return START;
     }
-    let mut world = scene.build(settings(variant)).unwrap();
-    let steps = (40_000 / world.bodies.len().max(1)).clamp(4, 100);
+    let mut settings = settings(variant);
+    // What takes long in large scenes is cut short.
+    let work = 100_000 / scene.bodies.len().max(1);
+    settings.budget.velocity_iterations = settings.budget.velocity_iterations.min(work.max(8) as u32);
+    let mut world = scene.build(settings).unwrap();
+    let steps = (work / 5).clamp(3, 100);
     for _ in 0..steps {
         if world.step().is_err() {
             break;
@@ -41,19 +47,18 @@ fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
 fn all_hashes() -> String {
     let names: Vec<&str> = CATALOG.iter().map(|entry| entry.name).collect();
     let scenes: Vec<_> = names.iter().map(|name| scenes::load(name).unwrap().scene).collect();
+    let next = AtomicUsize::new(0);
     let cells: Vec<Vec<u64>> = std::thread::scope(|scope| {
-        let halves: Vec<_> = (0..2)
-            .map(|half| {
-                let scenes = &scenes;
-                scope.spawn(move || {
-                    let mine = VARIANTS.iter().enumerate().filter(|(i, _)| i % 2 == half);
-                    mine.map(|(i, v)| (i, scenes.iter().map(|s| hash_of(s, v)).collect())).collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        let mut rows: Vec<_> = halves.into_iter().flat_map(|half| half.join().unwrap()).collect();
-        rows.sort_by_key(|(i, _)| *i);
-        rows.into_iter().map(|(_, row)| row).collect()
+        let worker = || {
+            let mut rows = Vec::new();
+            while let Some(variant) = VARIANTS.get(next.fetch_add(1, Ordering::Relaxed)) {
+                rows.push((variant.name, scenes.iter().map(|scene| hash_of(scene, variant)).collect()));
+            }
+            rows
+        };
+        let halves = [scope.spawn(worker), scope.spawn(worker)];
+        let rows: HashMap<&str, _> = halves.into_iter().flat_map(|half| half.join().unwrap()).collect();
+        VARIANTS.iter().map(|variant| Vec::clone(&rows[variant.name])).collect()
     });
     let mut text = String::new();
     let over = |row: &[u64], joined: bool| {

@@ -54,7 +54,7 @@ pub static SOLVER: Variant = Variant {
         Parameter {
             name: "factor_work",
             unit: "10⁶",
-            default: 30.0,
+            default: 1000.0,
             range: [0.0, 1e9],
             meaning: "multiplications of a factorization, beyond which conjugate gradients take its place",
             trials: &[],
