@@ -49,7 +49,7 @@ use frames::Roll;
 use glam::Vec2;
 use jams::Jams;
 use rest::hand_down::HandDown;
-use rest::{BORNE, CALM, LEAD, PER_CONTACT};
+use rest::{BORNE, CALM, PER_CONTACT};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -353,7 +353,6 @@ impl Shim {
             passes.spread_impacts(Spreading {
                 timed: passes.has(part::MOMENT),
                 stops: Some(&self.joined),
-                lead: Some(LEAD),
                 releases: passes.has(part::RELEASE),
             });
             passes.parts().clock.lap(Phase::Prepare);

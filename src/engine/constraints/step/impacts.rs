@@ -3,7 +3,7 @@
 use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::spread::{self, Find, Leads, SpreadInput};
+use crate::engine::constraints::impacts::spread::{self, Find, SpreadInput};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::records::batches::Part;
@@ -17,8 +17,6 @@ pub(crate) struct Spreading<'a> {
     pub timed: bool,
     /// What does not bounce stops, but for contacts of these bodies (`[bodies]`, or empty); none: nothing stops.
     pub stops: Option<&'a [bool]>,
-    /// Which number that the solver keeps per contact is the time of its frame.
-    pub lead: Option<usize>,
     /// Points that an impact releases have borne their body until then.
     pub releases: bool,
 }
@@ -26,7 +24,7 @@ pub(crate) struct Spreading<'a> {
 impl Passes<'_> {
     /// Lets what comes in bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
-        let Spreading { timed, stops, lead, releases } = spreading;
+        let Spreading { timed, stops, releases } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -42,16 +40,13 @@ impl Passes<'_> {
             found.clear();
             self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
         }
-        let Workspace { rows, lanes, serial, motion, kept, .. } = &mut *self.work;
-        let size = kept.size().per_contact;
-        let leads = lead.map_or(Leads::NONE, |place| Leads { kept: kept.contacts(), size, place });
+        let Workspace { rows, lanes, serial, motion, .. } = &mut *self.work;
         let done = spread.run(&mut SpreadInput {
             rows,
             batches: [lanes, serial],
             contacts: self.contacts,
             features: &self.input.features,
             increments: motion.velocity_increments(),
-            leads,
             dt,
             h,
             slop,
@@ -80,7 +75,7 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(Spreading { timed: false, stops: None, lead: None, releases: true });
+                self.spread_impacts(Spreading { timed: false, stops: None, releases: true });
             }
         }
     }

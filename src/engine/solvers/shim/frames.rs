@@ -19,15 +19,8 @@
 //! contacts use the frame at t = τ, which removes the lag. With one substep that is the start of the step: symplectic
 //! Euler has no lag.
 //!
-//! A contact rolls if its gap changes by less than a fifth of the slop s in the step, and so does its speed of approach until τ,
-//! with φ below and ℓ from center to center or to the face:
-//!
-//! ```text
-//! |v_n| ≤ s/(5 dt),   φ² ℓ/τ ≤ s/(5 dt)
-//! ```
-//!
-//! Contacts that close, open or pass by use the frame of the start of the step: a chip that spins on a disc of a thousand times its
-//! size would be turned beyond its own edge. Only the record turns; the contact itself keeps that frame.
+//! A contact rolls if its gap changes by less than a fifth of the slop s in the step, |v_n| ≤ s/(5 dt). Contacts that close or open
+//! use the frame of the start of the step. Only the record turns; the contact itself keeps that frame.
 //!
 //! # Arms
 //!
@@ -40,7 +33,6 @@
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.
 
-use super::rest::LEAD;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
@@ -54,7 +46,7 @@ pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;
 /// Radii above this are those of faces (m).
 const FLAT: f32 = 1e30;
 
-/// Turns the records of rolling contacts, and stores the time of their frames.
+/// Turns the records of rolling contacts.
 pub(super) struct Roll {
     /// τ (s)
     pub middle: f32,
@@ -71,9 +63,8 @@ impl Pass for Roll {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        let kept = on.kept.contacts();
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            roll::<L>(on.rows, batches, segment, layout, on.contacts, kept, self);
+            roll::<L>(on.rows, batches, segment, layout, on.contacts, self);
         });
     }
 }
@@ -85,11 +76,9 @@ fn roll<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     contacts: &[Contact],
-    kept: &mut [f32],
     &Roll { middle, dt, steady }: &Roll,
 ) {
     let contacts: &[Quad] = bytemuck::cast_slice(contacts);
-    let kept: &mut [Quad] = bytemuck::cast_slice_mut(kept);
     let (zero, one) = (L::zero(), L::splat(1.0));
     let (tau, steady) = (L::splat(middle), L::splat(steady / dt));
     // The point is on b's surface if a is held, else in the middle of the gap.
@@ -97,7 +86,7 @@ fn roll<L: Lanes>(
     let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
     let records = records.chunks_exact_mut(layout.stride).zip(indices);
-    for (batch, (record, (contact, (row_a, row_b)))) in records.enumerate() {
+    for (record, (contact, (row_a, row_b))) in records {
         let row_b: LaneIndex<L::Index> = row_b;
         let [_, radius_a, radius_b, _] =
             L::gather_quads::<{ quad::STRIDE }, { quad::RADII }>(contacts, contact);
@@ -126,14 +115,7 @@ fn roll<L: Lanes>(
         let distance = to_a + to_b;
         let between = slide / distance.select_positive(distance, one);
         let angle = tau * face_a.select_positive(-a[2], face_b.select_positive(-b[2], between));
-        let bends = steady.mul_add(tau, -(angle * angle * distance));
-        let rolls = is_round.select_positive((steady - approach.max(-approach)).min(bends), zero);
-        let filled = &contact.entries()[..segment.filled(batch, L::WIDTH)];
-        let lead = rolls.select_positive(tau, zero);
-        let leads: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&lead));
-        for (&contact, &lead) in filled.iter().zip(leads) {
-            kept[2 * contact as usize + 1].0[LEAD - 4] = lead;
-        }
+        let rolls = is_round.select_positive(steady - approach.max(-approach), zero);
         if !rolls.any_positive() {
             continue;
         }

@@ -50,8 +50,8 @@ use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
+pub(crate) use point::SpreadInput;
 use point::{Body, HitPoint, Role, STILL};
-pub(crate) use point::{Leads, SpreadInput};
 use std::collections::VecDeque;
 
 /// No lane, no point.
@@ -186,8 +186,6 @@ impl Spread {
                 if self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                     self.slowest *= FINER;
                 }
-                let rounding = self.points[self.first..].iter().map(|point| point.rounding(on.rows));
-                self.slowest = rounding.fold(self.slowest, f32::max);
             }
             if !any && wave > 0 && !(on.releases && self.release(on)) {
                 is_done = true;
@@ -454,9 +452,7 @@ impl Spread {
     fn link(&mut self, on: &SpreadInput<'_>) {
         let (count, lanes) = (on.rows.len(), on.batches[0].lanes() + on.batches[1].lanes());
         self.bodies.clear();
-        self.bodies.extend(
-            on.rows.iter().map(|row| Body { flown: std::array::from_fn(|k| row.velocity[k]), ..STILL }),
-        );
+        self.bodies.resize(count, STILL);
         self.islands.begin(count);
         self.next.resize(2 * lanes, NONE);
         self.listed.clear();
@@ -495,14 +491,6 @@ impl Spread {
         if *listed == NONE {
             *listed = self.points.len() as u32;
             let mut points = on.points(lane);
-            for point in points.iter_mut().filter(|point| point.mass > 0.0) {
-                // Arms end at one point at the time of the frame, if nothing is hit.
-                let [a, b] = point.rows.map(|row| self.bodies[row as usize].flown);
-                let is_flat = on.contacts[point.contact as usize].radii == [0.0; 2];
-                let lead = if is_flat { 0.0 } else { on.leads.of(point.contact) };
-                point.apart = std::array::from_fn(|k| lead * (b[k] - a[k]));
-                point.is_round |= lead != 0.0;
-            }
             let [k_0, k_1] = [points[0].k[0], points[1].k[0]];
             points[0].is_tight =
                 points[1].mass > 0.0 && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;

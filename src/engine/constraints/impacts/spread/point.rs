@@ -18,15 +18,13 @@ pub(super) struct Body {
     /// Time of the last push (s); −∞ without one.
     pub time: f32,
     pub is_queued: bool,
-    /// Its velocity before anything pushed it (m/s, m/s, rad/s).
-    pub flown: [f32; 3],
     /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): there may be very many.
     pub rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
 pub(super) const STILL: Body =
-    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, flown: [0.0; 3], rounded: [0.0; 3] };
+    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, rounded: [0.0; 3] };
 
 /// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -101,8 +99,6 @@ pub(crate) struct SpreadInput<'a> {
     pub features: &'a Features,
     /// Changes of velocity by forces in a substep (m/s).
     pub increments: &'a [[f32; 4]],
-    /// Times of the frames that contacts have (s), and at which place of how many numbers each: see [`Leads`].
-    pub leads: Leads<'a>,
     /// Step and substep (s).
     pub dt: f32,
     pub h: f32,
@@ -115,28 +111,6 @@ pub(crate) struct SpreadInput<'a> {
     pub record_impulses: bool,
     /// Contacts may bounce.
     pub bounces: bool,
-}
-
-/// Times within the step at which contacts have the frames of their records.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Leads<'a> {
-    /// What a solver keeps per contact; empty if all frames are of the beginning.
-    pub kept: &'a [f32],
-    /// Numbers per contact, and which of them it is.
-    pub size: usize,
-    pub place: usize,
-}
-
-impl Leads<'static> {
-    /// All frames are of the beginning.
-    pub(crate) const NONE: Self = Leads { kept: &[], size: 0, place: 0 };
-}
-
-impl Leads<'_> {
-    /// Of a contact (s).
-    pub(super) fn of(&self, contact: u32) -> f32 {
-        self.kept.get(self.size * contact as usize + self.place).copied().unwrap_or(0.0)
-    }
 }
 
 /// Where the record of a lane is.
@@ -276,15 +250,6 @@ impl HitPoint {
             velocity[3].mul_add(straight, delta[3] * self.arms[body][0] * other.arms[body][0])
         };
         of(1) + if self.pushes_a { of(0) } else { 0.0 }
-    }
-
-    /// Rounding error of its velocity (m/s).
-    pub fn rounding(&self, rows: &[BodyRow]) -> f32 {
-        let of = |body: usize| {
-            let [x, y, turn, _] = rows[self.rows[body] as usize].velocity.map(f32::abs);
-            turn.mul_add(self.arms[body][0].abs(), x + y)
-        };
-        if self.mass > 0.0 { f32::EPSILON * (of(0) + of(1)) } else { 0.0 }
     }
 
     /// Gap as bodies are now (m).

@@ -89,7 +89,7 @@ fn close<L: Lanes>(
         let [nx, ny] = [record[0], record[1]];
         let straight = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
         let last: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [calm, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [calm, _, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut loads = [open, zero, open, zero];
         let (mut fastest, mut is_short) = (zero, zero);
         for p in 0..layout.points {
@@ -135,7 +135,7 @@ fn close<L: Lanes>(
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let at_once = is_pair.select_positive(is_short.select_positive(zero, at_once), zero);
         let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
-        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, lead, borne[0], borne[1]]);
+        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, zero, borne[0], borne[1]]);
     }
 }
 

@@ -45,15 +45,12 @@ use crate::engine::constraints::step::StepParts;
 use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::lanes::BodyRow;
 
-/// Numbers kept per contact: N and T of both points (N), −1 and 0 for a point that is open; how long the contact has been calm (s); the
-/// time of the frame of what rolls (s); and the load that springs of each point are shortened for (N), −1 for a contact that is calm.
+/// Numbers kept per contact, two quads: N and T of both points (N), −1 and 0 for a point that is open; how long the contact has been
+/// calm (s); a zero; and the load that springs of each point are shortened for (N), −1 for a contact that is calm.
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
 pub(super) const CALM: usize = 4;
-
-/// See [`PER_CONTACT`].
-pub(super) const LEAD: usize = 5;
 
 /// See [`PER_CONTACT`].
 pub(super) const BORNE: usize = 6;

@@ -97,7 +97,7 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [calm, lead, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [calm, _, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut borne = [borne_0, borne_1];
         let is_single = if layout.points == 2 {
             record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
@@ -137,6 +137,6 @@ fn shorten<L: Lanes>(
             }
         }
         let filled = segment.filled(batch, L::WIDTH);
-        super::closed::store::<L, 1>(quads, index, filled, [calm, lead, borne[0], borne[1]]);
+        super::closed::store::<L, 1>(quads, index, filled, [calm, zero, borne[0], borne[1]]);
     }
 }
