@@ -646,7 +646,6 @@ mod tests {
     fn newton_s_method_ends_at_rounding_after_two_steps_per_level() {
         for base in [5, 10, 20] {
             let history = thrown_pyramid(base);
-            println!("pyramid of {base}: {history:?}");
             assert!(
                 history.len() as u32 <= 2 * base + 4 && *history.last().unwrap() < 1e-9,
                 "{base}: {history:?}"
@@ -658,7 +657,6 @@ mod tests {
     fn conjugate_gradients_come_to_the_same() {
         MOST_WORK.set(0.0);
         let history = thrown_pyramid(5);
-        println!("{history:?}");
         assert!(*history.last().unwrap() < 1e-9, "{history:?}");
     }
 

@@ -182,10 +182,8 @@ impl Spread {
                 self.slowest = TOLERANCE * speeds.fold(0.0, f32::max);
             }
             let any = self.begin_wave(on, wave == 0, bounces);
-            if wave == 0 {
-                if self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
-                    self.slowest *= FINER;
-                }
+            if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
+                self.slowest *= FINER;
             }
             if !any && wave > 0 && !(on.releases && self.release(on)) {
                 is_done = true;
