@@ -6,6 +6,8 @@
 //!   (accumulated impulses); lanes without a contact are read like the others;
 //! * *indices*: 4 B per body whose row is gathered;
 //! * *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
+//! * *joints*: records, impulses, three indices and both rows of each; of chains that are solved at once their rows and what
+//!   is eliminated;
 //! * *body passes*: what is read and written of each row and of the arrays beside it;
 //! * *pairs, collide, color*: what goes in once and what comes out once; what they look up in
 //!   between (nodes of the tree, shapes, colors of a body) is not in it, so theirs is a lower bound.
@@ -106,7 +108,8 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
 /// Records and the indices of the rows that sweeps gather.
 fn used_by_sweeps(frozen: &HeldWorld<'_>) -> f64 {
     let work = frozen.workspace();
-    (work.lanes.bytes() + work.serial.bytes()) as f64
+    let of_joints = work.types.iter().map(|joined| joined.bytes()).sum::<usize>();
+    (work.lanes.bytes() + work.serial.bytes() + of_joints) as f64
 }
 
 /// What a pass requests of records, rows and vectors, padding included.

@@ -538,6 +538,10 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.write_links(rows, by, to);
     }
 
+    fn is_idle(&self) -> bool {
+        self.rigid_alone() && self.linked.count() == self.joints.len() && self.linked.is_active()
+    }
+
     fn set_linked(&mut self, impulses: &LinkImpulses) {
         self.keep_links(impulses);
     }

@@ -182,6 +182,11 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Writes the rigid rows of links as bodies are now.
     fn link_rows(&mut self, _rows: &[BodyRow], _by: LinkRule, _to: &mut LinkRows) {}
 
+    /// Whether sweeps have nothing to do: all rows are those of links.
+    fn is_idle(&self) -> bool {
+        false
+    }
+
     /// Sets the impulses of links; records take them up in [`PassMode::TakeUp`].
     fn set_linked(&mut self, _impulses: &LinkImpulses) {}
 
@@ -256,6 +261,11 @@ impl Joined {
     /// Its batches, colored and serial.
     pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
         [&mut self.lanes, &mut self.serial]
+    }
+
+    /// Bytes of records and indices.
+    pub fn bytes(&self) -> usize {
+        self.lanes.bytes() + self.serial.bytes()
     }
 
     /// Rows of sixteen constraints in vectors.

@@ -22,7 +22,7 @@ use crate::engine::clock::{Clock, Phase};
 use crate::engine::constraints::impacts::ImpactLaw;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
 use crate::engine::constraints::kernels::prepare::{Prepare, Store};
-use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::engine::constraints::kernels::types::{ConstraintType, Joined, TypeInput, TypeRows};
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Part};
 use crate::engine::constraints::records::features::Layout;
@@ -256,7 +256,8 @@ impl<'a> Passes<'a> {
     /// Colored batches at the width of the step, then serial ones at one lane; in reverse order the
     /// other way round. Constraints of other types take part.
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
-        if self.work.types.is_empty() {
+        let is_idle = |joined: &Joined| is_sweep(phase) && joined.kind.is_idle();
+        if self.work.types.iter().all(is_idle) {
             return self.over_contacts(pass);
         }
         for part in self.parts_in_order() {
@@ -291,6 +292,9 @@ impl<'a> Passes<'a> {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
+                if self.input.phases.counted && is_sweep(phase) && !kind.is_idle() {
+                    self.clock.book_bytes(type_traffic(&**kind, batches));
+                }
                 let rows = TypeRows::new(rows, pass.sums_of(), mode);
                 kind.run(TypeInput {
                     phase,
@@ -371,3 +375,20 @@ impl<'a> Passes<'a> {
 
 /// Bytes of a body's row.
 const ROW: f64 = size_of::<BodyRow>() as f64;
+
+/// Whether impulses are solved or applied.
+fn is_sweep(phase: Phase) -> bool {
+    matches!(phase, Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position)
+}
+
+/// Bytes that a sweep over the constraints of a type reads and writes: records and impulses, three indices, both bodies.
+fn type_traffic(kind: &dyn ConstraintType, batches: &Batches) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for segment in batches.visits() {
+        let lanes = (segment.batches * batches.width()) as f64;
+        let pushed = if segment.pushes_a() { 2.0 } else { 1.0 };
+        sums[0] += lanes * (4.0 * (kind.stride() + 3) as f64 + 2.0 * ROW);
+        sums[1] += lanes * (4.0 * kind.rows() as f64 + 0.5 * ROW * pushed);
+    }
+    sums
+}

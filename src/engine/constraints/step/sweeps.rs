@@ -62,6 +62,9 @@ impl Passes<'_> {
     /// are kept, as those of the last substep are.
     pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, keeps: bool) {
         if !chains.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+            if self.input.phases.counted {
+                self.clock.book_bytes(chains.traffic());
+            }
             let Workspace { rows, types, .. } = &mut *self.work;
             chains.solve(types, rows, [self.input.h, gravity, self.input.length_unit]);
             if keeps || self.input.record_impulses {

@@ -41,6 +41,7 @@
 pub(super) mod records;
 mod system;
 
+use crate::engine::constraints::joints::ANCHORS;
 use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
@@ -146,6 +147,14 @@ impl Chains {
             }
         }
         self.system.solve(rows, gravity * h * h);
+    }
+
+    /// Bytes that [`Self::solve`] reads and writes, without numbers of types.
+    pub fn traffic(&self) -> [f64; 2] {
+        // Anchors, two indices and both bodies make rows.
+        let [read, written] = self.system.traffic();
+        let rows = 4 * (ANCHORS + 2) + 2 * size_of::<BodyRow>();
+        [read + (self.system.slots() * rows) as f64, written]
     }
 
     /// Types take over the impulses.

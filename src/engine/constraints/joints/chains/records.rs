@@ -128,6 +128,11 @@ impl<T: JointType> Joints<T> {
         }
     }
 
+    /// Whether joints have rigid rows and no others.
+    pub(crate) fn rigid_alone(&self) -> bool {
+        self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form))
+    }
+
     /// As [`Self::pass`] over velocities, without the rigid rows of links.
     #[inline(never)]
     pub(crate) fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
@@ -136,10 +141,10 @@ impl<T: JointType> Joints<T> {
         of: impl Fn(JointPair<L>) -> P,
     ) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
-        let rigid_alone = self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form));
-        if rigid_alone && self.linked.count() == self.joints.len() {
+        if self.is_idle() {
             return;
         }
+        let rigid_alone = self.rigid_alone();
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
@@ -250,7 +255,7 @@ impl JointPass<f32x8> for LinkPass<'_> {
         let LinkPass { pair, way, by, to } = self;
         let (way, inv_h, most) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.most_speed));
         let is_link = way * way;
-        // Selected by products: the compiler makes a masked store of a selection, which takes twenty times as long on Zen.
+        // Selected by products: of selections the compiler makes masked stores, which took more than half of this pass on Zen.
         let others = f32x8::ONE - is_link;
         let set = |to: &mut f32x8, value: f32x8| *to = Lanes::mul_add(is_link, value, others * *to);
         let square = error.iter().fold(f32x8::ZERO, |sum, &x| Lanes::mul_add(x, x, sum));

@@ -180,6 +180,15 @@ impl ChainSystem {
         self.bodies.list().batch(group)
     }
 
+    /// Bytes that a solve reads and writes: rows once written and read twice, what is eliminated, impulses, and bodies R with
+    /// their index.
+    pub fn traffic(&self) -> [f64; 2] {
+        let (row, kept) = (5 * self.size + 4, 2 * self.size * self.size + self.size);
+        let half = size_of::<BodyRow>() / 2;
+        let (read, written) = (4 * (2 * row + kept + 1) + half, 4 * (row + kept + self.size) + half);
+        [read, written].map(|bytes| (self.slots() * bytes) as f64)
+    }
+
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         self.rows.held_bytes()
