@@ -506,11 +506,11 @@ mod tests {
                 let left = if begins(i) { [0.0; 2] } else { mass(i - 1) };
                 let given = system.impulses().group(system.slot(i) / LINK_LANES);
                 let mut made = 1.0_f32;
-                for r in 0..size {
+                for (r, impulse) in given.iter().enumerate().take(size) {
                     let [x, y, s_left, s_right, _] = row(i, r);
                     let turning = left[1] * s_left * s_left + mass(i)[1] * s_right * s_right;
                     let k = (left[0] + mass(i)[0]) * (x * x + y * y) + turning;
-                    made += k * given[r].as_array()[system.slot(i) % LINK_LANES].abs();
+                    made += k * impulse.as_array()[system.slot(i) % LINK_LANES].abs();
                 }
                 for r in 0..size {
                     let [x, y, left, right, b] = row(i, r);
