@@ -127,8 +127,8 @@ impl ChainSystem {
         for k in 0..last {
             let next = Link::<N>::of(self.rows.group(k + 1));
             let c = here.coupling(&next);
-            let inverse = inverse(pivot);
-            let (x, y, z) = (product(&inverse, &c), product(&inverse, &e), times(&inverse, &b));
+            let factor = Factor::of(pivot);
+            let (x, y, z) = (factor.solve_each(c), factor.solve_each(e), factor.solve(b));
             let to = self.eliminated.group_mut(k);
             to[..N * N].copy_from_slice(x.as_flattened());
             to[N * N..2 * N * N].copy_from_slice(y.as_flattened());
@@ -152,7 +152,7 @@ impl ChainSystem {
         reduce::<1, N>(&mut pivot, &mut e, &mut b);
         reduce::<2, N>(&mut pivot, &mut e, &mut b);
         reduce::<4, N>(&mut pivot, &mut e, &mut b);
-        let of_end = times(&inverse(pivot), &b);
+        let of_end = Factor::of(pivot).solve(b);
         self.impulses.group_mut(last).copy_from_slice(&of_end);
         let of_lane_before = each(of_end, up::<1>);
         let (mut next, mut impulse) = (end, of_end);
@@ -325,11 +325,12 @@ fn reduce<const D: usize, const N: usize>(
     e: &mut LaneMatrix<N>,
     b: &mut LaneVector<N>,
 ) {
-    let inverse = inverse(*d);
-    let z = times(&inverse, b);
+    let factor = Factor::of(*d);
+    let z = factor.solve(*b);
     let (f, e_p) = (transposed(each_of(*e, down::<D>)), each_of(*e, up::<D>));
-    let to_p = product(e, &each_of(inverse, up::<D>));
-    let to_q = product(&f, &each_of(inverse, down::<D>));
+    // D is symmetric.
+    let to_p = transposed(factor.shifted(up::<D>).solve_each(transposed(*e)));
+    let to_q = transposed(factor.shifted(down::<D>).solve_each(transposed(f)));
     *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
     *b = less(less(*b, e, &each(z, up::<D>)), &f, &each(z, down::<D>));
     *e = minus([[f32x8::ZERO; N]; N], &to_p, &e_p);
@@ -360,34 +361,6 @@ fn transposed<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
     for r in 0..N {
         for c in 0..N {
             to[r][c] = m[c][r];
-        }
-    }
-    to
-}
-
-/// A B
-#[inline(always)]
-fn product<const N: usize>(a: &LaneMatrix<N>, b: &LaneMatrix<N>) -> LaneMatrix<N> {
-    let mut to = *a;
-    for r in 0..N {
-        for c in 0..N {
-            to[r][c] = a[r][0] * b[0][c];
-            for k in 1..N {
-                to[r][c] = a[r][k].mul_add(b[k][c], to[r][c]);
-            }
-        }
-    }
-    to
-}
-
-/// A x
-#[inline(always)]
-fn times<const N: usize>(a: &LaneMatrix<N>, x: &LaneVector<N>) -> LaneVector<N> {
-    let mut to = *x;
-    for r in 0..N {
-        to[r] = a[r][0] * x[0];
-        for k in 1..N {
-            to[r] = a[r][k].mul_add(x[k], to[r]);
         }
     }
     to
@@ -429,32 +402,60 @@ fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f32x8) -> f32x8) ->
     m
 }
 
-/// The inverse of a symmetric, positive definite matrix; zeros where rounding has made it none. A third row is added to the
-/// inverse of the first two, so that what is multiplied is of one unit: with A, u = A⁻¹ v and s = m − vᵀ u,
-///
-/// ```text
-/// [A v; vᵀ m]⁻¹ = [A⁻¹ + u uᵀ/s, −u/s; −uᵀ/s, 1/s]
-/// ```
-#[inline(always)]
-fn inverse<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
-    let one_over = |x: f32x8| x.simd_gt(f32x8::ZERO).select(f32x8::ONE / x, f32x8::ZERO);
-    let scale = one_over(m[0][0].mul_add(m[1][1], -(m[0][1] * m[0][1])));
-    let mut to = m;
-    (to[0][0], to[1][1]) = (scale * m[1][1], scale * m[0][0]);
-    (to[0][1], to[1][0]) = (-(scale * m[0][1]), -(scale * m[0][1]));
-    if N == 3 {
-        let u = [0, 1].map(|r| to[r][0].mul_add(m[0][2], to[r][1] * m[1][2]));
-        let s = one_over(m[1][2].mul_neg_add(u[1], m[0][2].mul_neg_add(u[0], m[2][2])));
-        let of_third = u.map(|u| -(s * u));
-        for r in 0..2 {
-            for c in 0..2 {
-                to[r][c] = of_third[r].mul_neg_add(u[c], to[r][c]);
+/// L D Lᵀ of a symmetric, positive definite matrix. Unlike with its inverse, rounding errors do not grow with its condition.
+#[derive(Clone, Copy)]
+struct Factor<const N: usize> {
+    /// Below the diagonal.
+    lower: LaneMatrix<N>,
+    /// D⁻¹; 0 where rounding has left no pivot.
+    inverse: LaneVector<N>,
+}
+
+impl<const N: usize> Factor<N> {
+    #[inline(always)]
+    fn of(m: LaneMatrix<N>) -> Self {
+        let (mut lower, mut inverse) = (m, [f32x8::ZERO; N]);
+        for j in 0..N {
+            let column = lower.map(|row| row[j]);
+            inverse[j] = column[j].simd_gt(f32x8::ZERO).select(f32x8::ONE / column[j], f32x8::ZERO);
+            for i in j + 1..N {
+                lower[i][j] = column[i] * inverse[j];
+                for k in j + 1..=i {
+                    lower[i][k] = lower[i][j].mul_neg_add(column[k], lower[i][k]);
+                }
             }
-            (to[r][2], to[2][r]) = (of_third[r], of_third[r]);
         }
-        to[2][2] = s;
+        Factor { lower, inverse }
     }
-    to
+
+    /// M⁻¹ x
+    #[inline(always)]
+    fn solve(&self, mut x: LaneVector<N>) -> LaneVector<N> {
+        for i in 0..N {
+            for j in 0..i {
+                x[i] = self.lower[i][j].mul_neg_add(x[j], x[i]);
+            }
+        }
+        for i in (0..N).rev() {
+            x[i] *= self.inverse[i];
+            for j in i + 1..N {
+                x[i] = self.lower[j][i].mul_neg_add(x[j], x[i]);
+            }
+        }
+        x
+    }
+
+    /// M⁻¹ A
+    #[inline(always)]
+    fn solve_each(&self, a: LaneMatrix<N>) -> LaneMatrix<N> {
+        transposed(transposed(a).map(|column| self.solve(column)))
+    }
+
+    /// Of the lane before, or the one after.
+    #[inline(always)]
+    fn shifted(self, by: impl Fn(f32x8) -> f32x8) -> Self {
+        Factor { lower: each_of(self.lower, &by), inverse: each(self.inverse, &by) }
+    }
 }
 
 #[cfg(test)]
@@ -463,9 +464,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Bodies begin at rest; b says how fast rows shall be. Impulses of a row, one by one, change its speed by K_rr |λ_r|. Of their
-        /// sum an inverse in `f32` leaves ε κ, with κ some thousands for the diagonal block of three such rows, of bodies whose radius of
-        /// gyration is one to three times the unit of length.
+        /// Bodies begin at rest; b says how fast rows shall be. The impulses of a row, one by one, change its speed by K_rr |λ_r|:
+        /// what rounding leaves is a share of that.
         #[test]
         fn rows_of_all_chains_hold_afterwards(
             size in 2usize..=3,
@@ -479,10 +479,7 @@ mod tests {
             let of = |i: usize| &numbers[20 * i..][..20];
             // A fifth of the chains end at each link; bodies differ in mass, up to a hundredfold.
             let begins = |i: usize| i == 0 || of(i)[0] > 0.6;
-            let mass = |i: usize| {
-                let inv_mass = of(i)[1].abs() + 0.01;
-                [inv_mass, inv_mass * (0.9 * of(i)[2].abs() + 0.1)]
-            };
+            let mass = |i: usize| [of(i)[1].abs() + 0.01, of(i)[2].abs() + 0.01];
             let row = |i: usize, r: usize| {
                 let at = &of(i)[3 + 5 * r..][..5];
                 // Rows of a joint differ in direction.
@@ -503,20 +500,20 @@ mod tests {
             system.solve(&mut rows, 0.0);
             for i in 0..links {
                 let of_left = if begins(i) { [0.0; 4] } else { rows[i - 1].velocity };
-                let left = if begins(i) { [0.0; 2] } else { mass(i - 1) };
+                let of_masses = if begins(i) { [0.0; 2] } else { mass(i - 1) };
                 let given = system.impulses().group(system.slot(i) / LINK_LANES);
                 let mut made = 1.0_f32;
-                for (r, impulse) in given.iter().enumerate().take(size) {
+                for (r, impulse) in given.iter().enumerate() {
                     let [x, y, s_left, s_right, _] = row(i, r);
-                    let turning = left[1] * s_left * s_left + mass(i)[1] * s_right * s_right;
-                    let k = (left[0] + mass(i)[0]) * (x * x + y * y) + turning;
+                    let turning = of_masses[1] * s_left * s_left + mass(i)[1] * s_right * s_right;
+                    let k = (of_masses[0] + mass(i)[0]) * (x * x + y * y) + turning;
                     made += k * impulse.as_array()[system.slot(i) % LINK_LANES].abs();
                 }
                 for r in 0..size {
                     let [x, y, left, right, b] = row(i, r);
                     let speed = |v: [f32; 4], arm: f32| x * v[0] + y * v[1] + arm * v[2];
                     let off = speed(rows[i].velocity, right) - speed(of_left, left) - b;
-                    prop_assert!(off.abs() < 1e-3 * made, "{size} rows, link {i} of {links}: {off} of {made}");
+                    prop_assert!(off.abs() < 3e-4 * made, "{size} rows, link {i} of {links}: {off} of {made}");
                 }
             }
             prop_assert_eq!(rows[links].velocity, [0.0; 4]);
