@@ -1,6 +1,7 @@
 //! Laws of the engine, a file each.
 
 mod coloring;
+mod convex;
 mod joints;
 mod kernel;
 mod motion;

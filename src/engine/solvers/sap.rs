@@ -26,7 +26,8 @@
 //!
 //! See `sap/convex.rs`.
 
-mod convex;
+#[doc(hidden)]
+pub mod convex;
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

@@ -35,9 +35,7 @@ mod rest;
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::joints::chains::Chains;
-use crate::engine::constraints::kernels::velocity::rules::{
-    Bearing, Between, NormalRule, Relaxed, Rigid, Soft,
-};
+use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
 use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
@@ -251,10 +249,14 @@ impl Solver for Shim {
         let (budget, h, dt) = (passes.budget(), passes.h(), passes.dt());
         let [stiffness, damping_ratio, push_speed, load_sweeps] = [0, 1, 2, 3].map(|i| passes.parameter(i));
         let omega = TAU * stiffness / h;
+        let [damping, relaxation] =
+            if passes.has(part::UNEQUAL) { [UNEQUAL_DAMPING, UNEQUAL_RELAXATION] } else { [1.0; 2] };
+        let from = if passes.has(part::BEARING) { push_speed } else { f32::INFINITY };
         let springs = Soft::new([omega, 2.0 * omega], damping_ratio, push_speed, h);
+        let damped = Soft::new([omega, 2.0 * omega], damping * damping_ratio, push_speed, h);
         let rigid = Rigid::new(h);
-        let damped = Soft::new([omega, 2.0 * omega], UNEQUAL_DAMPING * damping_ratio, push_speed, h);
-        let relaxed = Relaxed { rule: rigid, factor: UNEQUAL_RELAXATION };
+        let soft = Between { equal: Bearing { springs, from }, unequal: Bearing { springs: damped, from } };
+        let relaxed = Between { equal: rigid, unequal: Relaxed { rule: rigid, factor: relaxation } };
         if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
             passes
@@ -279,17 +281,13 @@ impl Solver for Shim {
             }
             passes.solve_chains(&mut self.chains, self.gravity.length(), substep + 1 == budget.substeps);
             for _ in 0..budget.velocity_iterations {
-                if passes.has(part::BEARING) {
-                    sweep(passes, Phase::Solve, Bearing(springs), Bearing(damped));
-                } else {
-                    sweep(passes, Phase::Solve, springs, damped);
-                }
+                passes.block_sweep_normal_first(Phase::Solve, soft);
                 passes.iteration_done();
             }
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
-                sweep(passes, Phase::Relax, rigid, relaxed);
+                passes.block_sweep_normal_first(Phase::Relax, relaxed);
             }
             self.jams.bound(passes);
             passes.end_substep(substep);
@@ -305,15 +303,6 @@ impl Solver for Shim {
     fn held_bytes(&self) -> usize {
         let parts = [self.hand_down.held_bytes(), self.chains.held_bytes(), self.jams.held_bytes()];
         parts.iter().sum::<usize>() + held(&self.fields) + held(&self.joined) + held(&self.last_joined)
-    }
-}
-
-/// One sweep, by how unequal masses are.
-fn sweep<R: NormalRule, S: NormalRule>(passes: &mut Passes<'_>, phase: Phase, equal: R, unequal: S) {
-    if passes.has(part::UNEQUAL) {
-        passes.block_sweep_normal_first(phase, Between { equal, unequal });
-    } else {
-        passes.block_sweep_normal_first(phase, equal);
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Balance {
     work: [f64; 2],
     /// The fastest point of a kinematic body at which it touched another (m/s).
     drive: f64,
+    /// The fastest that joints pull bodies together which start apart (m/s).
+    closing: f64,
 }
 
 /// A scene whose kinetic energy exceeds all that it can have by this factor has blown up (1).
@@ -98,6 +100,7 @@ impl Balance {
             unexplained_max: 0.0,
             work: [0.0; 2],
             drive: 0.0,
+            closing: 0.0,
             kinetic_start: bodies.iter().map(BodyState::kinetic_energy).sum(),
             kinetic_max: bodies.iter().map(BodyState::kinetic_energy).sum(),
         }
@@ -211,12 +214,18 @@ impl Balance {
         self.kinetic_max + self.weight * self.body_size
     }
 
+    /// Joints start `gaps` (m) apart, all together. Rigid rows may close them in one step, and a chain adds up their speeds.
+    pub fn start_apart(&mut self, gaps: f64) {
+        self.closing = gaps / self.dt;
+    }
+
     /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, fell for since they were
     /// highest, would gain by falling their own size, and had if all of them left the fastest kinematic point at
-    /// twice its speed. Read from poses and velocities: impulses may be what explodes.
+    /// twice its speed or closed the gaps of joints in a step. Read from poses and velocities: impulses may be what
+    /// explodes.
     pub fn is_blown_up(&self, kinetic: f64) -> bool {
-        let driven = 0.5 * self.mass * (2.0 * self.drive).powi(2);
-        let has = self.kinetic_start + (self.work[0] - self.work[1]) + driven + self.weight * self.body_size;
+        let given = 0.5 * self.mass * ((2.0 * self.drive).powi(2) + self.closing.powi(2));
+        let has = self.kinetic_start + (self.work[0] - self.work[1]) + given + self.weight * self.body_size;
         has > 0.0 && kinetic > BLOW_UP * has
     }
 }
@@ -358,6 +367,9 @@ mod tests {
         let after = BodyState { position: DVec2::new(0.4, 0.0), ..pushed };
         balance.add(&[BodyStep { before: pushed, after }], &[], &Given::default());
         assert!(!balance.is_blown_up(800.0) && balance.is_blown_up(801.0));
+        // A gap of DT meters that closes within DT has 1 m/s: 1 J.
+        balance.start_apart(DT);
+        assert!(!balance.is_blown_up(900.0) && balance.is_blown_up(901.0));
         assert!(!Balance::new(&[], DT, 1).is_blown_up(1.0));
     }
 }

@@ -290,6 +290,10 @@ impl Observation {
     pub fn new(world: &World) -> Self {
         let settings = &world.settings;
         let previous = snapshot(world);
+        let mut balance = Balance::new(&previous, settings.dt as f64, settings.budget.substeps);
+        balance.start_apart(
+            world.joints().filter_map(|(joint, _)| world.joint_state(joint).ok()).map(|s| s.gap).sum(),
+        );
         let dynamic = world
             .shapes
             .iter()
@@ -297,7 +301,7 @@ impl Observation {
             .filter(|&(_, &body)| world.bodies.is_dynamic(body as usize))
             .map(|(shape, _)| shape.min_half_extent() as f64);
         Observation {
-            balance: Balance::new(&previous, settings.dt as f64, settings.budget.substeps),
+            balance,
             half_extent: dynamic.fold(f64::INFINITY, f64::min),
             dt: settings.dt as f64,
             weight: weight(&previous),

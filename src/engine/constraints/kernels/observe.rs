@@ -6,13 +6,13 @@
 //! [`crate::engine::constraints::step::Workspace::observe`] is set; a step then costs one branch per sweep.
 
 use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::kernels::velocity::sweep::VelocitySweep;
+use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
 use crate::engine::lanes::BodyRow;
 use std::fmt;
 
 /// The rule of a velocity sweep, as a function of plain numbers.
 pub struct ObservedRule {
-    sweep: Box<dyn VelocitySweep + Send + Sync>,
+    contact: Box<dyn ContactLaw + Send + Sync>,
     /// Whether the sweep solved friction rows.
     pub friction: bool,
     /// How far each row's body had moved since the step began: Δx, Δy (m), Δθ (rad); the fourth
@@ -25,7 +25,7 @@ pub struct ObservedRule {
 impl Clone for ObservedRule {
     fn clone(&self) -> Self {
         ObservedRule {
-            sweep: self.sweep.boxed(),
+            contact: self.contact.boxed(),
             friction: self.friction,
             deltas: self.deltas.clone(),
             joints: self.joints,
@@ -55,13 +55,13 @@ const FASTEST_PROBE: f32 = 1048576.0;
 const KEEP_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 impl ObservedRule {
-    /// Keeps a copy of the rule of `sweep`, and of the motions that it saw.
-    pub fn of(sweep: &dyn VelocitySweep, rows: &[BodyRow]) -> Self {
+    /// Keeps a copy of `law`, and of the motions that its sweep saw.
+    pub fn of(law: &dyn ContactLaw, rows: &[BodyRow]) -> Self {
         ObservedRule {
-            sweep: sweep.boxed(),
-            friction: sweep.has_friction(),
+            contact: law.boxed(),
+            friction: law.has_friction(),
             deltas: rows.iter().map(|row| row.delta).collect(),
-            joints: sweep.law_of(),
+            joints: law.of_errors(),
         }
     }
 
@@ -81,7 +81,7 @@ impl ObservedRule {
     /// the rounding of b grows with them.
     pub fn law(&self, against_static: bool, separation: f32, mass: f64) -> Option<NormalLaw> {
         let f = |vn: f32, old: f32| {
-            f64::from(self.sweep.normal_impulse(against_static, vn, separation, 1.0, old))
+            f64::from(self.contact.normal_impulse(against_static, vn, separation, 1.0, old))
         };
         let mut speed = 1.0_f32;
         let [once, twice] = loop {

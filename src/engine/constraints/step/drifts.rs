@@ -4,7 +4,7 @@
 use super::{Passes, StepParts, Workspace};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
-use crate::engine::constraints::kernels::velocity::sweep::VelocitySweep;
+use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
 use crate::engine::constraints::records::point_vector::PointVector;
 
 /// Drifts within a step; between steps they are in [`super::Passes::kept`], one float per contact point.
@@ -37,13 +37,7 @@ impl Drifts {
     }
 
     /// A sweep, and one over what bounces, which solves the law of `law`.
-    pub fn sweep_by(
-        &mut self,
-        passes: &mut Passes<'_>,
-        phase: Phase,
-        sticky: Sticky,
-        law: &dyn VelocitySweep,
-    ) {
+    pub fn sweep_by(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky, law: &dyn ContactLaw) {
         let drifts = passes.parts_of(&mut self.vector);
         passes.sweep_by(phase, &mut StickySweep { sticky, drifts }, law);
     }

@@ -10,7 +10,7 @@ use crate::engine::constraints::kernels::velocity::block::BlockSweep;
 use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
 use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
-use crate::engine::constraints::kernels::velocity::sweep::{Sweep, VelocitySweep};
+use crate::engine::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
 use crate::engine::constraints::kernels::velocity::warm_start::WarmStart;
 use crate::engine::lanes::BodyRow;
 
@@ -127,7 +127,7 @@ impl Passes<'_> {
     }
 
     /// Constraint pass: one velocity sweep by a pass of the solver's own, which solves the law of `law`.
-    pub fn sweep_by(&mut self, phase: Phase, pass: &mut dyn AnyPass, law: &dyn VelocitySweep) {
+    pub fn sweep_by(&mut self, phase: Phase, pass: &mut dyn AnyPass, law: &dyn ContactLaw) {
         if self.run(phase, pass) {
             self.sweep_bias(phase);
             self.solved(law);
@@ -175,17 +175,17 @@ impl Passes<'_> {
         }
     }
 
-    /// Says which law was solved, where no sweep did: that of this one.
-    pub fn solves(&mut self, sweep: &dyn VelocitySweep) {
+    /// Says which law was solved, where no sweep did: this one.
+    pub fn solves(&mut self, law: &dyn ContactLaw) {
         if self.work.observe {
-            self.work.last_rule = Some(ObservedRule::of(sweep, &self.work.rows));
+            self.work.last_rule = Some(ObservedRule::of(law, &self.work.rows));
         }
     }
 
-    /// Counts a velocity sweep, and keeps its rule if `observe` is set.
-    pub fn solved(&mut self, sweep: &dyn VelocitySweep) {
-        let rows = if sweep.has_friction() { self.rows_per_point() } else { 1 };
+    /// Counts a velocity sweep, and keeps its law if `observe` is set.
+    pub fn solved(&mut self, law: &dyn ContactLaw) {
+        let rows = if law.has_friction() { self.rows_per_point() } else { 1 };
         self.count_sweep(rows);
-        self.solves(sweep);
+        self.solves(law);
     }
 }

@@ -136,19 +136,22 @@ impl<R: NormalRule> Pass for Sweep<R> {
     }
 }
 
-/// A velocity sweep under some rule: a pass that can say which law it solves.
-pub trait VelocitySweep: AnyPass {
+/// The law that sweeps under some rule solve. Not the sweep: a law that only names what another pass has solved compiles no kernel.
+pub trait ContactLaw {
     /// Whether friction rows are solved.
     fn has_friction(&self) -> bool;
 
     /// [`NormalRule::normal_impulse`] of one row.
     fn normal_impulse(&self, against_static: bool, vn: f32, separation: f32, mass: f32, old: f32) -> f32;
 
-    /// The same sweep, owned.
-    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync>;
+    /// [`NormalRule::of_errors`]
+    fn of_errors(&self) -> Softness;
+
+    /// The same law, owned.
+    fn boxed(&self) -> Box<dyn ContactLaw + Send + Sync>;
 }
 
-impl<R: NormalRule> VelocitySweep for Sweep<R> {
+impl<R: NormalRule> ContactLaw for Sweep<R> {
     fn has_friction(&self) -> bool {
         R::FRICTION
     }
@@ -157,10 +160,20 @@ impl<R: NormalRule> VelocitySweep for Sweep<R> {
         self.0.normal_impulse(against_static, vn, separation, mass, old)
     }
 
-    fn boxed(&self) -> Box<dyn VelocitySweep + Send + Sync> {
+    fn of_errors(&self) -> Softness {
+        self.0.of_errors()
+    }
+
+    fn boxed(&self) -> Box<dyn ContactLaw + Send + Sync> {
         Box::new(*self)
     }
 }
+
+/// A velocity sweep under some rule: a pass that can say which law it solves.
+pub trait VelocitySweep: AnyPass + ContactLaw {}
+
+impl<R: NormalRule> VelocitySweep for Sweep<R> {}
+
 /// The rows of a contact along one axis.
 pub(crate) struct Rows<L> {
     /// Of bodies a and b, per point.

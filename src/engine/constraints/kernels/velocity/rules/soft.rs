@@ -128,22 +128,27 @@ impl NormalRule for Soft {
 ///
 /// Then λ = −m γ_m β s/γ_i at any depth, and what is pushed without a load still moves at u.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bearing(pub Soft);
+pub struct Bearing {
+    /// The springs.
+    pub springs: Soft,
+    /// Push from which on the leak falls (m/s): u, or infinite for [`Soft`] itself.
+    pub from: f32,
+}
 
 impl NormalRule for Bearing {
     const FRICTION: bool = Soft::FRICTION;
 
     fn of_errors(&self) -> Softness {
-        Softness::stiffest(self.0.inv_h)
+        Softness::stiffest(self.springs.inv_h)
     }
 
     #[inline(always)]
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        let Bearing(springs) = self;
+        let Bearing { springs, from } = self;
         let soft = if against_static { springs.against_static } else { springs.dynamic };
         let [constant, slope] = springs.line(against_static, separation, mass, old);
         let depth = separation * L::splat(-soft.mass_scale * soft.bias_rate);
-        let beyond = depth - L::splat(springs.push_speed);
+        let beyond = depth - L::splat(*from);
         if !beyond.any_positive() {
             return [constant, slope];
         }
@@ -160,6 +165,7 @@ mod tests {
     #[test]
     fn springs_bear_at_any_depth_what_their_stiffness_says() {
         let springs = Soft::new([900.0, 1800.0], 10.0, 3.0, 1.0 / 960.0);
+        let bearing = Bearing { springs, from: springs.push_speed };
         let mass = 2.0;
         let bears = |depth: f32| mass * 900.0f32.powi(2) * depth / 960.0;
         // What remains of an impulse at rest, after the soft row and after the one that carries.
@@ -168,7 +174,7 @@ mod tests {
             let row = [-depth, mass, bears(depth)];
             [
                 after(springs.line::<f32>(false, row[0], row[1], row[2])),
-                after(Bearing(springs).line::<f32>(false, row[0], row[1], row[2])),
+                after(bearing.line::<f32>(false, row[0], row[1], row[2])),
             ]
         };
         for shallow in [1e-4, 1e-2, 0.06] {
@@ -179,7 +185,7 @@ mod tests {
             assert!(soft < -1e-3 && bearing.abs() < 1e-5, "{deep}: {soft} {bearing}");
         }
         // Without a load both push at γ_m u.
-        let unloaded = Bearing(springs).line::<f32>(false, -1.0, mass, 0.0);
+        let unloaded = bearing.line::<f32>(false, -1.0, mass, 0.0);
         assert_eq!(unloaded, springs.line(false, -1.0, mass, 0.0));
     }
 }
