@@ -34,7 +34,7 @@ type Bare = Kernel<false, false, 1>;
 
 const RULE: Rigid = Rigid { inv_h: 60.0 };
 const POSITION: PositionSweep =
-    PositionSweep { fraction: 0.2, slop: 0.005, max_correction: 0.2, turned: true };
+    PositionSweep { fraction: 0.2, slop: 0.005, max_correction: [0.2; 2], turned: true };
 /// As far out as an index can point, and just past the end of the rows below.
 const FAR: [u32; 3] = [u32::MAX, 1_000_000_000, ROWS as u32];
 /// Rows of the good batches, the inert one among them, and contacts.

@@ -251,20 +251,27 @@ fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
     (0..SCENES).filter(apart).count() as u32
 }
 
+/// Solvers whose norms add up meters and radians where joints hold angles.
+const MIXING: [&str; 4] = ["nncg", "two_level", "anderson", "sap"];
+
 /// A power of two rounds nothing, so a scene of another size moves to the same bits, if its length unit goes along. Not under `avbd`, whose
 /// penalties begin at 1 N/m.
 #[test]
 fn a_scene_of_another_size_moves_to_the_same_bits() {
     let cases = FAMILIES.iter().zip(0..).map(|(family, number)| family.case(77, number).scene);
-    let chains = ["hanging_chain", "ball_and_chain"].map(|name| load(name).unwrap().scene);
+    let chains = ["hanging_chain", "ball_and_chain", "cantilever"].map(|name| load(name).unwrap().scene);
     let scenes: Vec<Scene> = cases.chain(chains).collect();
     for variant in VARIANTS.iter().filter(|v| v.name != "avbd") {
-        for scene in scenes.iter().filter(|scene| scene.runs_on(variant).is_ok()) {
+        let mixes = |scene: &Scene| scene.name == "cantilever" && MIXING.contains(&variant.name);
+        for scene in scenes.iter().filter(|scene| scene.runs_on(variant).is_ok() && !mixes(scene)) {
             for factor in [2.0, 1.0 / 32.0] {
                 let image = scaled(scene, factor);
                 let [mut a, mut b] = [scene, &image].map(|s| s.build(settings(variant)).unwrap());
-                for _ in 0..STEPS {
-                    assert_eq!(a.step().is_ok(), b.step().is_ok(), "{} {}", variant.name, scene.name);
+                let mut steps = (0..STEPS).map(|_| [&mut a, &mut b].map(|world| world.step().is_ok()));
+                // What diverges has no places.
+                if let Some(apart) = steps.find(|one| *one != [true; 2]) {
+                    assert_eq!(apart, [false; 2], "{} {}", variant.name, scene.name);
+                    continue;
                 }
                 for i in 0..scene.bodies.len() {
                     let [(x, p), (y, q)] = [&a, &b].map(|w| (w.bodies.center(i), w.bodies.pose(i)));

@@ -87,6 +87,40 @@ fn operations_are_those_counted_by_hand() {
     }
 }
 
+/// A chain of 21 hinges, by the text of `constraints/joints/rows.rs`.
+#[test]
+fn operations_of_joints_are_those_counted_by_hand() {
+    // Sine and versine of both turns: 6 multiplications, 4 multiply-adds. Both anchors turned, 4 and 4; the arms and the way
+    // between them, 12 additions. Each row applied: 4 multiplications, 6 multiply-adds.
+    let placed = Operations { adds: 12, multiplies: 6 + 4, multiply_adds: 4 + 4, ..Operations::default() };
+    let warm = Operations { multiplies: 10 + 2 * 4, multiply_adds: 8 + 2 * 6, ..placed };
+    // Per row J v, 2 additions, 1 multiplication, 3 multiply-adds; what it asks for, 1 of each; the new impulse, 2 additions with
+    // its increment, 2 multiply-adds; applied as above. K: an addition, and in each of 3 entries 4 multiplications and 3
+    // multiply-adds. By its determinant, which may be zero: 5 and 3, a division and a choice.
+    let sweep = Operations {
+        adds: 12 + 2 * (2 + 1 + 2) + 1,
+        multiplies: 10 + 2 * (1 + 1 + 4) + 3 * 4 + 5,
+        multiply_adds: 8 + 2 * (3 + 1 + 2 + 6) + 3 * 3 + 3,
+        divisions: 1,
+        choices: 1,
+    };
+    let mut world = settled("hanging_chain", settings(find("soft_step").unwrap()), 5);
+    let mut frozen = world.hold();
+    for (phase, each) in [(Phase::WarmStart, warm), (Phase::Solve, sweep), (Phase::Relax, sweep)] {
+        let found = probe(&mut frozen, phase);
+        assert_eq!((found.passes, found.counted_contacts), (4, 0));
+        let times = 4 * 21;
+        let all = Operations {
+            adds: times * each.adds,
+            multiplies: times * each.multiplies,
+            multiply_adds: times * each.multiply_adds,
+            divisions: times * each.divisions,
+            choices: times * each.choices,
+        };
+        assert_eq!(found.operations, Some(all), "{phase:?}");
+    }
+}
+
 #[test]
 fn bytes_are_those_of_the_layout() {
     let solver = find("soft_step").unwrap();

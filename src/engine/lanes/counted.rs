@@ -121,6 +121,8 @@ impl Neg for Counted {
 impl Lanes for Counted {
     const WIDTH: usize = 1;
 
+    const COUNTS: bool = true;
+
     type Index = [u32; 1];
 
     fn splat(value: f32) -> Self {

@@ -71,7 +71,7 @@ const DEEPEST: f32 = 0.2;
 fn step(passes: &mut Passes<'_>) {
     let (budget, rigid) = (passes.budget(), Rigid::new(passes.h()));
     let [fraction, slop] = [0, 1].map(|i| passes.parameter(i));
-    let max_correction = fraction * DEEPEST * passes.length_unit();
+    let max_correction = [passes.length_unit(), 1.0].map(|unit| fraction * DEEPEST * unit);
     let positions = PositionSweep { fraction, slop, max_correction, turned: true };
     for substep in 0..budget.substeps {
         passes.integrate_velocities();

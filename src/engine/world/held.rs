@@ -64,7 +64,7 @@ pub struct Probe {
     pub rows: usize,
     /// Operations of all passes; none where the phase does not work on lanes.
     pub operations: Option<Operations>,
-    /// Contacts on which they were counted: those that have a color.
+    /// Contacts on which they were counted: those that have a color. Joints count besides.
     pub counted_contacts: usize,
     /// Per pass and contact, by kind of body a: floats of records read and written, rows gathered, half
     /// rows written.
@@ -236,7 +236,7 @@ impl HeldWorld<'_> {
             _ => laps[phase as usize],
         };
         let counted_contacts = self.world.work.lanes.lanes();
-        let operations = Some(operations).filter(|o| *o != Operations::default() && counted_contacts > 0);
+        let operations = Some(operations).filter(|o| *o != Operations::default());
         let rows = count.row_updates / passes.max(1) as usize;
         let requested = clock.requested();
         let times = f64::from(passes.max(1));

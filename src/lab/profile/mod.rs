@@ -262,8 +262,9 @@ impl Entrant {
         let pass_ns = median(&self.pass_ns);
         let deviations: Vec<f64> = self.pass_ns.iter().map(|t| (t - pass_ns).abs()).collect();
         let probe = self.probe;
-        let per_contact = |flops: u64| flops as f64 / probe.counted_contacts as f64 / f64::from(probe.passes);
-        let flops = probe.operations.map(|o| contacts * per_contact(o.flops()));
+        // Contacts without a color take as many as the others.
+        let all = if probe.counted_contacts > 0 { contacts / probe.counted_contacts as f64 } else { 1.0 };
+        let flops = probe.operations.map(|o| all * o.flops() as f64 / f64::from(probe.passes));
         let bandwidth = Bandwidth { read: median(&self.read), update: median(&self.update) };
         PhaseReport {
             probe,

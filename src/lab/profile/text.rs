@@ -93,11 +93,13 @@ fn single(report: &ProfileReport, phase: &PhaseReport) -> String {
         bytes(phase.traffic.working_set)
     );
     if let Some(o) = phase.probe.operations {
-        let each = |count: u64| {
-            digits(count as f64 / phase.probe.counted_contacts as f64 / f64::from(phase.probe.passes))
+        let (of, times) = match phase.probe.counted_contacts {
+            0 => ("pass", 1),
+            contacts => ("contact", contacts),
         };
+        let each = |count: u64| digits(count as f64 / times as f64 / f64::from(phase.probe.passes));
         text += &format!(
-            "  per contact on lanes: {} additions, {} multiplications, {} multiply-adds, {} divisions or roots; \
+            "  per {of} on lanes: {} additions, {} multiplications, {} multiply-adds, {} divisions or roots; \
              {} minima, maxima and selections, which do not count as flop\n",
             each(o.adds),
             each(o.multiplies),

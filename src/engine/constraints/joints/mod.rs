@@ -10,7 +10,7 @@ pub mod rows;
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
-use crate::engine::constraints::kernels::pass::{PassMode, VectorTask, at_width};
+use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_pass_width, at_width};
 use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
 use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
@@ -310,7 +310,7 @@ impl<T: JointType> Joints<T> {
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
         let of = |pair| JointWarmStart { pair, driving: false };
-        if !self.linked.is_active() {
+        if const { L::COUNTS } || !self.linked.is_active() {
             self.pass::<L, _>(on, false, of)
         } else {
             self.pass_besides::<L, _>(on, of)
@@ -319,7 +319,7 @@ impl<T: JointType> Joints<T> {
 
     fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
         let of = |pair| Velocities { pair, by };
-        if !self.linked.is_active() {
+        if const { L::COUNTS } || !self.linked.is_active() {
             self.pass::<L, _>(on, false, of)
         } else {
             self.pass_besides::<L, _>(on, of)
@@ -474,6 +474,8 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn run(&mut self, on: TypeInput<'_>) {
         let width = on.width.width;
+        // What sweeps do besides links is not counted.
+        let swept = PassWidth { counted: on.width.counted && !self.linked.is_active(), ..on.width };
         let inv_h = 1.0 / on.h;
         match (on.phase, on.mode) {
             (_, PassMode::Masses) => {}
@@ -487,14 +489,14 @@ impl<T: JointType> ConstraintType for Joints<T> {
             }
             (Phase::Prepare, _) => at_width!(width, Self::fill(self, on)),
             (Phase::Store, _) => at_width!(width, Self::store(self, on)),
-            (Phase::WarmStart, _) => at_width!(width, Self::warm_start(self, on)),
+            (Phase::WarmStart, _) => at_pass_width!(swept, Self::warm_start(self, on)),
             (_, PassMode::Position { max_correction, impulses }) => {
                 let by =
                     DisplacementRule::Position { max_correction, inv_h: if impulses { inv_h } else { 0.0 } };
-                at_width!(width, Self::displace(self, by, on))
+                at_pass_width!(swept, Self::displace(self, by, on))
             }
             (Phase::Position, _) => {
-                at_width!(width, Self::displace(self, DisplacementRule::Push { law: on.law }, on))
+                at_pass_width!(swept, Self::displace(self, DisplacementRule::Push { law: on.law }, on))
             }
             (Phase::Solve | Phase::Relax, mode) => {
                 let by = VelocityRule {
@@ -507,7 +509,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
                     relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
                     inv_h,
                 };
-                at_width!(width, Self::sweep(self, by, on))
+                at_pass_width!(swept, Self::sweep(self, by, on))
             }
             _ => {}
         }

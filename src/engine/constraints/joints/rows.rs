@@ -405,8 +405,8 @@ pub(super) enum DisplacementRule {
     },
     /// Until errors are gone.
     Position {
-        /// Largest correction (m or rad).
-        max_correction: f32,
+        /// Largest correction of a length (m), and of an angle (rad).
+        max_correction: [f32; 2],
         /// 1/h, where displacements are impulses (1/s); else 0.
         inv_h: f32,
     },
@@ -443,8 +443,12 @@ impl<L: Lanes> JointPass<L> for Displacements<L> {
                     RowLaw::Limit => x[0] = x[0].min(L::zero()),
                     RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
                 }
-                let bound = L::splat(max_correction);
-                let x = self.pair.solved(&j, x.map(|x| (-x).min(bound).max(-bound)));
+                let [of_length, of_angle] = max_correction.map(L::splat);
+                for (x, j) in x.iter_mut().zip(&j) {
+                    let bound = j.select(of_length, of_angle);
+                    *x = (-*x).min(bound).max(-bound);
+                }
+                let x = self.pair.solved(&j, x);
                 for i in 0..N {
                     self.pair.apply(&j[i], x[i], [DX, DY, TURN]);
                     impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);

@@ -75,8 +75,8 @@ pub enum PassMode {
     Masses,
     /// Bodies are moved until errors are gone.
     Position {
-        /// Largest correction (m or rad).
-        max_correction: f32,
+        /// Largest correction of a length (m), and of an angle (rad).
+        max_correction: [f32; 2],
         /// Whether displacements count as impulses of h.
         impulses: bool,
     },
@@ -128,6 +128,18 @@ macro_rules! at_width {
     };
 }
 pub(crate) use at_width;
+
+/// As [`at_width`], on the lanes of a [`PassWidth`].
+macro_rules! at_pass_width {
+    ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
+        match $width {
+            #[cfg(feature = "count")]
+            PassWidth { counted: true, .. } => $($pass)::+::<$crate::engine::lanes::Counted>($($arg),*),
+            PassWidth { width, .. } => at_width!(width, $($pass)::+($($arg),*)),
+        }
+    };
+}
+pub(crate) use at_pass_width;
 
 /// A pass over contacts, compiled per width and features.
 ///

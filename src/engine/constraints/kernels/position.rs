@@ -40,8 +40,8 @@ pub struct PositionSweep {
     pub fraction: f32,
     /// Overlap that is left alone (m).
     pub slop: f32,
-    /// C_max (m): more would turn bodies further than a linearized contact can follow.
-    pub max_correction: f32,
+    /// C_max of overlap (m), and of angles of joints (rad): more would turn bodies further than a linearized contact can follow.
+    pub max_correction: [f32; 2],
     /// Arms follow the bodies' turn within the step.
     pub turned: bool,
 }
@@ -99,7 +99,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 mass = mass.select_positive(L::splat(1.0) / k, L::zero());
             }
             let overlap = (-(separation + L::splat(sweep.slop))).max(L::zero());
-            let correction = (overlap * L::splat(sweep.fraction)).min(L::splat(sweep.max_correction));
+            let correction = (overlap * L::splat(sweep.fraction)).min(L::splat(sweep.max_correction[0]));
             let push = mass * correction;
             sum = sum + push;
             moved = mass_sum.mul_add(push, moved);

@@ -23,8 +23,8 @@ pub struct ChainLink {
 pub struct LinkRule {
     /// 1/h (1/s)
     pub inv_h: f32,
-    /// Fastest speed at which the error of a joint is removed (m/s or rad/s).
-    pub most_speed: f32,
+    /// Size of typical bodies (m).
+    pub length_unit: f32,
 }
 
 /// Numbers of links, group by group: so many lane vectors each.

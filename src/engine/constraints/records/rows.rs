@@ -37,6 +37,12 @@ impl<L: Lanes> Jacobian<L> {
         ]
     }
 
+    /// The first value where the error is a length, the second where it is an angle.
+    #[inline(always)]
+    pub fn select(&self, of_length: L, of_angle: L) -> L {
+        self.axis[0].mul_add(self.axis[0], self.axis[1] * self.axis[1]).select_positive(of_length, of_angle)
+    }
+
     /// The same row, the other way round: −C.
     #[inline(always)]
     pub fn reversed(self) -> Self {

@@ -144,9 +144,9 @@ impl<'a> Passes<'a> {
         MAX_PUSH_SPEED * self.input.length_unit
     }
 
-    /// Largest overlap that one position sweep removes at a point (m).
-    pub fn max_correction(&self) -> f32 {
-        MAX_POSITION_CORRECTION * self.input.length_unit
+    /// Largest overlap that one position sweep removes at a point (m), and largest angle (rad).
+    pub fn max_correction(&self) -> [f32; 2] {
+        [self.input.length_unit, 1.0].map(|unit| MAX_POSITION_CORRECTION * unit)
     }
 
     /// The solver's own parameter of this index in `Variant::parameters`.

@@ -107,7 +107,7 @@ impl Pass for Displace<'_> {
     }
 
     fn mode(&self) -> PassMode {
-        PassMode::Position { max_correction: f32::INFINITY, impulses: true }
+        PassMode::Position { max_correction: [f32::INFINITY; 2], impulses: true }
     }
 
     #[inline(never)]

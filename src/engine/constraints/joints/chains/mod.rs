@@ -48,9 +48,6 @@ use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
 use system::ChainSystem;
 
-/// Fastest speed at which the error of a joint is removed (m/s or rad/s).
-const MOST_SPEED: f32 = 10.0;
-
 /// No body.
 const NONE: u32 = u32::MAX;
 
@@ -140,7 +137,7 @@ impl Chains {
     /// Changes velocities so that the rows hold at the end of the substep of `h` (s), under `gravity` (m/s²), of bodies of
     /// about `length_unit` (m).
     pub fn solve(&mut self, types: &mut [Joined], rows: &mut [BodyRow], [h, gravity, length_unit]: [f32; 3]) {
-        let by = LinkRule { inv_h: 1.0 / h, most_speed: MOST_SPEED * length_unit };
+        let by = LinkRule { inv_h: 1.0 / h, length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.link_rows(rows, by, self.system.rows());

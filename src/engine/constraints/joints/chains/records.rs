@@ -10,6 +10,9 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
 
+/// Fastest speed at which the error of a joint is removed (length units or rad per second).
+const MOST_SPEED: f32 = 10.0;
+
 /// Links of one type, in batches of one group each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Linked {
@@ -253,12 +256,16 @@ impl JointPass<f32x8> for LinkPass<'_> {
             return;
         }
         let LinkPass { pair, way, by, to } = self;
-        let (way, inv_h, most) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.most_speed));
+        let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
+        let most = f32x8::splat(MOST_SPEED) * unit;
         let is_link = way * way;
         // Selected by products: of selections the compiler makes masked stores, which took more than half of this pass on Zen.
         let others = f32x8::ONE - is_link;
         let set = |to: &mut f32x8, value: f32x8| *to = Lanes::mul_add(is_link, value, others * *to);
-        let square = error.iter().fold(f32x8::ZERO, |sum, &x| Lanes::mul_add(x, x, sum));
+        let square = error.iter().zip(&j).fold(f32x8::ZERO, |sum, (&x, j)| {
+            let x = x * j.select(f32x8::ONE, unit);
+            Lanes::mul_add(x, x, sum)
+        });
         let mut rate = inv_h;
         let is_fast = (square * (inv_h * inv_h)).simd_gt(most * most);
         if is_fast.any() {
