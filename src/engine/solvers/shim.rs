@@ -127,7 +127,8 @@ const MECHANISMS: [Mechanism; 12] = [
         name: "hand_down",
         meaning: "loads go down from body to body",
         case: "B5.height",
-        lines: lines_of(include_str!("shim/rest/hand_down.rs")),
+        lines: lines_of(include_str!("shim/rest/hand_down.rs"))
+            + lines_of(include_str!("../constraints/numerics/supports.rs")),
     },
     Mechanism {
         name: "rising",
