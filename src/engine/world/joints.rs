@@ -83,6 +83,12 @@ impl World {
     /// Errors: a value out of its range, a handle of a body that was removed, a joint of a body to itself or between two that
     /// cannot move, a solver that cannot hold joints.
     pub fn add_joint(&mut self, joint: &Joint) -> Result<JointHandle, Error> {
+        let joint = self.admit(joint)?;
+        Ok(self.joints.add(joint))
+    }
+
+    /// A joint with its frames, from now on between its bodies.
+    fn admit(&mut self, joint: &Joint) -> Result<Joint, Error> {
         self.check_joint(joint)?;
         let joint = joint.placed(&self.bodies);
         joint.kind.check()?;
@@ -93,7 +99,7 @@ impl World {
         self.traits.spins();
         self.features = self.traits.features();
         self.joints_changed();
-        Ok(self.joints.add(joint))
+        Ok(joint)
     }
 
     /// Changes a joint: its bodies, its frames, its values. Impulses stay where the rows do.
@@ -101,12 +107,9 @@ impl World {
     /// Errors: as [`Self::add_joint`]; a handle of a joint that was removed.
     pub fn set_joint(&mut self, handle: JointHandle, joint: &Joint) -> Result<(), Error> {
         self.joint(handle)?;
-        self.check_joint(joint)?;
-        let joint = joint.placed(&self.bodies);
-        joint.kind.check()?;
+        let joint = self.admit(joint)?;
         keep_apart(&mut self.joints.apart, &joint);
         self.joints.joints[handle.index()] = Some(joint);
-        self.joints_changed();
         Ok(())
     }
 
