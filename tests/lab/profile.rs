@@ -19,6 +19,18 @@ fn probe(frozen: &mut HeldWorld, phase: Phase) -> Probe {
     *frozen.probes().iter().find(|p| p.phase == phase).unwrap()
 }
 
+/// So many times all of these.
+fn sum(all: &[Operations], times: u64) -> Operations {
+    let of = |count: fn(&Operations) -> u64| times * all.iter().map(count).sum::<u64>();
+    Operations {
+        adds: of(|o| o.adds),
+        multiplies: of(|o| o.multiplies),
+        multiply_adds: of(|o| o.multiply_adds),
+        divisions: of(|o| o.divisions),
+        choices: of(|o| o.choices),
+    }
+}
+
 /// One box on static ground, and one box on another that is on the ground: per contact the counts of
 /// the text of the kernel, made by hand for two points with friction.
 #[test]
@@ -64,21 +76,13 @@ fn operations_are_those_counted_by_hand() {
         multiply_adds: warm_static.multiply_adds + 4 + 2,
         ..warm_static
     };
-    let solver = find("soft_step").unwrap();
     for (boxes, warm, soft) in [
         (1, vec![warm_static], vec![soft_static]),
         (2, vec![warm_static, warm_dynamic], vec![soft_static, soft_dynamic]),
     ] {
-        let mut world = settled(&format!("stack:{boxes}"), settings(solver), 5);
+        let mut world = settled(&format!("stack:{boxes}"), settings(find("soft_step").unwrap()), 5);
         assert_eq!((world.counts.contacts, world.counts.points), (boxes, 2 * boxes));
         let mut frozen = world.hold();
-        let sum = |all: &[Operations], passes: u64| Operations {
-            adds: passes * all.iter().map(|o| o.adds).sum::<u64>(),
-            multiplies: passes * all.iter().map(|o| o.multiplies).sum::<u64>(),
-            multiply_adds: passes * all.iter().map(|o| o.multiply_adds).sum::<u64>(),
-            divisions: passes * all.iter().map(|o| o.divisions).sum::<u64>(),
-            choices: passes * all.iter().map(|o| o.choices).sum::<u64>(),
-        };
         let found = probe(&mut frozen, Phase::WarmStart);
         assert_eq!(found.operations, Some(sum(&warm, 1)), "{boxes} boxes");
         let found = probe(&mut frozen, Phase::Solve);
@@ -109,15 +113,7 @@ fn operations_of_joints_are_those_counted_by_hand() {
     for (phase, each) in [(Phase::WarmStart, warm), (Phase::Solve, sweep), (Phase::Relax, sweep)] {
         let found = probe(&mut frozen, phase);
         assert_eq!((found.passes, found.counted_contacts), (4, 0));
-        let times = 4 * 21;
-        let all = Operations {
-            adds: times * each.adds,
-            multiplies: times * each.multiplies,
-            multiply_adds: times * each.multiply_adds,
-            divisions: times * each.divisions,
-            choices: times * each.choices,
-        };
-        assert_eq!(found.operations, Some(all), "{phase:?}");
+        assert_eq!(found.operations, Some(sum(&[each], 4 * 21)), "{phase:?}");
     }
 }
 

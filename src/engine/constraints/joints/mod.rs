@@ -23,6 +23,7 @@ use rows::{
 };
 use std::f32::consts::TAU;
 use std::fmt;
+use std::ops::DerefMut;
 
 /// A type of joint between two bodies. `tests/engine/joints.rs` has one from outside.
 pub trait JointType: Clone + fmt::Debug + Send + 'static {
@@ -309,16 +310,19 @@ impl<T: JointType> Joints<T> {
     }
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
-        let of = |pair| JointWarmStart { pair, driving: false };
-        if const { L::COUNTS } || !self.linked.is_active() {
-            self.pass::<L, _>(on, false, of)
-        } else {
-            self.pass_besides::<L, _>(on, of)
-        }
+        self.velocity_pass::<L, _>(on, |pair| JointWarmStart { pair, driving: false });
     }
 
     fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
-        let of = |pair| Velocities { pair, by };
+        self.velocity_pass::<L, _>(on, |pair| Velocities { pair, by });
+    }
+
+    /// A pass over velocities, without the rigid rows of links. These are not counted, so it has no instance that counts.
+    fn velocity_pass<L: Lanes, P: JointPass<L> + DerefMut>(
+        &self,
+        on: TypeInput<'_>,
+        of: impl Fn(JointPair<L>) -> P,
+    ) {
         if const { L::COUNTS } || !self.linked.is_active() {
             self.pass::<L, _>(on, false, of)
         } else {

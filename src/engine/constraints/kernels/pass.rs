@@ -134,7 +134,9 @@ macro_rules! at_pass_width {
     ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
         match $width {
             #[cfg(feature = "count")]
-            PassWidth { counted: true, .. } => $($pass)::+::<$crate::engine::lanes::Counted>($($arg),*),
+            PassWidth { counted: true, width: LaneWidth::W1 } => {
+                $($pass)::+::<$crate::engine::lanes::Counted>($($arg),*)
+            }
             PassWidth { width, .. } => at_width!(width, $($pass)::+($($arg),*)),
         }
     };
@@ -165,6 +167,19 @@ pub trait Pass {
 
     /// Runs over all segments of `on.batches`, in order.
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>);
+
+    /// Runs the instance for these features.
+    fn run_with<L: Lanes>(&mut self, features: &Features, on: PassInput<'_>) {
+        match (features.rotation, features.friction, features.two_points) {
+            (false, false, false) => self.run::<L, Kernel<false, false, 1>>(on),
+            (true, false, false) => self.run::<L, Kernel<true, false, 1>>(on),
+            (true, true, false) => self.run::<L, Kernel<true, true, 1>>(on),
+            (true, false, true) => self.run::<L, Kernel<true, false, 2>>(on),
+            (true, true, true) => self.run::<L, Kernel<true, true, 2>>(on),
+            // Friction and a second point act through rotation.
+            (false, ..) => unreachable!("friction or a second point without rotation"),
+        }
+    }
 }
 
 /// The lanes that a pass runs at: a width, or one lane that counts its operations.
@@ -212,27 +227,6 @@ impl<P: Pass> AnyPass for P {
     }
 
     fn run_at(&mut self, width: PassWidth, features: &Features, on: PassInput<'_>) {
-        match width.width {
-            #[cfg(feature = "count")]
-            LaneWidth::W1 if width.counted => {
-                with_features::<P, crate::engine::lanes::Counted>(self, features, on);
-            }
-            LaneWidth::W1 => with_features::<P, f32>(self, features, on),
-            LaneWidth::W4 => with_features::<P, wide::f32x4>(self, features, on),
-            LaneWidth::W8 => with_features::<P, wide::f32x8>(self, features, on),
-            LaneWidth::W16 => with_features::<P, wide::f32x16>(self, features, on),
-        }
-    }
-}
-
-fn with_features<P: Pass, L: Lanes>(pass: &mut P, features: &Features, on: PassInput<'_>) {
-    match (features.rotation, features.friction, features.two_points) {
-        (false, false, false) => pass.run::<L, Kernel<false, false, 1>>(on),
-        (true, false, false) => pass.run::<L, Kernel<true, false, 1>>(on),
-        (true, true, false) => pass.run::<L, Kernel<true, true, 1>>(on),
-        (true, false, true) => pass.run::<L, Kernel<true, false, 2>>(on),
-        (true, true, true) => pass.run::<L, Kernel<true, true, 2>>(on),
-        // Friction and a second point act through rotation.
-        (false, ..) => unreachable!("friction or a second point without rotation"),
+        at_pass_width!(width, Self::run_with(self, features, on))
     }
 }
