@@ -34,7 +34,8 @@ mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::Chains;
+use crate::engine::constraints::joints::chains::{Chains, Stage};
+static ENV: std::sync::LazyLock<[bool; 2]> = std::sync::LazyLock::new(|| ["NOAGAIN", "NOSETTLE"].map(|x| std::env::var(x).is_ok()));
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -280,16 +281,24 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
-            passes.solve_chains(&mut self.chains, self.gravity.length(), substep + 1 == budget.substeps);
+            let g = self.gravity.length();
+            passes.solve_chains(&mut self.chains, g, Stage::First);
             for _ in 0..budget.velocity_iterations {
                 passes.block_sweep_normal_first(Phase::Solve, soft);
                 passes.iteration_done();
+            }
+            if !ENV[0] {
+                passes.solve_chains(&mut self.chains, g, Stage::Again);
             }
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, relaxed);
             }
+            if !ENV[1] {
+                passes.solve_chains(&mut self.chains, g, Stage::Relaxed);
+            }
+            passes.keep_chains(&self.chains, substep + 1 == budget.substeps);
             self.jams.bound(passes);
             passes.end_substep(substep);
         }

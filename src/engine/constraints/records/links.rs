@@ -49,6 +49,11 @@ impl<V: Pod> LinkGroups<V> {
         self.values.resize(groups * stride, V::zeroed());
     }
 
+    /// Sets all to zero.
+    pub fn clear(&mut self) {
+        self.values.fill(V::zeroed());
+    }
+
     /// Of a group. `[stride]`
     #[inline(always)]
     pub fn group(&self, group: usize) -> &[V] {
@@ -64,5 +69,13 @@ impl<V: Pod> LinkGroups<V> {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         held(&self.values)
+    }
+}
+
+impl LinkImpulses {
+    /// Adds to a group.
+    #[inline(always)]
+    pub fn add(&mut self, group: usize, change: &[f32x8]) {
+        self.group_mut(group).iter_mut().zip(change).for_each(|(to, &change)| *to += change);
     }
 }

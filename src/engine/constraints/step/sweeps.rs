@@ -2,7 +2,7 @@
 
 use super::{Passes, ROW, Workspace};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::Chains;
+use crate::engine::constraints::joints::chains::{Chains, Stage};
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
@@ -58,20 +58,28 @@ impl Passes<'_> {
         }
     }
 
-    /// Pass over joints alone: solves the rigid rows of chains of joints at once, under `gravity` (m/s²). `keeps`: their impulses
-    /// are kept, as those of the last substep are.
-    pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, keeps: bool) {
+    /// Pass over joints alone: solves the rigid rows of chains of joints at once, under `gravity` (m/s²).
+    pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, stage: Stage) {
         if !chains.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
-            if self.input.phases.counted {
+            let Workspace { rows, types, .. } = &mut *self.work;
+            let solved = chains.solve(types, rows, [self.input.h, gravity, self.input.length_unit], stage);
+            if solved && self.input.phases.counted {
                 self.clock.book_bytes(chains.traffic());
             }
-            let Workspace { rows, types, .. } = &mut *self.work;
-            chains.solve(types, rows, [self.input.h, gravity, self.input.length_unit]);
-            if keeps || self.input.record_impulses {
-                chains.give_impulses(types);
-                // Types of the caller's own take it for what it is to them, storing.
-                self.over_types_alone(Phase::Store, PassMode::TakeUp);
-            }
+            self.clock.lap(Phase::Solve);
+        }
+    }
+
+    /// Pass over joints alone: joints of chains take over the impulses of this substep. `is_last`: of the step.
+    pub fn keep_chains(&mut self, chains: &Chains, is_last: bool) {
+        if (is_last || self.input.record_impulses)
+            && !chains.is_empty()
+            && !self.work.types.is_empty()
+            && self.input.phases.runs(Phase::Solve)
+        {
+            chains.give_impulses(&mut self.work.types);
+            // Types of the caller's own take it for what it is to them, storing.
+            self.over_types_alone(Phase::Store, PassMode::TakeUp);
             self.clock.lap(Phase::Solve);
         }
     }

@@ -46,6 +46,7 @@ use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
+pub use system::Stage;
 use system::ChainSystem;
 
 /// No body.
@@ -77,7 +78,7 @@ struct ChainSearch {
     ends: Vec<[u32; 2]>,
     /// Links of all chains, one after the other: joint, body away from where it hangs, and links of the chain if it hangs at
     /// both ends.
-    found: Vec<(u32, u32, usize)>,
+    found: Vec<(u32, u32, usize, usize)>,
 }
 
 impl Chains {
@@ -108,11 +109,11 @@ impl Chains {
         let inert = self.moves.len() as u32 - 1;
         system.begin(search.found.len(), size);
         let mut bodies = vec![inert; system.slots()];
-        for (i, &(joint, right, span)) in search.found.iter().enumerate() {
+        for (i, &(joint, right, span, chain)) in search.found.iter().enumerate() {
             let [t, number] = search.places[joint as usize];
             let slot = system.slot(i);
             let forward = search.ends[joint as usize][1] == right;
-            system.set_span(slot, span);
+            system.set_chain(slot, chain, span);
             if right != NONE {
                 bodies[slot] = right;
             }
@@ -136,14 +137,24 @@ impl Chains {
 
     /// Changes velocities so that the rows hold at the end of the substep of `h` (s), under `gravity` (m/s²), of bodies of
     /// about `length_unit` (m).
-    pub fn solve(&mut self, types: &mut [Joined], rows: &mut [BodyRow], [h, gravity, length_unit]: [f32; 3]) {
-        let by = LinkRule { inv_h: 1.0 / h, length_unit };
+    pub fn solve(
+        &mut self,
+        types: &mut [Joined],
+        rows: &mut [BodyRow],
+        [h, gravity, length_unit]: [f32; 3],
+        stage: Stage,
+    ) -> bool {
+        if stage != Stage::First && !self.system.find_moved(rows) {
+            return false;
+        }
+        let by = LinkRule { inv_h: if stage == Stage::Relaxed { 0.0 } else { 1.0 / h }, length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.link_rows(rows, by, self.system.rows());
             }
         }
-        self.system.solve(rows, gravity * h * h);
+        self.system.solve(rows, gravity * h * h, stage);
+        true
     }
 
     /// Bytes that [`Self::solve`] reads and writes, without numbers of types.
@@ -209,7 +220,7 @@ impl ChainSearch {
     fn follow(&mut self, first: u32, mut body: u32) -> Option<u32> {
         let (from, mut joint) = (self.found.len(), first);
         loop {
-            self.found.push((joint, body, 0));
+            self.found.push((joint, body, 0, from));
             if body == NONE {
                 let links = self.found.len() - from;
                 self.found[from..].iter_mut().for_each(|link| link.2 = links);

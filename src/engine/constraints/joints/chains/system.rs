@@ -47,12 +47,31 @@ pub struct ChainSystem {
     spans: Vec<f32x8>,
     /// Body of each slot away from where its chain hangs, or the inert one. `[groups × lanes]`
     bodies: Indices,
+    /// Its velocity when the chain was solved last. `[groups]`
+    velocities: Vec<[f32x8; 3]>,
+    /// Chain of each slot. `[groups × lanes]`
+    chains: Vec<u32>,
+    /// Whether something has moved a chain since it was solved. `[chains]`
+    moved: Vec<bool>,
+    /// Links of the chains that are solved now: 1, others: 0. `[groups]`
+    taken: Vec<f32x8>,
     /// X, Y and z: 2 size² + size numbers.
     eliminated: LinkGroups<f32x8>,
 }
 
 /// γ (1) at least: for what hits a chain, and is no weight that it bears.
 const LEAST_GIVE: f32 = 3e-5;
+
+/// Which solve of a substep.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Stage {
+    /// Before the sweeps, of all chains.
+    First,
+    /// After the sweeps.
+    Again,
+    /// After the relaxing sweeps, without errors.
+    Relaxed,
+}
 
 type LaneVector<const N: usize> = [f32x8; N];
 type LaneMatrix<const N: usize> = [[f32x8; N]; N];
@@ -68,6 +87,13 @@ impl ChainSystem {
         self.impulses.begin(size, groups);
         self.spans.clear();
         self.spans.resize(groups, f32x8::ZERO);
+        self.velocities.clear();
+        self.velocities.resize(groups, [f32x8::ZERO; 3]);
+        self.chains.clear();
+        self.chains.resize(groups * LINK_LANES, 0);
+        self.moved.clear();
+        self.taken.clear();
+        self.taken.resize(groups, f32x8::ONE);
         self.eliminated.begin(2 * size * size + size, groups);
     }
 
@@ -76,9 +102,37 @@ impl ChainSystem {
         i % self.groups * LINK_LANES + i / self.groups
     }
 
-    /// Says that a slot is of a chain of so many links that hangs at both ends.
-    pub fn set_span(&mut self, slot: usize, links: usize) {
+    /// Says which chain a slot is of, and how many links that has if it hangs at both ends.
+    pub fn set_chain(&mut self, slot: usize, chain: usize, links: usize) {
         self.spans[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = links as f32;
+        self.chains[slot] = chain as u32;
+        self.moved.resize(self.moved.len().max(chain + 1), false);
+    }
+
+    /// Whether bodies have changed velocity since they were solved; the chains of those are solved next.
+    pub fn find_moved(&mut self, rows: &[BodyRow]) -> bool {
+        self.moved.fill(false);
+        for k in 0..self.groups {
+            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            let mut same = f32x8::ZERO.simd_eq(f32x8::ZERO);
+            for (v, before) in velocity.iter().zip(self.velocities[k]) {
+                same &= v.simd_eq(before);
+            }
+            if same.all() {
+                continue;
+            }
+            for lane in (0..LINK_LANES).filter(|lane| (same.to_bitmask() >> lane) & 1 == 0) {
+                self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
+            }
+        }
+        if !self.moved.contains(&true) {
+            return false;
+        }
+        for (taken, chains) in self.taken.iter_mut().zip(self.chains.chunks_exact(LINK_LANES)) {
+            let lane = |i: usize| if self.moved[chains[i] as usize] { 1.0 } else { 0.0 };
+            *taken = f32x8::new(std::array::from_fn(lane));
+        }
+        true
     }
 
     /// Sets the bodies away from where chains hang, slot by slot, as many as there are slots.
@@ -108,20 +162,29 @@ impl ChainSystem {
     }
 
     /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
-    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f32) {
+    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f32, stage: Stage) {
+        if stage == Stage::First {
+            self.impulses.clear();
+            self.taken.fill(f32x8::ONE);
+        }
         match self.size {
-            2 => self.solve_rows::<2>(rows, fall),
-            _ => self.solve_rows::<3>(rows, fall),
+            2 => self.solve_rows::<2>(rows, fall, stage),
+            _ => self.solve_rows::<3>(rows, fall, stage),
         }
     }
 
-    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f32) {
+    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f32, stage: Stage) {
         let fall = f32x8::splat(fall * fall);
+        let gives = f32x8::splat(if stage == Stage::Again { 1.0 } else { 0.0 });
+        let diagonal = |system: &Self, link: &Link<N>, k: usize| {
+            let borne = each(vector(system.impulses.group(k)), |x| x * gives);
+            link.diagonal(system.spans[k], fall, borne, system.taken[k])
+        };
         let last = self.groups - 1;
         let first = Link::<N>::of(self.rows.group(0));
         let end = Link::<N>::of(self.rows.group(last));
         let mut here = first;
-        let (mut pivot, mut b) = here.diagonal(self.spans[0], fall);
+        let (mut pivot, mut b) = diagonal(self, &here, 0);
         let mut e = transposed(end.shifted(up::<1>).coupling(&first));
         let (mut d_before, mut b_before) = ([[f32x8::ZERO; N]; N], [f32x8::ZERO; N]);
         for k in 0..last {
@@ -137,7 +200,7 @@ impl ChainSystem {
             d_before = minus(d_before, &e_transposed, &y);
             b_before = less(b_before, &e_transposed, &z);
             let c = transposed(c);
-            (pivot, b) = next.diagonal(self.spans[k + 1], fall);
+            (pivot, b) = diagonal(self, &next, k + 1);
             pivot = minus(pivot, &c, &x);
             b = less(b, &c, &z);
             e = minus([[f32x8::ZERO; N]; N], &c, &y);
@@ -153,7 +216,7 @@ impl ChainSystem {
         reduce::<2, N>(&mut pivot, &mut e, &mut b);
         reduce::<4, N>(&mut pivot, &mut e, &mut b);
         let of_end = Factor::of(pivot).solve(b);
-        self.impulses.group_mut(last).copy_from_slice(&of_end);
+        self.impulses.add(last, &of_end);
         let of_lane_before = each(of_end, up::<1>);
         let (mut next, mut impulse) = (end, of_end);
         for k in (0..last).rev() {
@@ -166,14 +229,14 @@ impl ChainSystem {
                     impulse[r] = from[N * N + r * N + c].mul_neg_add(of_lane_before[c], impulse[r]);
                 }
             }
-            self.impulses.group_mut(k).copy_from_slice(&impulse);
+            self.impulses.add(k, &impulse);
             let here = Link::<N>::of(self.rows.group(k));
-            push([&here, &next], [&impulse, &of_next], self.bodies_of(k), rows);
+            self.velocities[k] = push([&here, &next], [&impulse, &of_next], self.bodies_of(k), rows);
             next = here;
         }
         // Of lanes' last links, the next are the first ones of the lanes after.
         let (next, of_next) = (first.shifted(down::<1>), each(impulse, down::<1>));
-        push([&end, &next], [&of_end, &of_next], self.bodies_of(last), rows);
+        self.velocities[last] = push([&end, &next], [&of_end, &of_next], self.bodies_of(last), rows);
     }
 
     fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
@@ -194,6 +257,10 @@ impl ChainSystem {
         self.rows.held_bytes()
             + self.impulses.held_bytes()
             + held(&self.spans)
+            + held(&self.velocities)
+            + held(&self.chains)
+            + held(&self.moved)
+            + held(&self.taken)
             + self.bodies.held_bytes()
             + self.eliminated.held_bytes()
     }
@@ -247,7 +314,13 @@ impl<const N: usize> Link<N> {
 
     /// (1 + γ) K_ii and b, with γ of chains that hang at both ends. `fall`: (g h²)² (m²).
     #[inline(always)]
-    fn diagonal(&self, span: f32x8, fall: f32x8) -> (LaneMatrix<N>, LaneVector<N>) {
+    fn diagonal(
+        &self,
+        span: f32x8,
+        fall: f32x8,
+        borne: LaneVector<N>,
+        taken: f32x8,
+    ) -> (LaneMatrix<N>, LaneVector<N>) {
         // The length of a link is that of two arms, each of which has s² = |r|² of two rows; g h² at least.
         let mut square = fall + f32x8::splat(f32::MIN_POSITIVE);
         for arms in self.arms {
@@ -267,9 +340,17 @@ impl<const N: usize> Link<N> {
                 k[r][c] = gives * mass.mul_add(along(self.axis[r], self.axis[c]), turning);
                 k[c][r] = k[r][c];
             }
+        }
+        let given = (gives - f32x8::ONE) / gives;
+        for r in 0..N {
+            for c in 0..N {
+                b[r] = (given * k[r][c]).mul_neg_add(borne[c], b[r]);
+            }
+        }
+        for r in 0..N {
             let moves = k[r][r].simd_gt(f32x8::ZERO);
             k[r][r] = moves.select(k[r][r], f32x8::ONE);
-            b[r] = moves.select(b[r], f32x8::ZERO);
+            b[r] = (moves & taken.simd_gt(f32x8::ZERO)).select(b[r], f32x8::ZERO);
         }
         (k, b)
     }
@@ -296,7 +377,7 @@ fn push<const N: usize>(
     [own, others]: [&LaneVector<N>; 2],
     bodies: LaneIndex<[u32; LINK_LANES]>,
     rows: &mut [BodyRow],
-) {
+) -> [f32x8; 3] {
     let (mut of_own, mut of_others) = ([f32x8::ZERO; 3], [f32x8::ZERO; 3]);
     for r in 0..N {
         let [x, y] = here.axis[r];
@@ -316,6 +397,11 @@ fn push<const N: usize>(
         *v += more;
     }
     f32x8::scatter_velocity(rows, bodies, velocity);
+    [velocity[0], velocity[1], velocity[2]]
+}
+
+fn vector<const N: usize>(numbers: &[f32x8]) -> LaneVector<N> {
+    std::array::from_fn(|r| numbers[r])
 }
 
 /// One step of cyclic reduction, between lanes `D` apart.
@@ -497,7 +583,7 @@ mod tests {
                 }
             }
             system.set_bodies(&bodies);
-            system.solve(&mut rows, 0.0);
+            system.solve(&mut rows, 0.0, Stage::First);
             for i in 0..links {
                 let of_left = if begins(i) { [0.0; 4] } else { rows[i - 1].velocity };
                 let of_masses = if begins(i) { [0.0; 2] } else { mass(i - 1) };
