@@ -51,6 +51,7 @@ impl Passes<'_> {
             h,
             slop,
             timed,
+            joined: stops.unwrap_or_default(),
             releases,
             record_impulses: self.input.record_impulses,
             bounces,

@@ -199,11 +199,12 @@ impl Spread {
                 break;
             }
         }
-        if !on.timed {
-            for i in 0..self.pushed.len() {
-                on.rows[self.pushed[i] as usize].delta[..3].fill(0.0);
+        for &row in &self.pushed {
+            if !on.timed || on.joined.get(row as usize) == Some(&true) {
+                on.rows[row as usize].delta[..3].fill(0.0);
             }
-        } else if !is_done {
+        }
+        if on.timed && !is_done {
             self.stay(on);
         }
         is_done

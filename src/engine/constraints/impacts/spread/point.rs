@@ -106,6 +106,8 @@ pub(crate) struct SpreadInput<'a> {
     pub slop: f32,
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
+    /// Bodies with joints, which stay where they are. `[bodies]`, or empty
+    pub joined: &'a [bool],
     /// Points that an impact releases have borne their body until then.
     pub releases: bool,
     pub record_impulses: bool,

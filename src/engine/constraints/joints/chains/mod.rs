@@ -147,6 +147,10 @@ impl Chains {
         if stage != Stage::First && !self.system.find_moved(rows) {
             return false;
         }
+        self.system.h = h;
+        if stage == Stage::First {
+            self.system.damp(rows);
+        }
         let by = LinkRule { inv_h: if stage == Stage::Relaxed { 0.0 } else { 1.0 / h }, length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {

@@ -41,6 +41,8 @@ pub struct ChainSystem {
     groups: usize,
     /// Rows of a link.
     size: usize,
+    pub h: f32,
+    excess: Vec<f32x8>,
     rows: LinkRows,
     impulses: LinkImpulses,
     /// Links of the chain of each, where it hangs at both ends; else 0. `[groups]`
@@ -60,7 +62,7 @@ pub struct ChainSystem {
 }
 
 /// γ (1) at least: for what hits a chain, and is no weight that it bears.
-const LEAST_GIVE: f32 = 3e-5;
+static KAPPA: std::sync::LazyLock<[f32; 5]> = std::sync::LazyLock::new(|| { let e = |n: &str, d: f32| std::env::var(n).ok().and_then(|s| s.parse().ok()).unwrap_or(d); [e("KAPPA", 0.0), e("LEAST", 3e-5), e("GROWS", 1.0), e("X0", 1.0), e("DAMP", 1.0)] });
 
 /// Which solve of a substep.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -163,6 +165,12 @@ impl ChainSystem {
 
     /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
     pub fn solve(&mut self, rows: &mut [BodyRow], fall: f32, stage: Stage) {
+        if KAPPA[0] > 0.0 {
+            match self.size {
+                2 => self.stiffen::<2>(),
+                _ => self.stiffen::<3>(),
+            }
+        }
         if stage == Stage::First {
             self.impulses.clear();
             self.taken.fill(f32x8::ONE);
@@ -170,6 +178,65 @@ impl ChainSystem {
         match self.size {
             2 => self.solve_rows::<2>(rows, fall, stage),
             _ => self.solve_rows::<3>(rows, fall, stage),
+        }
+    }
+
+    pub fn damp(&mut self, rows: &mut [BodyRow]) {
+        if KAPPA[0] > 0.0 {
+            match self.size {
+                2 => self.find_excess::<2>(rows),
+                _ => self.find_excess::<3>(rows),
+            }
+        }
+    }
+
+    fn find_excess<const N: usize>(&mut self, rows: &mut [BodyRow]) {
+        let groups = self.groups;
+        self.excess.resize(groups, f32x8::ZERO);
+        for k in 0..groups {
+            let here = Link::<N>::of(self.rows.group(k));
+            let own = vector::<N>(self.impulses.group(k));
+            let (next, of_next) = if k + 1 == groups {
+                (Link::<N>::of(self.rows.group(0)).shifted(down::<1>), each(vector::<N>(self.impulses.group(0)), down::<1>))
+            } else {
+                (Link::<N>::of(self.rows.group(k + 1)), vector::<N>(self.impulses.group(k + 1)))
+            };
+            let pull = |l: &Link<N>, side: usize, x: &LaneVector<N>| {
+                let cross = l.axis[0][0] * l.axis[1][1] - l.axis[0][1] * l.axis[1][0];
+                cross * (l.arms[side][1] * x[0] - l.arms[side][0] * x[1])
+            };
+            let mut w = pull(&here, 1, &own);
+            w -= next.mass[0].simd_gt(f32x8::ZERO).select(pull(&next, 0, &of_next), f32x8::ZERO);
+            let w = w.max(f32x8::ZERO) * f32x8::splat(KAPPA[0] * self.h);
+            let mut e = [0.0; 8];
+            for lane in 0..8 {
+                let body = self.bodies.list().entries()[k * 8 + lane] as usize;
+                let x = w.to_array()[lane] * rows[body].delta[3] - KAPPA[3];
+                if x > 0.0 {
+                    e[lane] = x;
+                    rows[body].velocity[2] /= 1.0 + KAPPA[4] * x;
+                }
+            }
+            self.excess[k] = f32x8::new(e);
+        }
+    }
+
+    fn stiffen<const N: usize>(&mut self) {
+        let groups = self.groups;
+        let end = |k: usize| 5 * N + 2 + k;
+        if self.excess.len() != groups {
+            return;
+        }
+        for k in 0..groups {
+            let e = f32x8::ONE / (f32x8::ONE + self.excess[k]);
+            self.rows.group_mut(k)[end(1)] *= e;
+            if k + 1 == groups {
+                let mut to = up::<1>(e).to_array();
+                to[0] = 1.0;
+                self.rows.group_mut(0)[end(0)] *= f32x8::new(to);
+            } else {
+                self.rows.group_mut(k + 1)[end(0)] *= e;
+            }
         }
     }
 
@@ -327,9 +394,9 @@ impl<const N: usize> Link<N> {
             square = arms[1].mul_add(arms[1], arms[0].mul_add(arms[0], square));
         }
         // (4/3) (2 G)²
-        let grows = f32x8::splat(8.0 / 3.0) * fall * (span * span) / square;
+        let grows = f32x8::splat(KAPPA[2] * 8.0 / 3.0) * fall * (span * span) / square;
         let gives =
-            f32x8::ONE + span.simd_gt(f32x8::ZERO).select(grows + f32x8::splat(LEAST_GIVE), f32x8::ZERO);
+            f32x8::ONE + span.simd_gt(f32x8::ZERO).select(grows + f32x8::splat(KAPPA[1]), f32x8::ZERO);
         let ([left, right], mass) = (self.arms, self.mass[0] + self.mass[1]);
         let mut k = [[f32x8::ZERO; N]; N];
         let mut b = self.b;
