@@ -35,7 +35,6 @@ mod rest;
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::joints::chains::{Chains, Stage};
-static ENV: std::sync::LazyLock<[bool; 2]> = std::sync::LazyLock::new(|| ["NOAGAIN", "NOSETTLE"].map(|x| std::env::var(x).is_ok()));
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -281,23 +280,18 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
-            let g = self.gravity.length();
-            passes.solve_chains(&mut self.chains, g, Stage::First);
+            passes.solve_chains(&mut self.chains, Stage::Begin);
             for _ in 0..budget.velocity_iterations {
                 passes.block_sweep_normal_first(Phase::Solve, soft);
                 passes.iteration_done();
             }
-            if !ENV[0] {
-                passes.solve_chains(&mut self.chains, g, Stage::Again);
-            }
+            passes.solve_chains(&mut self.chains, Stage::Again);
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, relaxed);
             }
-            if !ENV[1] {
-                passes.solve_chains(&mut self.chains, g, Stage::Relaxed);
-            }
+            passes.solve_chains(&mut self.chains, Stage::Relax);
             passes.keep_chains(&self.chains, substep + 1 == budget.substeps);
             self.jams.bound(passes);
             passes.end_substep(substep);

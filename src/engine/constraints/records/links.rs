@@ -21,7 +21,7 @@ pub struct ChainLink {
 /// How errors of links are removed.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkRule {
-    /// 1/h (1/s)
+    /// 1/h (1/s); 0 if errors are left.
     pub inv_h: f32,
     /// Size of typical bodies (m).
     pub length_unit: f32,
@@ -75,7 +75,7 @@ impl<V: Pod> LinkGroups<V> {
 impl LinkImpulses {
     /// Adds to a group.
     #[inline(always)]
-    pub fn add(&mut self, group: usize, change: &[f32x8]) {
-        self.group_mut(group).iter_mut().zip(change).for_each(|(to, &change)| *to += change);
+    pub fn add(&mut self, group: usize, more: &[f32x8]) {
+        self.group_mut(group).iter_mut().zip(more).for_each(|(sum, &more)| *sum += more);
     }
 }

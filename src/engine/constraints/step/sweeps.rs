@@ -58,30 +58,34 @@ impl Passes<'_> {
         }
     }
 
-    /// Pass over joints alone: solves the rigid rows of chains of joints at once, under `gravity` (m/s²).
-    pub fn solve_chains(&mut self, chains: &mut Chains, gravity: f32, stage: Stage) {
-        if !chains.is_empty() && !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+    /// Pass over joints alone: solves the rigid rows of chains of joints at once.
+    pub fn solve_chains(&mut self, chains: &mut Chains, stage: Stage) {
+        let phase = if stage == Stage::Relax { Phase::Relax } else { Phase::Solve };
+        if self.has_chains(chains) && self.input.phases.runs(phase) {
             let Workspace { rows, types, .. } = &mut *self.work;
-            let solved = chains.solve(types, rows, [self.input.h, gravity, self.input.length_unit], stage);
+            let solved = chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);
             if solved && self.input.phases.counted {
                 self.clock.book_bytes(chains.traffic());
             }
-            self.clock.lap(Phase::Solve);
+            self.clock.lap(phase);
         }
     }
 
-    /// Pass over joints alone: joints of chains take over the impulses of this substep. `is_last`: of the step.
+    /// Pass over joints alone: joints of chains take over their impulses, of the last substep or of any if they are recorded.
     pub fn keep_chains(&mut self, chains: &Chains, is_last: bool) {
         if (is_last || self.input.record_impulses)
-            && !chains.is_empty()
-            && !self.work.types.is_empty()
-            && self.input.phases.runs(Phase::Solve)
+            && self.has_chains(chains)
+            && self.input.phases.runs(Phase::Relax)
         {
             chains.give_impulses(&mut self.work.types);
             // Types of the caller's own take it for what it is to them, storing.
             self.over_types_alone(Phase::Store, PassMode::TakeUp);
-            self.clock.lap(Phase::Solve);
+            self.clock.lap(Phase::Relax);
         }
+    }
+
+    fn has_chains(&self, chains: &Chains) -> bool {
+        !chains.is_empty() && !self.work.types.is_empty()
     }
 
     /// Sweeps solve all joints again.

@@ -12,6 +12,11 @@
 //!
 //! The errors are gone at the end of the substep to first order. The impulses λ are whole: these rows need no warm start.
 //!
+//! Sweeps of contacts, motors and limits move the links after that. Chains that they have moved are solved again, before positions
+//! follow; and once more without errors, K λ' = −J v, after the relaxing sweeps. Otherwise the next substep finds as errors what sweeps
+//! did in this one, and removes them at the rate 1/h, against the same contacts and motors. A chain that nothing has moved, to the bit,
+//! is solved once.
+//!
 //! # Chains
 //!
 //! Rows are oriented along the chain: L is the body toward the place where the chain hangs, R the one away from it, and
@@ -21,19 +26,22 @@
 //! K_ii = (m_L⁻¹ + m_R⁻¹) d dᵀ + I_L⁻¹ s_L s_Lᵀ + I_R⁻¹ s_R s_Rᵀ,     K_ij = −(m_R⁻¹ d_i d_jᵀ + I_R⁻¹ s_R,i s_L,jᵀ)
 //! ```
 //!
-//! # Chains that hang at both ends
+//! # Tension
 //!
-//! A straight bridge has a tension T without bound. Links of mass m and length l swing across it at up to ω² = 4 T/(m l), which
-//! an explicit step bears up to ω h = 2. So the joints of such a chain give way, C = γ K_ii λ h: K_ii is multiplied by 1 + γ. With
-//! K ≈ 2/m, λ = T h and n links, a sag of δ n l has T = n m g/(8 δ) and stretches each link by 8 δ² l/3, so that
+//! A force F on the arm r of a body turns it by r × F, which falls by r·F per radian. So a chain under a tension T swings across, its links
+//! of mass m and length l at up to ω² = 4 T/(m l), and T has no bound where a chain is straight between two pins. An explicit step bears
+//! ω h < 2. Implicit Euler bears any: with the torque τ at the start of the substep and the stiffness Σ r·F of all hinges of the body,
 //!
 //! ```text
-//! δ³ = (3/32) γ G,      (ω h)² = G/(2 δ) = 1.1 G^⅔ γ^−⅓,      G = n g h²/l
+//! I (ω⁺ − ω) = h (τ − h ω⁺ Σ r·F),      (1 + x) I ω⁺ = I ω + h τ,      x = (h²/I) Σ r·F
 //! ```
 //!
-//! and ω h = 1 asks for γ = (4/3) G²; with (4/3) (2 G)² a chain may bear as much again. A bridge of 160 links of a meter gives way by
-//! 1.4 mm a joint at h = 1/240 s. To that γ 3·10⁻⁵ are added: rows of a straight chain contradict each other without gravity, too, and
-//! a load that hits a chain has to be caught.
+//! but damps what it slows. So only what is beyond x = 1 is taken implicitly, e = max(0, x − 1): ω at the start of the substep and I⁻¹ in
+//! these rows are divided by 1 + e. F is that of the substep before. Links that are rods have x = 3 (ω h)², and x = 1 at ω h = 0.58; slower
+//! swings keep their energy.
+//!
+//! A straight chain between two pins has a row more along it than its bodies have coordinates, so K has no inverse. Joints of all chains
+//! give way, C = −γ K_ii λ h with γ = 10⁻⁵: K_ii is multiplied by 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
 //!
 //! Chains have two links or more, and no body of theirs has a third rigid joint. All else is left to sweeps: the bodies of ragdolls
 //! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.
@@ -46,8 +54,8 @@ use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
-pub use system::Stage;
 use system::ChainSystem;
+pub use system::Stage;
 
 /// No body.
 const NONE: u32 = u32::MAX;
@@ -76,9 +84,8 @@ struct ChainSearch {
     places: Vec<[u32; 2]>,
     /// Its ends; [`NONE`] for what does not move.
     ends: Vec<[u32; 2]>,
-    /// Links of all chains, one after the other: joint, body away from where it hangs, and links of the chain if it hangs at
-    /// both ends.
-    found: Vec<(u32, u32, usize, usize)>,
+    /// Links of all chains, one after the other: joint, body away from where it hangs, and number of the chain.
+    found: Vec<(u32, u32, usize)>,
 }
 
 impl Chains {
@@ -109,11 +116,11 @@ impl Chains {
         let inert = self.moves.len() as u32 - 1;
         system.begin(search.found.len(), size);
         let mut bodies = vec![inert; system.slots()];
-        for (i, &(joint, right, span, chain)) in search.found.iter().enumerate() {
+        for (i, &(joint, right, chain)) in search.found.iter().enumerate() {
             let [t, number] = search.places[joint as usize];
             let slot = system.slot(i);
             let forward = search.ends[joint as usize][1] == right;
-            system.set_chain(slot, chain, span);
+            system.set_chain(slot, chain);
             if right != NONE {
                 bodies[slot] = right;
             }
@@ -135,29 +142,27 @@ impl Chains {
         }
     }
 
-    /// Changes velocities so that the rows hold at the end of the substep of `h` (s), under `gravity` (m/s²), of bodies of
-    /// about `length_unit` (m).
+    /// Changes velocities so that the rows hold at the end of the substep of `h` (s), of bodies of about `length_unit` (m); whether
+    /// there was something to solve.
     pub fn solve(
         &mut self,
         types: &mut [Joined],
         rows: &mut [BodyRow],
-        [h, gravity, length_unit]: [f32; 3],
+        [h, length_unit]: [f32; 2],
         stage: Stage,
     ) -> bool {
-        if stage != Stage::First && !self.system.find_moved(rows) {
+        if stage == Stage::Begin {
+            self.system.begin_substep(rows, h);
+        } else if !self.system.find_moved(rows) {
             return false;
         }
-        self.system.h = h;
-        if stage == Stage::First {
-            self.system.damp(rows);
-        }
-        let by = LinkRule { inv_h: if stage == Stage::Relaxed { 0.0 } else { 1.0 / h }, length_unit };
+        let by = LinkRule { inv_h: if stage == Stage::Relax { 0.0 } else { 1.0 / h }, length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.link_rows(rows, by, self.system.rows());
             }
         }
-        self.system.solve(rows, gravity * h * h, stage);
+        self.system.solve(rows, stage);
         true
     }
 
@@ -206,28 +211,29 @@ impl ChainSearch {
     /// Finds all chains, from the first joint of each that hangs from what does not move.
     fn find(&mut self) {
         self.found.clear();
+        let mut chains = 0;
         for joint in 0..self.ends.len() as u32 {
             let [a, b] = self.ends[joint as usize];
             // A chain that hangs at both ends is found from the joint that comes first.
             if (a == NONE) != (b == NONE) {
                 let from = self.found.len();
-                let last = self.follow(joint, if a == NONE { b } else { a });
-                if !last.is_some_and(|last| self.found.len() > from + 1 && last >= joint) {
+                let last = self.follow(joint, if a == NONE { b } else { a }, chains);
+                if last.is_some_and(|last| self.found.len() > from + 1 && last >= joint) {
+                    chains += 1;
+                } else {
                     self.found.truncate(from);
                 }
             }
         }
     }
 
-    /// Lists the links from `joint` and its `body` on; the last joint if it hangs from what does not move, else the first; none
-    /// where there is no chain.
-    fn follow(&mut self, first: u32, mut body: u32) -> Option<u32> {
-        let (from, mut joint) = (self.found.len(), first);
+    /// Lists the links of a chain from its `first` joint and that one's `body` on; the last joint if it hangs from what does not move,
+    /// else the first; none where there is no chain.
+    fn follow(&mut self, first: u32, mut body: u32, chain: usize) -> Option<u32> {
+        let mut joint = first;
         loop {
-            self.found.push((joint, body, 0, from));
+            self.found.push((joint, body, chain));
             if body == NONE {
-                let links = self.found.len() - from;
-                self.found[from..].iter_mut().for_each(|link| link.2 = links);
                 return Some(joint);
             }
             joint = match *self.joints_of(body) {

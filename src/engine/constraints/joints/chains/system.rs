@@ -30,6 +30,7 @@
 //! inverses of D. A bridge of 160 links takes 1 µs a substep, and 0.8 µs for its rows, 11 ns a link (AVX2).
 //! In `f64`, which gains nothing but the last tenth of a micrometer, its steps take 1.7 times as long.
 
+use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
 use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
 use wide::f32x8;
@@ -41,38 +42,38 @@ pub struct ChainSystem {
     groups: usize,
     /// Rows of a link.
     size: usize,
-    pub h: f32,
-    excess: Vec<f32x8>,
     rows: LinkRows,
     impulses: LinkImpulses,
-    /// Links of the chain of each, where it hangs at both ends; else 0. `[groups]`
-    spans: Vec<f32x8>,
-    /// Body of each slot away from where its chain hangs, or the inert one. `[groups × lanes]`
+    /// Body R of each slot, or the inert one. `[groups × lanes]`
     bodies: Indices,
-    /// Its velocity when the chain was solved last. `[groups]`
+    /// Its velocity when its chain was solved last (m/s, rad/s). `[groups]`
     velocities: Vec<[f32x8; 3]>,
+    /// Σ r·λ of its hinges in this substep (N·m·s). `[groups]`
+    pulls: Vec<f32x8>,
+    /// 1/(1 + e) of it. `[groups]`
+    shares: Vec<f32x8>,
     /// Chain of each slot. `[groups × lanes]`
     chains: Vec<u32>,
     /// Whether something has moved a chain since it was solved. `[chains]`
     moved: Vec<bool>,
-    /// Links of the chains that are solved now: 1, others: 0. `[groups]`
+    /// 1 for links that are solved now, 0 for others. `[groups]`
     taken: Vec<f32x8>,
     /// X, Y and z: 2 size² + size numbers.
     eliminated: LinkGroups<f32x8>,
 }
 
-/// γ (1) at least: for what hits a chain, and is no weight that it bears.
-static KAPPA: std::sync::LazyLock<[f32; 5]> = std::sync::LazyLock::new(|| { let e = |n: &str, d: f32| std::env::var(n).ok().and_then(|s| s.parse().ok()).unwrap_or(d); [e("KAPPA", 0.0), e("LEAST", 3e-5), e("GROWS", 1.0), e("X0", 1.0), e("DAMP", 1.0)] });
+/// γ (1).
+const GIVE: f32 = 1e-5;
 
-/// Which solve of a substep.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// Which solve of a substep; see `chains`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Before the sweeps, of all chains.
-    First,
-    /// After the sweeps.
+    /// Before the sweeps: all chains.
+    Begin,
+    /// After them: chains that they have moved.
     Again,
-    /// After the relaxing sweeps, without errors.
-    Relaxed,
+    /// After the relaxing sweeps: chains that these have moved, without errors.
+    Relax,
 }
 
 type LaneVector<const N: usize> = [f32x8; N];
@@ -87,15 +88,15 @@ impl ChainSystem {
         (self.groups, self.size) = (groups, size);
         self.rows.begin(5 * size + 4, groups);
         self.impulses.begin(size, groups);
-        self.spans.clear();
-        self.spans.resize(groups, f32x8::ZERO);
         self.velocities.clear();
         self.velocities.resize(groups, [f32x8::ZERO; 3]);
+        for (list, value) in [(&mut self.pulls, 0.0), (&mut self.shares, 1.0), (&mut self.taken, 1.0)] {
+            list.clear();
+            list.resize(groups, f32x8::splat(value));
+        }
         self.chains.clear();
         self.chains.resize(groups * LINK_LANES, 0);
         self.moved.clear();
-        self.taken.clear();
-        self.taken.resize(groups, f32x8::ONE);
         self.eliminated.begin(2 * size * size + size, groups);
     }
 
@@ -104,37 +105,10 @@ impl ChainSystem {
         i % self.groups * LINK_LANES + i / self.groups
     }
 
-    /// Says which chain a slot is of, and how many links that has if it hangs at both ends.
-    pub fn set_chain(&mut self, slot: usize, chain: usize, links: usize) {
-        self.spans[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = links as f32;
+    /// Says which chain a slot is of, counted from 0.
+    pub fn set_chain(&mut self, slot: usize, chain: usize) {
         self.chains[slot] = chain as u32;
         self.moved.resize(self.moved.len().max(chain + 1), false);
-    }
-
-    /// Whether bodies have changed velocity since they were solved; the chains of those are solved next.
-    pub fn find_moved(&mut self, rows: &[BodyRow]) -> bool {
-        self.moved.fill(false);
-        for k in 0..self.groups {
-            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
-            let mut same = f32x8::ZERO.simd_eq(f32x8::ZERO);
-            for (v, before) in velocity.iter().zip(self.velocities[k]) {
-                same &= v.simd_eq(before);
-            }
-            if same.all() {
-                continue;
-            }
-            for lane in (0..LINK_LANES).filter(|lane| (same.to_bitmask() >> lane) & 1 == 0) {
-                self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
-            }
-        }
-        if !self.moved.contains(&true) {
-            return false;
-        }
-        for (taken, chains) in self.taken.iter_mut().zip(self.chains.chunks_exact(LINK_LANES)) {
-            let lane = |i: usize| if self.moved[chains[i] as usize] { 1.0 } else { 0.0 };
-            *taken = f32x8::new(std::array::from_fn(lane));
-        }
-        true
     }
 
     /// Sets the bodies away from where chains hang, slot by slot, as many as there are slots.
@@ -163,95 +137,98 @@ impl ChainSystem {
         &self.impulses
     }
 
-    /// Finds the impulses and gives them to bodies. `fall`: g h² (m).
-    pub fn solve(&mut self, rows: &mut [BodyRow], fall: f32, stage: Stage) {
-        if KAPPA[0] > 0.0 {
-            match self.size {
-                2 => self.stiffen::<2>(),
-                _ => self.stiffen::<3>(),
+    /// Begins a substep of `h` (s): all chains are solved, from no impulses; what their last ones pull straight is slowed.
+    pub fn begin_substep(&mut self, rows: &mut [BodyRow], h: f32) {
+        self.impulses.clear();
+        self.taken.fill(f32x8::ONE);
+        let h = f32x8::splat(h);
+        for k in 0..self.groups {
+            let pull = std::mem::replace(&mut self.pulls[k], f32x8::ZERO);
+            self.shares[k] = f32x8::ONE;
+            if !pull.simd_gt(f32x8::ZERO).any() {
+                continue;
+            }
+            let bodies = self.bodies.list().batch(k);
+            let body = f32x8::gather(rows, bodies);
+            let excess = (h * pull).mul_add(body[INV_INERTIA], -f32x8::ONE);
+            if excess.simd_gt(f32x8::ZERO).any() {
+                self.shares[k] = f32x8::ONE / (f32x8::ONE + excess.max(f32x8::ZERO));
+                f32x8::scatter_velocity(
+                    rows,
+                    bodies,
+                    [body[VX], body[VY], body[W] * self.shares[k], body[INV_MASS]],
+                );
             }
         }
-        if stage == Stage::First {
-            self.impulses.clear();
-            self.taken.fill(f32x8::ONE);
+    }
+
+    /// Finds the chains with a body that has changed its velocity since they were solved, which are solved next; whether there
+    /// are any.
+    pub fn find_moved(&mut self, rows: &[BodyRow]) -> bool {
+        self.moved.fill(false);
+        for k in 0..self.groups {
+            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            let same = velocity.iter().zip(self.velocities[k]).map(|(v, before)| v.simd_eq(before));
+            let same = same.fold(f32x8::ZERO.simd_eq(f32x8::ZERO), |all, one| all & one).to_bitmask();
+            for lane in (0..LINK_LANES).filter(|lane| (same >> lane) & 1 == 0) {
+                self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
+            }
         }
+        for (taken, chains) in self.taken.iter_mut().zip(self.chains.as_chunks::<LINK_LANES>().0) {
+            *taken = f32x8::new(chains.map(|chain| f32::from(u8::from(self.moved[chain as usize]))));
+        }
+        self.moved.contains(&true)
+    }
+
+    /// Finds the impulses that are missing and gives them to bodies.
+    pub fn solve(&mut self, rows: &mut [BodyRow], stage: Stage) {
         match self.size {
-            2 => self.solve_rows::<2>(rows, fall, stage),
-            _ => self.solve_rows::<3>(rows, fall, stage),
+            2 => self.solve_rows::<2>(rows, stage),
+            _ => self.solve_rows::<3>(rows, stage),
         }
     }
 
-    pub fn damp(&mut self, rows: &mut [BodyRow]) {
-        if KAPPA[0] > 0.0 {
-            match self.size {
-                2 => self.find_excess::<2>(rows),
-                _ => self.find_excess::<3>(rows),
-            }
+    /// Divides the inverse inertias of bodies by 1 + e.
+    fn slow<const N: usize>(&mut self) {
+        let (last, [of_left, of_right]) = (self.groups - 1, [5 * N + 2, 5 * N + 3]);
+        for (k, &share) in self.shares.iter().enumerate() {
+            self.rows.group_mut(k)[of_right] *= share;
+            let (next, share) =
+                if k < last { (k + 1, share) } else { (0, up::<1>(share - f32x8::ONE) + f32x8::ONE) };
+            self.rows.group_mut(next)[of_left] *= share;
         }
     }
 
-    fn find_excess<const N: usize>(&mut self, rows: &mut [BodyRow]) {
-        let groups = self.groups;
-        self.excess.resize(groups, f32x8::ZERO);
-        for k in 0..groups {
-            let here = Link::<N>::of(self.rows.group(k));
-            let own = vector::<N>(self.impulses.group(k));
-            let (next, of_next) = if k + 1 == groups {
-                (Link::<N>::of(self.rows.group(0)).shifted(down::<1>), each(vector::<N>(self.impulses.group(0)), down::<1>))
-            } else {
-                (Link::<N>::of(self.rows.group(k + 1)), vector::<N>(self.impulses.group(k + 1)))
-            };
-            let pull = |l: &Link<N>, side: usize, x: &LaneVector<N>| {
-                let cross = l.axis[0][0] * l.axis[1][1] - l.axis[0][1] * l.axis[1][0];
-                cross * (l.arms[side][1] * x[0] - l.arms[side][0] * x[1])
-            };
-            let mut w = pull(&here, 1, &own);
-            w -= next.mass[0].simd_gt(f32x8::ZERO).select(pull(&next, 0, &of_next), f32x8::ZERO);
-            let w = w.max(f32x8::ZERO) * f32x8::splat(KAPPA[0] * self.h);
-            let mut e = [0.0; 8];
-            for lane in 0..8 {
-                let body = self.bodies.list().entries()[k * 8 + lane] as usize;
-                let x = w.to_array()[lane] * rows[body].delta[3] - KAPPA[3];
-                if x > 0.0 {
-                    e[lane] = x;
-                    rows[body].velocity[2] /= 1.0 + KAPPA[4] * x;
+    /// The diagonal block of a link and its right side.
+    #[inline(always)]
+    fn diagonal<const N: usize>(
+        &self,
+        k: usize,
+        link: &Link<N>,
+        stage: Stage,
+    ) -> (LaneMatrix<N>, LaneVector<N>) {
+        let (matrix, mut b) = link.diagonal();
+        if stage == Stage::Again {
+            // γ K_ii λ; the block is (1 + γ) K_ii.
+            let share = f32x8::splat(GIVE / (1.0 + GIVE));
+            for (b, row) in b.iter_mut().zip(&matrix) {
+                for (&k_rc, &impulse) in row.iter().zip(self.impulses.group(k)) {
+                    *b = (share * k_rc).mul_neg_add(impulse, *b);
                 }
             }
-            self.excess[k] = f32x8::new(e);
         }
+        (matrix, each(b, |b| b * self.taken[k]))
     }
 
-    fn stiffen<const N: usize>(&mut self) {
-        let groups = self.groups;
-        let end = |k: usize| 5 * N + 2 + k;
-        if self.excess.len() != groups {
-            return;
+    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], stage: Stage) {
+        if self.shares.iter().any(|share| share.simd_lt(f32x8::ONE).any()) {
+            self.slow::<N>();
         }
-        for k in 0..groups {
-            let e = f32x8::ONE / (f32x8::ONE + self.excess[k]);
-            self.rows.group_mut(k)[end(1)] *= e;
-            if k + 1 == groups {
-                let mut to = up::<1>(e).to_array();
-                to[0] = 1.0;
-                self.rows.group_mut(0)[end(0)] *= f32x8::new(to);
-            } else {
-                self.rows.group_mut(k + 1)[end(0)] *= e;
-            }
-        }
-    }
-
-    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], fall: f32, stage: Stage) {
-        let fall = f32x8::splat(fall * fall);
-        let gives = f32x8::splat(if stage == Stage::Again { 1.0 } else { 0.0 });
-        let diagonal = |system: &Self, link: &Link<N>, k: usize| {
-            let borne = each(vector(system.impulses.group(k)), |x| x * gives);
-            link.diagonal(system.spans[k], fall, borne, system.taken[k])
-        };
         let last = self.groups - 1;
         let first = Link::<N>::of(self.rows.group(0));
         let end = Link::<N>::of(self.rows.group(last));
         let mut here = first;
-        let (mut pivot, mut b) = diagonal(self, &here, 0);
+        let (mut pivot, mut b) = self.diagonal(0, &here, stage);
         let mut e = transposed(end.shifted(up::<1>).coupling(&first));
         let (mut d_before, mut b_before) = ([[f32x8::ZERO; N]; N], [f32x8::ZERO; N]);
         for k in 0..last {
@@ -267,7 +244,7 @@ impl ChainSystem {
             d_before = minus(d_before, &e_transposed, &y);
             b_before = less(b_before, &e_transposed, &z);
             let c = transposed(c);
-            (pivot, b) = diagonal(self, &next, k + 1);
+            (pivot, b) = self.diagonal(k + 1, &next, stage);
             pivot = minus(pivot, &c, &x);
             b = less(b, &c, &z);
             e = minus([[f32x8::ZERO; N]; N], &c, &y);
@@ -298,12 +275,27 @@ impl ChainSystem {
             }
             self.impulses.add(k, &impulse);
             let here = Link::<N>::of(self.rows.group(k));
-            self.velocities[k] = push([&here, &next], [&impulse, &of_next], self.bodies_of(k), rows);
+            self.give(k, [&here, &next], [&impulse, &of_next], rows);
             next = here;
         }
         // Of lanes' last links, the next are the first ones of the lanes after.
         let (next, of_next) = (first.shifted(down::<1>), each(impulse, down::<1>));
-        self.velocities[last] = push([&end, &next], [&of_end, &of_next], self.bodies_of(last), rows);
+        self.give(last, [&end, &next], [&of_end, &of_next], rows);
+    }
+
+    /// Gives impulses of links and of the next ones to the bodies R of a group.
+    #[inline(always)]
+    fn give<const N: usize>(
+        &mut self,
+        k: usize,
+        links: [&Link<N>; 2],
+        given: [&LaneVector<N>; 2],
+        rows: &mut [BodyRow],
+    ) {
+        self.velocities[k] = push(links, given, self.bodies_of(k), rows);
+        let [here, next] = links;
+        let hangs = next.mass[0].simd_gt(f32x8::ZERO);
+        self.pulls[k] += here.pull(1, given[0]) - hangs.select(next.pull(0, given[1]), f32x8::ZERO);
     }
 
     fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
@@ -315,7 +307,7 @@ impl ChainSystem {
     pub fn traffic(&self) -> [f64; 2] {
         let (row, kept) = (5 * self.size + 4, 2 * self.size * self.size + self.size);
         let half = size_of::<BodyRow>() / 2;
-        let (read, written) = (4 * (2 * row + kept + 1) + half, 4 * (row + kept + self.size) + half);
+        let (read, written) = (4 * (2 * row + kept + 2) + half, 4 * (row + kept + self.size + 4) + half);
         [read, written].map(|bytes| (self.slots() * bytes) as f64)
     }
 
@@ -323,12 +315,13 @@ impl ChainSystem {
     pub fn held_bytes(&self) -> usize {
         self.rows.held_bytes()
             + self.impulses.held_bytes()
-            + held(&self.spans)
+            + self.bodies.held_bytes()
             + held(&self.velocities)
+            + held(&self.pulls)
+            + held(&self.shares)
             + held(&self.chains)
             + held(&self.moved)
             + held(&self.taken)
-            + self.bodies.held_bytes()
             + self.eliminated.held_bytes()
     }
 }
@@ -379,24 +372,10 @@ impl<const N: usize> Link<N> {
         self
     }
 
-    /// (1 + γ) K_ii and b, with γ of chains that hang at both ends. `fall`: (g h²)² (m²).
+    /// (1 + γ) K_ii and b.
     #[inline(always)]
-    fn diagonal(
-        &self,
-        span: f32x8,
-        fall: f32x8,
-        borne: LaneVector<N>,
-        taken: f32x8,
-    ) -> (LaneMatrix<N>, LaneVector<N>) {
-        // The length of a link is that of two arms, each of which has s² = |r|² of two rows; g h² at least.
-        let mut square = fall + f32x8::splat(f32::MIN_POSITIVE);
-        for arms in self.arms {
-            square = arms[1].mul_add(arms[1], arms[0].mul_add(arms[0], square));
-        }
-        // (4/3) (2 G)²
-        let grows = f32x8::splat(KAPPA[2] * 8.0 / 3.0) * fall * (span * span) / square;
-        let gives =
-            f32x8::ONE + span.simd_gt(f32x8::ZERO).select(grows + f32x8::splat(KAPPA[1]), f32x8::ZERO);
+    fn diagonal(&self) -> (LaneMatrix<N>, LaneVector<N>) {
+        let gives = f32x8::splat(1.0 + GIVE);
         let ([left, right], mass) = (self.arms, self.mass[0] + self.mass[1]);
         let mut k = [[f32x8::ZERO; N]; N];
         let mut b = self.b;
@@ -407,19 +386,19 @@ impl<const N: usize> Link<N> {
                 k[r][c] = gives * mass.mul_add(along(self.axis[r], self.axis[c]), turning);
                 k[c][r] = k[r][c];
             }
-        }
-        let given = (gives - f32x8::ONE) / gives;
-        for r in 0..N {
-            for c in 0..N {
-                b[r] = (given * k[r][c]).mul_neg_add(borne[c], b[r]);
-            }
-        }
-        for r in 0..N {
             let moves = k[r][r].simd_gt(f32x8::ZERO);
             k[r][r] = moves.select(k[r][r], f32x8::ONE);
-            b[r] = (moves & taken.simd_gt(f32x8::ZERO)).select(b[r], f32x8::ZERO);
+            b[r] = moves.select(b[r], f32x8::ZERO);
         }
         (k, b)
+    }
+
+    /// r·λ of a side, with the arms r = (s_2, −s_1) in the frame of two rows across each other; 0 without these.
+    #[inline(always)]
+    fn pull(&self, side: usize, given: &LaneVector<N>) -> f32x8 {
+        let ([d, e], arms) = ([self.axis[0], self.axis[1]], &self.arms[side]);
+        let across = d[0].mul_add(e[1], -(d[1] * e[0]));
+        across * arms[1].mul_add(given[0], -(arms[0] * given[1]))
     }
 
     /// C, to the next link.
@@ -437,7 +416,7 @@ impl<const N: usize> Link<N> {
     }
 }
 
-/// Gives impulses to the bodies R of links: of these links, and of the next ones that hang from R.
+/// Gives impulses to the bodies R of links: of these links, and of the next ones that hang from R. Returns their velocities.
 #[inline(always)]
 fn push<const N: usize>(
     [here, next]: [&Link<N>; 2],
@@ -464,11 +443,7 @@ fn push<const N: usize>(
         *v += more;
     }
     f32x8::scatter_velocity(rows, bodies, velocity);
-    [velocity[0], velocity[1], velocity[2]]
-}
-
-fn vector<const N: usize>(numbers: &[f32x8]) -> LaneVector<N> {
-    std::array::from_fn(|r| numbers[r])
+    [velocity[VX], velocity[VY], velocity[W]]
 }
 
 /// One step of cyclic reduction, between lanes `D` apart.
@@ -650,7 +625,7 @@ mod tests {
                 }
             }
             system.set_bodies(&bodies);
-            system.solve(&mut rows, 0.0, Stage::First);
+            system.solve(&mut rows, Stage::Begin);
             for i in 0..links {
                 let of_left = if begins(i) { [0.0; 4] } else { rows[i - 1].velocity };
                 let of_masses = if begins(i) { [0.0; 2] } else { mass(i - 1) };
