@@ -41,7 +41,7 @@
 //! swings keep their energy.
 //!
 //! A straight chain between two pins has a row more along it than its bodies have coordinates, so K has no inverse. Joints of all chains
-//! give way, C = −γ K_ii λ h with γ = 10⁻⁵: K_ii is multiplied by 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
+//! give way, C = −γ K_ii λ h with γ = 3·10⁻⁵: K_ii is multiplied by 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
 //!
 //! Chains have two links or more, and no body of theirs has a third rigid joint. All else is left to sweeps: the bodies of ragdolls
 //! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.

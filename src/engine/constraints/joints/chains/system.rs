@@ -63,7 +63,7 @@ pub struct ChainSystem {
 }
 
 /// γ (1).
-const GIVE: f32 = 1e-5;
+const GIVE: f32 = 3e-5;
 
 /// Which solve of a substep; see `chains`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
