@@ -36,6 +36,16 @@ impl SceneJoint {
         SceneJoint::new(a, b, JointKind::Revolute(Revolute { anchor_a, anchor_b, ..Revolute::default() }))
     }
 
+    /// The same at these points of the bodies' frames (m); for hinges and welds.
+    pub fn at(mut self, a: [f64; 2], b: [f64; 2]) -> Self {
+        match &mut self.kind {
+            JointKind::Revolute(Revolute { anchor_a, anchor_b, .. })
+            | JointKind::Weld(Weld { anchor_a, anchor_b, .. }) => (*anchor_a, *anchor_b) = (a, b),
+            _ => {}
+        }
+        self
+    }
+
     fn read(kind: &str, mut object: Map<String, Value>) -> Result<Self, String> {
         fn take<T: DeserializeOwned>(
             object: &mut Map<String, Value>,

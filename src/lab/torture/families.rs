@@ -1,8 +1,9 @@
-//! Eleven kinds of scenes that are hard in as many ways, each drawn from a seed.
+//! Twelve kinds of scenes that are hard in as many ways, each drawn from a seed.
 
-use super::shapes::{body, capsule, driven, log_range, of_density, of_surface, once_in};
+use super::shapes::{body, capsule, chain, driven, log_range, of_density, of_surface, once_in};
 use super::{Room, TortureCase};
-use crate::lab::scenes::{Scene, SceneBody, SceneShape};
+use crate::engine::joints::{JointKind, Motor, Revolute, Weld};
+use crate::lab::scenes::{Scene, SceneBody, SceneJoint, SceneShape};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -22,6 +23,8 @@ struct Draft {
     room: Room,
     /// Besides the walls.
     bodies: Vec<SceneBody>,
+    /// Between these bodies.
+    joints: Vec<SceneJoint>,
     gravity: f64,
     dt: f64,
     /// Simulated (s).
@@ -51,6 +54,7 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "slender", summary: "plates and needles in layers", draw: slender },
     Family { name: "far", summary: "mixed shapes 10 km from the origin", draw: far },
     Family { name: "struck", summary: "walls of bricks hit by something fast", draw: struck },
+    Family { name: "hung", summary: "ropes, bridges and beams with loads dropped on them", draw: hung },
 ];
 
 impl Family {
@@ -60,13 +64,16 @@ impl Family {
         // Neighbors in any of the three begin far apart: odd factors of a Weyl sequence.
         let mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (place << 32 | u64::from(number)).wrapping_mul(0xd1b5_4a32_d192_ed03);
-        let Draft { room, bodies, gravity, dt, seconds, rests, substeps } =
+        let Draft { room, bodies, mut joints, gravity, dt, seconds, rests, substeps } =
             (self.draw)(&mut Pcg64Mcg::seed_from_u64(mixed));
         let name = format!("{}:{number} of seed {seed}", self.name);
         let mut all = room.walls();
+        for joint in &mut joints {
+            (joint.a, joint.b) = (joint.a + all.len(), joint.b + all.len());
+        }
         all.extend(bodies);
         let steps = (seconds / dt).round().max(1.0) as u32;
-        let scene = Scene { gravity: [0.0, -gravity], dt, steps, ..Scene::new(name, all) };
+        let scene = Scene { gravity: [0.0, -gravity], dt, steps, ..Scene::new(name, all).joined(joints) };
         TortureCase { family: self.name, number, scene, room, rests, substeps }
     }
 }
@@ -74,7 +81,8 @@ impl Family {
 impl Draft {
     /// Ordinary gravity and steps, for so many seconds.
     fn new(room: Room, bodies: Vec<SceneBody>, seconds: f64) -> Self {
-        Draft { room, bodies, gravity: 10.0, dt: 1.0 / 60.0, seconds, rests: false, substeps: None }
+        let (joints, dt) = (vec![], 1.0 / 60.0);
+        Draft { room, bodies, joints, gravity: 10.0, dt, seconds, rests: false, substeps: None }
     }
 
     /// Should be at rest at the end.
@@ -291,6 +299,42 @@ fn struck(random: &mut Pcg64Mcg) -> Draft {
     let restitution = if bounces { random.random_range(0.0..0.6) } else { 0.0 };
     let bodies = bodies.into_iter().map(|body| of_surface(body, friction, restitution)).collect();
     Draft::new(room, bodies, 3.0)
+}
+
+fn hung(random: &mut Pcg64Mcg) -> Draft {
+    let is_beam = once_in(random, 3);
+    let links = random.random_range(3..if is_beam { 9 } else { 25 });
+    let half = log_range(random, 0.1, 0.5);
+    let thin = half * random.random_range(0.05..0.4);
+    let (length, both_ends) = (2.0 * half * f64::from(links), !is_beam && once_in(random, 2));
+    let height = length * random.random_range(0.3..1.2) + 1.0;
+    let count = random.random_range(0..7);
+    let top = height + 3.0 + 4.0 * half * f64::from(count);
+    let room = Room::new(0.0, length + 2.0, top, 2.0);
+    let hinge = Revolute {
+        motor: once_in(random, 3).then(|| Motor { speed: 0.0, max: log_range(random, 0.1, 1e3) }),
+        ..Revolute::default()
+    };
+    let kind = if is_beam { JointKind::Weld(Weld::default()) } else { JointKind::Revolute(hinge) };
+    let (mut bodies, mut joints) = chain([-0.5 * length, height], [half, thin], links, &kind);
+    let end = bodies.len();
+    if both_ends {
+        bodies.push(SceneBody::fixed([0.5 * length, height], SceneShape::disc(0.02)));
+        joints.push(SceneJoint::new(end - 1, end, kind).at([half, 0.0], [0.0; 2]));
+    } else if !is_beam && once_in(random, 2) {
+        // A ball at its end.
+        let radius = log_range(random, 0.1, 1.0);
+        let ball = SceneBody::dynamic([0.5 * length + radius, height], SceneShape::disc(radius));
+        bodies.push(of_density(ball, log_range(random, 0.3, 20.0)));
+        joints.push(SceneJoint::new(end - 1, end, kind).at([half, 0.0], [-radius, 0.0]));
+    }
+    for i in 0..count {
+        let size = half * random.random_range(0.5..1.5);
+        let place = [random.random_range(-0.4..0.4) * length, height + 1.0 + 4.0 * half * f64::from(i)];
+        let load = body(random, place, size, true);
+        bodies.push(of_density(load, log_range(random, 0.3, 20.0)));
+    }
+    Draft { joints, ..Draft::new(room, bodies, 9.0) }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::{CaseOutcome, Engine, Fault, Room, TortureCase, TortureVerdict};
 use crate::engine::bodies::BodyKind;
+use crate::engine::joints::JointState;
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
@@ -19,6 +20,9 @@ pub const FLUNG: f64 = 4.0;
 
 /// Overlap, in half the width of the thinner shape, from which on it is sunk.
 pub const SUNK: f64 = 0.5;
+
+/// Gap of a joint, in the mean reach of the bodies, from which on its ends are apart.
+pub const APART: f64 = 0.1;
 
 /// Speed at rest, in √(g ℓ) with ℓ the mean reach of the bodies: 9 mm/s for bodies of 0.3 m.
 pub const RESTLESS: f64 = 0.005;
@@ -156,10 +160,14 @@ impl<'c> Judge<'c> {
         }
         // What a piston presses has nowhere to go.
         let is_driven = self.bodies.iter().any(|b| b.kind == BodyKind::Kinematic);
+        // Brings the mirror up to date.
         let (depth, body) = self.deepest();
         self.outcome.depth = depth;
         if depth > SUNK && !is_driven {
             self.fault(TortureVerdict::Sunk, Some(body));
+        }
+        if let Some(body) = self.apart() {
+            self.fault(TortureVerdict::Apart, Some(body));
         }
         self.outcome.faults.sort_by_key(|f| f.verdict);
         self.outcome
@@ -186,6 +194,14 @@ impl<'c> Judge<'c> {
             }
         });
         deepest
+    }
+
+    /// The second body of a joint whose ends are apart.
+    fn apart(&self) -> Option<usize> {
+        let is_apart = |state: JointState| state.gap > APART * self.reach;
+        let joint =
+            self.mirror.joints().find(|(joint, _)| self.mirror.joint_state(*joint).is_ok_and(is_apart));
+        joint.map(|(_, joint)| joint.b.index())
     }
 
     fn fault(&mut self, verdict: TortureVerdict, body: Option<usize>) {

@@ -3,6 +3,7 @@
 use super::{CaseOutcome, TortureCase, TortureVerdict};
 use crate::engine::bodies::BodyKind;
 use crate::lab::error::Error;
+use crate::lab::scenes::Scene;
 
 /// Runs that a minimization may take.
 const MOST_RUNS: u32 = 150;
@@ -45,8 +46,7 @@ pub fn minimize(
             }
             let gone = &bodies[from..(from + size).min(bodies.len())];
             let mut fewer = best.clone();
-            let mut number = 0..;
-            fewer.scene.bodies.retain(|_| number.next().is_some_and(|i: usize| !gone.contains(&i)));
+            leave_out(&mut fewer.scene, gone);
             if gone.len() < bodies.len() && fails(&fewer)?.is_some() {
                 best = fewer;
             } else {
@@ -56,6 +56,17 @@ pub fn minimize(
         size = if size == 1 { 0 } else { size.div_ceil(2) };
     }
     Ok(best)
+}
+
+/// Leaves out bodies of these numbers, in order, and their joints.
+fn leave_out(scene: &mut Scene, gone: &[usize]) {
+    let mut number = 0..;
+    scene.bodies.retain(|_| number.next().is_some_and(|i: usize| !gone.contains(&i)));
+    scene.joints.retain(|joint| !gone.contains(&joint.a) && !gone.contains(&joint.b));
+    let before = |body: usize| gone.partition_point(|&other| other < body);
+    for joint in &mut scene.joints {
+        (joint.a, joint.b) = (joint.a - before(joint.a), joint.b - before(joint.b));
+    }
 }
 
 /// Bodies that may be left out: walls are the room.
@@ -68,6 +79,21 @@ fn removable(case: &TortureCase) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::lab::torture::{Fault, families::FAMILIES};
+
+    #[test]
+    fn joints_of_bodies_that_stay_stay() {
+        let case = FAMILIES.iter().find(|f| f.name == "hung").unwrap().case(1, 0);
+        let mut scene = case.scene.clone();
+        // Walls, a pin, and links.
+        leave_out(&mut scene, &[6, 8]);
+        let of = |scene: &Scene, i: usize| [scene.joints[i].a, scene.joints[i].b];
+        assert_eq!((of(&scene, 0), of(&case.scene, 0)), ([4, 5], [4, 5]));
+        // Links 6 to 8 had four joints.
+        assert_eq!(scene.joints.len(), case.scene.joints.len() - 4);
+        assert_eq!(of(&scene, 1), [7, 8]);
+        assert_eq!(scene.joints[1].kind, case.scene.joints[5].kind);
+        scene.validate().unwrap();
+    }
 
     #[test]
     fn two_culprits_remain_of_many_bodies() {

@@ -11,6 +11,7 @@
 //! | flung | a body much faster than anything in the scene can explain |
 //! | escaped | a body beyond the middle of the walls that close the scene |
 //! | sunk | at the end, two bodies past the middle of the thinner one |
+//! | apart | at the end, a joint whose ends are apart by a tenth of a body |
 //! | restless | still in motion after seconds without a drive |
 //!
 //! A step that takes longer than the time that it simulates, without waiting for a processor, counts as late. That depends on the machine, so it is
@@ -84,18 +85,21 @@ pub enum TortureVerdict {
     Escaped,
     /// Two bodies are past the middle of the thinner one at the end.
     Sunk,
+    /// The ends of a joint are apart at the end.
+    Apart,
     /// Still in motion at the end.
     Restless,
 }
 
 impl TortureVerdict {
     /// Every verdict.
-    pub const ALL: [TortureVerdict; 6] = [
+    pub const ALL: [TortureVerdict; 7] = [
         TortureVerdict::Diverged,
         TortureVerdict::Energy,
         TortureVerdict::Flung,
         TortureVerdict::Escaped,
         TortureVerdict::Sunk,
+        TortureVerdict::Apart,
         TortureVerdict::Restless,
     ];
 
@@ -107,6 +111,7 @@ impl TortureVerdict {
             TortureVerdict::Flung => "flung",
             TortureVerdict::Escaped => "escaped",
             TortureVerdict::Sunk => "sunk",
+            TortureVerdict::Apart => "apart",
             TortureVerdict::Restless => "restless",
         }
     }

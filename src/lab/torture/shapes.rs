@@ -2,7 +2,8 @@
 
 use super::Room;
 use crate::engine::bodies::BodyKind;
-use crate::lab::scenes::{Capsule, Geometry, SceneBody, SceneShape};
+use crate::engine::joints::JointKind;
+use crate::lab::scenes::{Capsule, Geometry, SceneBody, SceneJoint, SceneShape};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -92,6 +93,24 @@ impl Room {
 pub fn driven(position: [f64; 2], half: [f64; 2], velocity: [f64; 2], spin: f64) -> SceneBody {
     SceneBody::new(BodyKind::Kinematic, position, SceneShape::rectangle(half[0], half[1]))
         .moving(velocity, spin)
+}
+
+/// A static disc, and boxes of half extents `half` that hang from it one after the other, to the right.
+pub fn chain(
+    [x, y]: [f64; 2],
+    half: [f64; 2],
+    links: u32,
+    kind: &JointKind,
+) -> (Vec<SceneBody>, Vec<SceneJoint>) {
+    let (mut bodies, mut joints) = (vec![SceneBody::fixed([x, y], SceneShape::disc(0.02))], vec![]);
+    for i in 0..links {
+        let link = SceneShape::rectangle(half[0], half[1]);
+        let [before, place] = [bodies.len() - 1, bodies.len()];
+        bodies.push(SceneBody::dynamic([x + half[0] * f64::from(2 * i + 1), y], link));
+        let anchor = if i == 0 { 0.0 } else { half[0] };
+        joints.push(SceneJoint::new(before, place, kind.clone()).at([anchor, 0.0], [-half[0], 0.0]));
+    }
+    (bodies, joints)
 }
 
 /// Gives every shape of a body this density (kg/m²).
