@@ -14,8 +14,8 @@
 //!
 //! Sweeps of contacts, motors and limits move the links after that. Chains that they have moved are solved again, before positions
 //! follow; and once more without errors, K λ' = −J v, after the relaxing sweeps. Otherwise the next substep finds as errors what sweeps
-//! did in this one, and removes them at the rate 1/h, against the same contacts and motors. A chain that nothing has moved, to the bit,
-//! is solved once.
+//! did in this one, and removes them at the rate 1/h, against the same contacts and motors. A chain that the first sweeps have not moved,
+//! to the bit, is solved once.
 //!
 //! # Chains
 //!
@@ -151,9 +151,12 @@ impl Chains {
         [h, length_unit]: [f32; 2],
         stage: Stage,
     ) -> bool {
-        if stage == Stage::Begin {
-            self.system.begin_substep(rows, h);
-        } else if !self.system.find_moved(rows) {
+        match stage {
+            Stage::Begin => self.system.begin_substep(rows, h),
+            Stage::Again => self.system.find_moved(rows),
+            Stage::Relax => {}
+        }
+        if stage != Stage::Begin && !self.system.any_moved() {
             return false;
         }
         let by = LinkRule { inv_h: if stage == Stage::Relax { 0.0 } else { 1.0 / h }, length_unit };

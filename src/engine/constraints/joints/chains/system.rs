@@ -30,7 +30,7 @@
 //! inverses of D. A bridge of 160 links takes 1 µs a substep, and 0.8 µs for its rows, 11 ns a link (AVX2).
 //! In `f64`, which gains nothing but the last tenth of a micrometer, its steps take 1.7 times as long.
 
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
+use crate::engine::constraints::kernels::frame::{VX, VY, W};
 use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
 use wide::f32x8;
@@ -48,14 +48,17 @@ pub struct ChainSystem {
     bodies: Indices,
     /// Its velocity when its chain was solved last (m/s, rad/s). `[groups]`
     velocities: Vec<[f32x8; 3]>,
-    /// Σ r·λ of its hinges in this substep (N·m·s). `[groups]`
+    /// I⁻¹ Σ r·λ of its hinges in this substep (1/s). `[groups]`
     pulls: Vec<f32x8>,
-    /// 1/(1 + e) of it. `[groups]`
-    shares: Vec<f32x8>,
+    /// 1 + e of it. `[groups]`
+    slowing: Vec<f32x8>,
+    /// Some is above 1.
+    any_slowed: bool,
     /// Chain of each slot. `[groups × lanes]`
     chains: Vec<u32>,
     /// Whether something has moved a chain since it was solved. `[chains]`
     moved: Vec<bool>,
+    any_moved: bool,
     /// 1 for links that are solved now, 0 for others. `[groups]`
     taken: Vec<f32x8>,
     /// X, Y and z: 2 size² + size numbers.
@@ -72,7 +75,7 @@ pub enum Stage {
     Begin,
     /// After them: chains that they have moved.
     Again,
-    /// After the relaxing sweeps: chains that these have moved, without errors.
+    /// After the relaxing sweeps: the same chains, without errors.
     Relax,
 }
 
@@ -90,7 +93,7 @@ impl ChainSystem {
         self.impulses.begin(size, groups);
         self.velocities.clear();
         self.velocities.resize(groups, [f32x8::ZERO; 3]);
-        for (list, value) in [(&mut self.pulls, 0.0), (&mut self.shares, 1.0), (&mut self.taken, 1.0)] {
+        for (list, value) in [(&mut self.pulls, 0.0), (&mut self.slowing, 1.0), (&mut self.taken, 1.0)] {
             list.clear();
             list.resize(groups, f32x8::splat(value));
         }
@@ -137,47 +140,52 @@ impl ChainSystem {
         &self.impulses
     }
 
-    /// Begins a substep of `h` (s): all chains are solved, from no impulses; what their last ones pull straight is slowed.
+    /// Begins a substep of `h` (s), from no impulses: slows what those of the last one pull straight.
     pub fn begin_substep(&mut self, rows: &mut [BodyRow], h: f32) {
         self.impulses.clear();
-        self.taken.fill(f32x8::ONE);
-        let h = f32x8::splat(h);
+        if std::mem::replace(&mut self.any_moved, false) {
+            self.taken.fill(f32x8::ONE);
+        }
+        self.any_slowed = false;
         for k in 0..self.groups {
-            let pull = std::mem::replace(&mut self.pulls[k], f32x8::ZERO);
-            self.shares[k] = f32x8::ONE;
-            if !pull.simd_gt(f32x8::ZERO).any() {
+            let x = f32x8::splat(h) * std::mem::replace(&mut self.pulls[k], f32x8::ZERO);
+            self.slowing[k] = x.max(f32x8::ONE);
+            if !x.simd_gt(f32x8::ONE).any() {
                 continue;
             }
+            self.any_slowed = true;
             let bodies = self.bodies.list().batch(k);
-            let body = f32x8::gather(rows, bodies);
-            let excess = (h * pull).mul_add(body[INV_INERTIA], -f32x8::ONE);
-            if excess.simd_gt(f32x8::ZERO).any() {
-                self.shares[k] = f32x8::ONE / (f32x8::ONE + excess.max(f32x8::ZERO));
-                f32x8::scatter_velocity(
-                    rows,
-                    bodies,
-                    [body[VX], body[VY], body[W] * self.shares[k], body[INV_MASS]],
-                );
+            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+            velocity[W] /= self.slowing[k];
+            f32x8::scatter_velocity(rows, bodies, velocity);
+        }
+    }
+
+    /// Finds the chains with a body that has changed its velocity since they were solved. These are solved from now on in this substep.
+    pub fn find_moved(&mut self, rows: &[BodyRow]) {
+        self.moved.fill(false);
+        for k in 0..self.groups {
+            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            let [x, y, w] = self.velocities[k];
+            let same = velocity[VX].simd_eq(x) & velocity[VY].simd_eq(y) & velocity[W].simd_eq(w);
+            if same.all() {
+                continue;
+            }
+            self.any_moved = true;
+            for lane in (0..LINK_LANES).filter(|lane| (same.to_bitmask() >> lane) & 1 == 0) {
+                self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
+            }
+        }
+        if self.any_moved {
+            for (taken, chains) in self.taken.iter_mut().zip(self.chains.as_chunks::<LINK_LANES>().0) {
+                *taken = f32x8::new(chains.map(|chain| if self.moved[chain as usize] { 1.0 } else { 0.0 }));
             }
         }
     }
 
-    /// Finds the chains with a body that has changed its velocity since they were solved, which are solved next; whether there
-    /// are any.
-    pub fn find_moved(&mut self, rows: &[BodyRow]) -> bool {
-        self.moved.fill(false);
-        for k in 0..self.groups {
-            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
-            let same = velocity.iter().zip(self.velocities[k]).map(|(v, before)| v.simd_eq(before));
-            let same = same.fold(f32x8::ZERO.simd_eq(f32x8::ZERO), |all, one| all & one).to_bitmask();
-            for lane in (0..LINK_LANES).filter(|lane| (same >> lane) & 1 == 0) {
-                self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
-            }
-        }
-        for (taken, chains) in self.taken.iter_mut().zip(self.chains.as_chunks::<LINK_LANES>().0) {
-            *taken = f32x8::new(chains.map(|chain| f32::from(u8::from(self.moved[chain as usize]))));
-        }
-        self.moved.contains(&true)
+    /// Whether there are such chains.
+    pub fn any_moved(&self) -> bool {
+        self.any_moved
     }
 
     /// Finds the impulses that are missing and gives them to bodies.
@@ -191,11 +199,12 @@ impl ChainSystem {
     /// Divides the inverse inertias of bodies by 1 + e.
     fn slow<const N: usize>(&mut self) {
         let (last, [of_left, of_right]) = (self.groups - 1, [5 * N + 2, 5 * N + 3]);
-        for (k, &share) in self.shares.iter().enumerate() {
-            self.rows.group_mut(k)[of_right] *= share;
-            let (next, share) =
-                if k < last { (k + 1, share) } else { (0, up::<1>(share - f32x8::ONE) + f32x8::ONE) };
-            self.rows.group_mut(next)[of_left] *= share;
+        for (k, &slowing) in self.slowing.iter().enumerate() {
+            self.rows.group_mut(k)[of_right] /= slowing;
+            // 1 where no lane is before.
+            let of_first = || f32x8::ONE + up::<1>(slowing - f32x8::ONE);
+            let (next, slowing) = if k < last { (k + 1, slowing) } else { (0, of_first()) };
+            self.rows.group_mut(next)[of_left] /= slowing;
         }
     }
 
@@ -221,7 +230,7 @@ impl ChainSystem {
     }
 
     fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], stage: Stage) {
-        if self.shares.iter().any(|share| share.simd_lt(f32x8::ONE).any()) {
+        if self.any_slowed {
             self.slow::<N>();
         }
         let last = self.groups - 1;
@@ -294,8 +303,10 @@ impl ChainSystem {
     ) {
         self.velocities[k] = push(links, given, self.bodies_of(k), rows);
         let [here, next] = links;
+        // No mass: a fixed body, or another chain's.
         let hangs = next.mass[0].simd_gt(f32x8::ZERO);
-        self.pulls[k] += here.pull(1, given[0]) - hangs.select(next.pull(0, given[1]), f32x8::ZERO);
+        let pull = here.pull(1, given[0]) - hangs.select(next.pull(0, given[1]), f32x8::ZERO);
+        self.pulls[k] += pull * here.inertia[1] * self.slowing[k];
     }
 
     fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
@@ -318,7 +329,7 @@ impl ChainSystem {
             + self.bodies.held_bytes()
             + held(&self.velocities)
             + held(&self.pulls)
-            + held(&self.shares)
+            + held(&self.slowing)
             + held(&self.chains)
             + held(&self.moved)
             + held(&self.taken)
