@@ -25,11 +25,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Run random scenes and count failures that no solver may have
 ///
-/// Eleven families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
+/// Twelve families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
 /// stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from the origin,
-/// walls that are hit. Every scene runs under every solver, on all cores; only poses are checked, in double
+/// walls that are hit, ropes and beams with loads. Every scene runs under every solver, on all cores; only poses are checked, in double
 /// precision. A scene fails if it diverges, gains energy, flings a body, lets one escape from its walls, ends with
-/// bodies inside each other or does not come to rest when it should. The same seed gives the same scenes.
+/// bodies inside each other or joints apart, or does not come to rest when it should. The same seed gives the same scenes.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

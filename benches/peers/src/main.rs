@@ -70,6 +70,9 @@ struct Args {
     /// The campaign of `simpulse torture` instead: so many random scenes under Box2D and rapier
     #[arg(long, value_name = "N")]
     torture: Option<u32>,
+    /// Its families [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", requires = "torture")]
+    families: Vec<String>,
     /// No race: draws the peers.csv of the folder again
     #[arg(long)]
     draw: bool,
@@ -87,7 +90,7 @@ fn main() {
 
 fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
-        return torture::run(args.seed.unwrap_or(1), scenes);
+        return torture::run(args.seed.unwrap_or(1), &args.families, scenes);
     }
     let path = args.out.join("peers.csv");
     let failed = |e: csv::Error| format!("{}: {e}", path.display());
