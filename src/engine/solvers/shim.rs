@@ -34,7 +34,7 @@ mod rest;
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::{Chains, Stage};
+use crate::engine::constraints::joints::chains::{ChainStage, Chains};
 use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::constraints::step::{Collision, CollisionScene};
@@ -280,18 +280,18 @@ impl Solver for Shim {
             } else {
                 passes.integrate_and_warm_start();
             }
-            passes.solve_chains(&mut self.chains, Stage::Begin);
+            passes.solve_chains(&mut self.chains, ChainStage::Begin);
             for _ in 0..budget.velocity_iterations {
                 passes.block_sweep_normal_first(Phase::Solve, soft);
                 passes.iteration_done();
             }
-            passes.solve_chains(&mut self.chains, Stage::Again);
+            passes.solve_chains(&mut self.chains, ChainStage::Again);
             self.jams.bound(passes);
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, relaxed);
             }
-            passes.solve_chains(&mut self.chains, Stage::Relax);
+            passes.solve_chains(&mut self.chains, ChainStage::Relax);
             passes.keep_chains(&self.chains, substep + 1 == budget.substeps);
             self.jams.bound(passes);
             passes.end_substep(substep);

@@ -2,7 +2,7 @@
 
 use super::{Passes, ROW, Workspace};
 use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::{Chains, Stage};
+use crate::engine::constraints::joints::chains::{ChainStage, Chains};
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
@@ -59,8 +59,8 @@ impl Passes<'_> {
     }
 
     /// Pass over joints alone: solves the rigid rows of chains of joints at once.
-    pub fn solve_chains(&mut self, chains: &mut Chains, stage: Stage) {
-        let phase = if stage == Stage::Relax { Phase::Relax } else { Phase::Solve };
+    pub fn solve_chains(&mut self, chains: &mut Chains, stage: ChainStage) {
+        let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
         if self.has_chains(chains) && self.input.phases.runs(phase) {
             let Workspace { rows, types, .. } = &mut *self.work;
             let solved = chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);

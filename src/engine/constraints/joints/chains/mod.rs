@@ -54,8 +54,8 @@ use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
+pub use system::ChainStage;
 use system::ChainSystem;
-pub use system::Stage;
 
 /// No body.
 const NONE: u32 = u32::MAX;
@@ -149,17 +149,17 @@ impl Chains {
         types: &mut [Joined],
         rows: &mut [BodyRow],
         [h, length_unit]: [f32; 2],
-        stage: Stage,
+        stage: ChainStage,
     ) -> bool {
         match stage {
-            Stage::Begin => self.system.begin_substep(rows, h),
-            Stage::Again => self.system.find_moved(rows),
-            Stage::Relax => {}
+            ChainStage::Begin => self.system.begin_substep(rows, h),
+            ChainStage::Again => self.system.find_moved(rows),
+            ChainStage::Relax => {}
         }
-        if stage != Stage::Begin && !self.system.any_moved() {
+        if stage != ChainStage::Begin && !self.system.any_moved() {
             return false;
         }
-        let by = LinkRule { inv_h: if stage == Stage::Relax { 0.0 } else { 1.0 / h }, length_unit };
+        let by = LinkRule { inv_h: if stage == ChainStage::Relax { 0.0 } else { 1.0 / h }, length_unit };
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.link_rows(rows, by, self.system.rows());

@@ -70,7 +70,7 @@ const GIVE: f32 = 3e-5;
 
 /// Which solve of a substep; see `chains`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum ChainStage {
     /// Before the sweeps: all chains.
     Begin,
     /// After them: chains that they have moved.
@@ -189,7 +189,7 @@ impl ChainSystem {
     }
 
     /// Finds the impulses that are missing and gives them to bodies.
-    pub fn solve(&mut self, rows: &mut [BodyRow], stage: Stage) {
+    pub fn solve(&mut self, rows: &mut [BodyRow], stage: ChainStage) {
         match self.size {
             2 => self.solve_rows::<2>(rows, stage),
             _ => self.solve_rows::<3>(rows, stage),
@@ -214,10 +214,10 @@ impl ChainSystem {
         &self,
         k: usize,
         link: &Link<N>,
-        stage: Stage,
+        stage: ChainStage,
     ) -> (LaneMatrix<N>, LaneVector<N>) {
         let (matrix, mut b) = link.diagonal();
-        if stage == Stage::Again {
+        if stage == ChainStage::Again {
             // γ K_ii λ; the block is (1 + γ) K_ii.
             let share = f32x8::splat(GIVE / (1.0 + GIVE));
             for (b, row) in b.iter_mut().zip(&matrix) {
@@ -229,7 +229,7 @@ impl ChainSystem {
         (matrix, each(b, |b| b * self.taken[k]))
     }
 
-    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], stage: Stage) {
+    fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], stage: ChainStage) {
         if self.any_slowed {
             self.slow::<N>();
         }
@@ -636,7 +636,7 @@ mod tests {
                 }
             }
             system.set_bodies(&bodies);
-            system.solve(&mut rows, Stage::Begin);
+            system.solve(&mut rows, ChainStage::Begin);
             for i in 0..links {
                 let of_left = if begins(i) { [0.0; 4] } else { rows[i - 1].velocity };
                 let of_masses = if begins(i) { [0.0; 2] } else { mass(i - 1) };
