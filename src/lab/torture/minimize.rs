@@ -78,20 +78,18 @@ fn removable(case: &TortureCase) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::joints::{JointKind, Weld};
+    use crate::lab::torture::shapes::chain;
     use crate::lab::torture::{Fault, families::FAMILIES};
 
     #[test]
     fn joints_of_bodies_that_stay_stay() {
-        let case = FAMILIES.iter().find(|f| f.name == "hung").unwrap().case(1, 0);
-        let mut scene = case.scene.clone();
-        // Walls, a pin, and links.
-        leave_out(&mut scene, &[6, 8]);
-        let of = |scene: &Scene, i: usize| [scene.joints[i].a, scene.joints[i].b];
-        assert_eq!((of(&scene, 0), of(&case.scene, 0)), ([4, 5], [4, 5]));
-        // Links 6 to 8 had four joints.
-        assert_eq!(scene.joints.len(), case.scene.joints.len() - 4);
-        assert_eq!(of(&scene, 1), [7, 8]);
-        assert_eq!(scene.joints[1].kind, case.scene.joints[5].kind);
+        let (bodies, joints) = chain([0.0; 2], [0.5, 0.1], 6, &JointKind::Weld(Weld::default()));
+        let mut scene = Scene::new("x", bodies).joined(joints);
+        leave_out(&mut scene, &[2, 4]);
+        // Links 5 and 6 of before.
+        let ends: Vec<_> = scene.joints.iter().map(|joint| [joint.a, joint.b]).collect();
+        assert_eq!((scene.bodies.len(), ends), (5, vec![[0, 1], [3, 4]]));
         scene.validate().unwrap();
     }
 
