@@ -25,6 +25,7 @@ mod table;
 mod torture;
 
 use clap::Parser;
+use simpulse::lab::torture::families::Family;
 use std::path::PathBuf;
 
 /// What is raced, for how many steps, and whether nothing in it may fall.
@@ -71,8 +72,8 @@ struct Args {
     #[arg(long, value_name = "N")]
     torture: Option<u32>,
     /// Its families [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", requires = "torture")]
-    families: Vec<String>,
+    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", requires = "torture", value_parser = simpulse::lab::torture::family)]
+    families: Vec<&'static Family>,
     /// No race: draws the peers.csv of the folder again
     #[arg(long)]
     draw: bool,
@@ -90,7 +91,7 @@ fn main() {
 
 fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
-        return torture::run(args.seed.unwrap_or(1), &args.families, scenes);
+        return torture::run(args.seed.unwrap_or(1), args.families.clone(), scenes);
     }
     let path = args.out.join("peers.csv");
     let failed = |e: csv::Error| format!("{}: {e}", path.display());

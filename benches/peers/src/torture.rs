@@ -2,7 +2,7 @@
 
 use crate::engine::{Contender, Engine, Maker};
 use crate::race::build;
-use simpulse::lab::torture::families::FAMILIES;
+use simpulse::lab::torture::families::{FAMILIES, Family};
 use simpulse::lab::torture::{self, Campaign, CaseOutcome, TortureCase, TortureRow, table};
 
 /// Another engine, as the judge sees it.
@@ -37,16 +37,13 @@ fn one(case: &TortureCase, contender: &Contender) -> Result<CaseOutcome, String>
     torture::run(case, &mut engine).map_err(|e| e.to_string())
 }
 
-/// Prints the table by family. One thread: Box2D makes its worlds in a list without a lock. Errors: unknown families; none that an
-/// engine makes, what it refuses is counted.
-pub fn run(seed: u64, families: &[String], scenes: u32) -> Result<(), String> {
+/// Prints the table by family. One thread: Box2D makes its worlds in a list without a lock. Errors: none that an engine
+/// makes; what it refuses is counted.
+pub fn run(seed: u64, mut families: Vec<&'static Family>, scenes: u32) -> Result<(), String> {
     let (engines, mut rows, mut refused) = (engines(), Vec::new(), 0);
-    let families = if families.is_empty() {
-        FAMILIES.iter().collect()
-    } else {
-        let named: Result<_, _> = families.iter().map(|name| torture::family(name)).collect();
-        named.map_err(|e| e.to_string())?
-    };
+    if families.is_empty() {
+        families = FAMILIES.iter().collect();
+    }
     for (family, number) in (Campaign { seed, families, scenes }).list() {
         let case = family.case(seed, number);
         for (name, contender) in &engines {

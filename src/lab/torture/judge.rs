@@ -160,7 +160,7 @@ impl<'c> Judge<'c> {
         }
         // What a piston presses has nowhere to go.
         let is_driven = self.bodies.iter().any(|b| b.kind == BodyKind::Kinematic);
-        // Brings the mirror up to date.
+        self.reflect();
         let (depth, body) = self.deepest();
         self.outcome.depth = depth;
         if depth > SUNK && !is_driven {
@@ -173,8 +173,8 @@ impl<'c> Judge<'c> {
         self.outcome
     }
 
-    /// The deepest overlap, in half the width of the thinner shape, and the second body of it.
-    fn deepest(&mut self) -> (f64, usize) {
+    /// Puts the bodies of the mirror where those of the engine are.
+    fn reflect(&mut self) {
         let bodies = &mut self.mirror.bodies;
         for (i, body) in self.bodies.iter().enumerate() {
             let high = body.position.as_vec2();
@@ -183,6 +183,10 @@ impl<'c> Judge<'c> {
             [bodies.position_x_lo[i], bodies.position_y_lo[i]] = low.to_array();
             [bodies.rotation_cos[i], bodies.rotation_sin[i]] = body.rotation.as_vec2().to_array();
         }
+    }
+
+    /// The deepest overlap of the mirror, in half the width of the thinner shape, and the second body of it.
+    fn deepest(&self) -> (f64, usize) {
         let (mut deepest, world) = ((0.0, 0), &self.mirror);
         Overlaps::default().find(world, |pair, manifold| {
             let thin = |s: u32| f64::from(world.shapes[s as usize].min_half_extent());
@@ -196,7 +200,7 @@ impl<'c> Judge<'c> {
         deepest
     }
 
-    /// The second body of a joint whose ends are apart.
+    /// The second body of a joint of the mirror whose ends are apart.
     fn apart(&self) -> Option<usize> {
         let is_apart = |state: JointState| state.gap > APART * self.reach;
         let joint =

@@ -15,7 +15,8 @@ use crate::engine::params::RESTITUTION_THRESHOLD;
 pub(crate) struct Spreading<'a> {
     /// Bodies are where they were hit, else where they are.
     pub timed: bool,
-    /// What does not bounce stops, but for contacts of these bodies (`[bodies]`, or empty); none: nothing stops.
+    /// What does not bounce stops, but for contacts of these bodies, which also stay where they are (`[bodies]`, or empty);
+    /// none: nothing stops.
     pub stops: Option<&'a [bool]>,
     /// Points that an impact releases have borne their body until then.
     pub releases: bool,
