@@ -296,7 +296,6 @@ impl Solver for Shim {
             self.jams.bound(passes);
             passes.end_substep(substep);
         }
-        passes.unlink_chains();
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 

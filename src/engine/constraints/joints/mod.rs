@@ -204,9 +204,11 @@ impl<T: JointType> Joints<T> {
         }
     }
 
+    /// Writes back what records keep; not the impulses of links, which they give themselves.
     fn store<L: Lanes>(&mut self, on: TypeInput<'_>) {
         let (numbers, kept) = (self.first_kept(), T::kept(self.form));
         let stride = self.stride();
+        let of_links = if self.linked.is_active() { self.rigid } else { None };
         for i in 0..on.batches.visits().len() {
             let segment = on.batches.visits()[i];
             let parts = on.batches.records_with_stride::<L>(&segment, stride);
@@ -215,9 +217,12 @@ impl<T: JointType> Joints<T> {
                 let floats: &[f32] = bytemuck::cast_slice(&record[numbers..]);
                 let filled = segment.filled(batch, L::WIDTH);
                 for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
-                    let values = &mut self.kept[joint as usize * kept..][..kept];
-                    for (value, from) in values.iter_mut().zip(floats.chunks_exact(L::WIDTH)) {
-                        *value = from[lane];
+                    let [place, rows] = of_links.filter(|_| self.linked.has(joint)).unwrap_or_default();
+                    let values = self.kept[joint as usize * kept..][..kept].iter_mut().enumerate();
+                    for ((i, value), from) in values.zip(floats.chunks_exact(L::WIDTH)) {
+                        if !(place..place + rows).contains(&i) {
+                            *value = from[lane];
+                        }
                     }
                 }
             }

@@ -250,14 +250,16 @@ impl<'a> Passes<'a> {
             self.over_batches(Phase::Store, &mut Store);
             self.clock.lap(Phase::Store);
         }
+        let Workspace { types, poses, .. } = &mut *self.work;
+        types.iter_mut().for_each(|joined| joined.kind.link(&[], poses));
         self.count
     }
 
     /// Colored batches at the width of the step, then serial ones at one lane; in reverse order the
     /// other way round. Constraints of other types take part.
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
-        let is_idle = |joined: &Joined| is_sweep(phase) && joined.kind.is_idle();
-        if self.work.types.iter().all(is_idle) {
+        let passes_by = is_sweep(phase) || phase == Phase::Store;
+        if self.work.types.is_empty() || passes_by && self.types_are_idle() {
             return self.over_contacts(pass);
         }
         for part in self.parts_in_order() {
@@ -275,6 +277,11 @@ impl<'a> Passes<'a> {
             }
             self.all(part).for_each(|batches| batches.arrange(order));
         }
+    }
+
+    /// Whether all rows of other types are those of links.
+    fn types_are_idle(&self) -> bool {
+        self.work.types.iter().all(|joined| joined.kind.is_idle())
     }
 
     /// As [`Self::over_batches`], over contacts alone.

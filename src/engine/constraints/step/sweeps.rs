@@ -50,7 +50,7 @@ impl Passes<'_> {
         }
     }
 
-    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until [`Self::unlink_chains`].
+    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until the step ends.
     pub fn find_chains(&mut self, chains: &mut Chains) {
         if !self.work.types.is_empty() {
             chains.find(&self.work.types, &self.work.rows);
@@ -61,7 +61,9 @@ impl Passes<'_> {
     /// Pass over joints alone: solves the rigid rows of chains of joints at once.
     pub fn solve_chains(&mut self, chains: &mut Chains, stage: ChainStage) {
         let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
-        if self.has_chains(chains) && self.input.phases.runs(phase) {
+        // Nothing has moved them since.
+        let is_done = stage != ChainStage::Begin && self.contacts.is_empty() && self.types_are_idle();
+        if self.has_chains(chains) && self.input.phases.runs(phase) && !is_done {
             let Workspace { rows, types, .. } = &mut *self.work;
             let solved = chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);
             if solved && self.input.phases.counted {
@@ -78,20 +80,16 @@ impl Passes<'_> {
             && self.input.phases.runs(Phase::Relax)
         {
             chains.give_impulses(&mut self.work.types);
-            // Types of the caller's own take it for what it is to them, storing.
-            self.over_types_alone(Phase::Store, PassMode::TakeUp);
+            if self.input.record_impulses {
+                // Types of the caller's own take it for what it is to them, storing.
+                self.over_types_alone(Phase::Store, PassMode::TakeUp);
+            }
             self.clock.lap(Phase::Relax);
         }
     }
 
     fn has_chains(&self, chains: &Chains) -> bool {
         !chains.is_empty() && !self.work.types.is_empty()
-    }
-
-    /// Sweeps solve all joints again.
-    pub fn unlink_chains(&mut self) {
-        let Workspace { types, poses, .. } = &mut *self.work;
-        types.iter_mut().for_each(|joined| joined.kind.link(&[], poses));
     }
 
     /// Pass over joints alone: their records take up what [`ConstraintType::replace`] has changed.

@@ -207,10 +207,10 @@ impl<T: JointType> Joints<T> {
         let Linked { groups, joints, ways, .. } = &self.linked;
         let kept = T::kept(self.form);
         for ((&group, way), joints) in groups.iter().zip(ways).zip(batches(joints)) {
-            for (lane, &joint) in links_of(joints.array(), way) {
-                let values = &mut self.kept[joint as usize * kept + place..][..rows];
-                for (to, impulse) in values.iter_mut().zip(impulses.group(group as usize)) {
-                    *to = way.as_array()[lane] * impulse.as_array()[lane];
+            for (row, &impulse) in impulses.group(group as usize)[..rows].iter().enumerate() {
+                let given = (*way * impulse).to_array();
+                for (lane, &joint) in links_of(joints.array(), way) {
+                    self.kept[joint as usize * kept + place + row] = given[lane];
                 }
             }
         }
