@@ -274,8 +274,9 @@ impl Solver for Shim {
             self.chains = Chains::default();
         }
         for substep in 0..budget.substeps {
-            if substep == 0 {
+            if substep == 0 || self.chains.lends() {
                 passes.integrate_velocities();
+                passes.note_chains(&mut self.chains);
                 passes.warm_start();
             } else {
                 passes.integrate_and_warm_start();
@@ -296,6 +297,7 @@ impl Solver for Shim {
             self.jams.bound(passes);
             passes.end_substep(substep);
         }
+        passes.leave_chains(&mut self.chains);
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 

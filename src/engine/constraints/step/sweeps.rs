@@ -50,11 +50,33 @@ impl Passes<'_> {
         }
     }
 
-    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until the step ends.
+    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until the step ends, and the masses that
+    /// contacts of their bodies have until [`Self::leave_chains`].
     pub fn find_chains(&mut self, chains: &mut Chains) {
-        if !self.work.types.is_empty() {
-            chains.find(&self.work.types, &self.work.rows);
-            chains.set_aside(&mut self.work.types, &self.work.poses);
+        if self.work.types.is_empty() {
+            return;
+        }
+        let Workspace { rows, types, poses, .. } = &mut *self.work;
+        chains.find(types, rows);
+        chains.set_aside(types, poses);
+        if !chains.is_empty() && !self.contacts.is_empty() && self.input.phases.runs(Phase::Prepare) {
+            let pairs = self.contacts.iter().map(|contact| [contact.body_a, contact.body_b]);
+            let shared = chains.share_masses(types, rows, self.input.length_unit, pairs);
+            if let Some((masses, shares)) = shared {
+                self.scale_masses(Phase::Prepare, masses, |body| shares[body]);
+            }
+        }
+    }
+
+    /// Body pass: bodies of chains have their own masses again.
+    pub fn leave_chains(&mut self, chains: &mut Chains) {
+        chains.restore_masses(&mut self.work.rows);
+    }
+
+    /// Body pass: notes velocities of chains. For before warm starts, which change them by the masses of contacts.
+    pub fn note_chains(&mut self, chains: &mut Chains) {
+        if self.input.phases.runs(Phase::WarmStart) {
+            chains.note(&self.work.rows);
         }
     }
 

@@ -16,6 +16,8 @@
 //! that are both deeper than the slop start a step without impulses. Within the step their normals stay fixed, so
 //! impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep, and keep theirs.
 //!
+//! Bodies that welds hold to what does not move count as that: a rod between two planks of a beam has one body on both sides.
+//!
 //! # Squeezes
 //!
 //! The same holds where a kinematic body leaves others no room. A body is in a squeeze if it touches a kinematic body, or
@@ -59,19 +61,27 @@ pub(super) struct Jams {
     squeezed: Vec<f32>,
     /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s).
     jammed: Vec<(u32, f32)>,
+    /// What welds hold each body to, if that does not move, else a body of its tree; empty without welds. `[bodies]`
+    holders: Vec<u32>,
 }
 
 impl Jams {
     /// Zeroes the impulses of contacts that push against each other, and finds bodies in a jam. `push_speed`: m/s.
     pub fn release(&mut self, scene: &mut CollisionScene<'_>, push_speed: f32) {
         let slop = Margins::of(scene.length_unit).slop;
+        self.find_holders(scene);
         let (contacts, bodies) = (&mut *scene.contacts, scene.bodies);
         self.deep.clear();
         self.pressed.clear();
         self.jammed.clear();
         for (i, contact) in contacts.iter().enumerate() {
             if contact.manifold.points().iter().any(|point| point.separation < -slop) {
-                self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
+                let holder = |body: u32| match self.holders.get(body as usize) {
+                    Some(&holder) if !bodies.is_dynamic(holder as usize) => holder,
+                    _ => body,
+                };
+                let [a, b] = [contact.body_a, contact.body_b].map(holder);
+                self.deep.push(([a.min(b), a.max(b)], i as u32, a < b));
             }
             for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
                 if bodies.kind[by as usize] == BodyKind::Kinematic {
@@ -109,6 +119,30 @@ impl Jams {
         if !self.jammed.is_empty() {
             let is_jammed = |body| self.jammed.binary_search_by_key(&body, |j| j.0).is_ok();
             contacts.iter_mut().filter(|c| is_jammed(c.body_a) || is_jammed(c.body_b)).for_each(forget);
+        }
+    }
+
+    /// Finds what holds each body: the root of the tree that welds make, where that does not move.
+    fn find_holders(&mut self, scene: &CollisionScene<'_>) {
+        let (holders, bodies) = (&mut self.holders, scene.bodies);
+        holders.clear();
+        for joined in scene.types.iter().filter(|joined| joined.kind.rigid_size() == 3) {
+            if holders.is_empty() {
+                holders.extend(0..bodies.len() as u32);
+            }
+            for pair in joined.kind.ends() {
+                let [a, b] = pair.map(|body| root_of(holders, body));
+                let [root, other] = if bodies.is_dynamic(a as usize) { [b, a] } else { [a, b] };
+                if bodies.is_dynamic(other as usize) {
+                    holders[other as usize] = root;
+                }
+            }
+        }
+        for body in 0..holders.len() as u32 {
+            let root = root_of(holders, body);
+            if !bodies.is_dynamic(root as usize) {
+                holders[body as usize] = root;
+            }
         }
     }
 
@@ -170,8 +204,22 @@ impl Jams {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        held(&self.deep) + held(&self.pressed) + held(&self.squeezed) + held(&self.jammed)
+        held(&self.deep)
+            + held(&self.pressed)
+            + held(&self.squeezed)
+            + held(&self.jammed)
+            + held(&self.holders)
     }
+}
+
+/// Root of the tree that a body is in, whose branches get shorter.
+fn root_of(holders: &mut [u32], mut body: u32) -> u32 {
+    while holders[body as usize] != body {
+        let above = holders[body as usize];
+        holders[body as usize] = holders[above as usize];
+        body = above;
+    }
+    body
 }
 
 /// √(v² + ρ²ω²), with ρ² as `gyration` (m²); that of a body that cannot turn is infinite and its spin zero.

@@ -51,6 +51,7 @@ mod system;
 
 use crate::engine::constraints::joints::ANCHORS;
 use crate::engine::constraints::kernels::types::Joined;
+use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::engine::constraints::records::links::{ChainLink, LinkRule};
 use crate::engine::lanes::{BodyRow, held};
 use crate::engine::narrowphase::lanes::PoseRow;
@@ -71,6 +72,11 @@ pub struct Chains {
     links: Vec<Vec<ChainLink>>,
     system: ChainSystem,
     search: ChainSearch,
+    /// Whether contacts, or rows that are not rigid, push a body. `[rows]`
+    loaded: Vec<bool>,
+    /// Share of its inverse mass that a body has for these. `[rows]`
+    shares: Vec<f32>,
+    masses: ScaledMasses,
 }
 
 /// Room to find chains.
@@ -136,9 +142,56 @@ impl Chains {
     }
 
     /// Says to types which joints are links, which sweeps leave alone.
-    pub fn set_aside(&self, types: &mut [Joined], poses: &[PoseRow]) {
+    pub fn set_aside(&mut self, types: &mut [Joined], poses: &[PoseRow]) {
+        self.system.forget_shares();
         for (joined, links) in types.iter_mut().zip(&self.links) {
             joined.kind.link(links, poses);
+        }
+    }
+
+    /// Finds the apparent masses that bodies have for contacts of these pairs, of bodies of about `length_unit` (m); none if all are whole.
+    pub fn share_masses(
+        &mut self,
+        types: &mut [Joined],
+        rows: &[BodyRow],
+        length_unit: f32,
+        pairs: impl Iterator<Item = [u32; 2]>,
+    ) -> Option<(&mut ScaledMasses, &[f32])> {
+        self.loaded.clear();
+        self.loaded.resize(rows.len(), false);
+        let others =
+            types.iter().filter(|joined| !joined.kind.is_idle()).flat_map(|joined| joined.kind.ends());
+        pairs.chain(others.copied()).flatten().for_each(|body| self.loaded[body as usize] = true);
+        self.write_rows(types, rows, LinkRule { inv_h: 0.0, length_unit });
+        self.system.find_shares(&self.loaded, &mut self.shares);
+        self.lends().then_some((&mut self.masses, &self.shares))
+    }
+
+    /// Whether some have apparent masses for contacts.
+    pub fn lends(&self) -> bool {
+        self.system.lends()
+    }
+
+    /// Notes velocities before warm starts, where there are such masses.
+    pub fn note(&mut self, rows: &[BodyRow]) {
+        if self.lends() {
+            self.system.note(rows);
+        }
+    }
+
+    /// Gives bodies their masses again.
+    pub fn restore_masses(&mut self, rows: &mut [BodyRow]) {
+        if self.lends() {
+            self.masses.scale(rows, |_| 1.0);
+            self.masses.forget();
+        }
+    }
+
+    fn write_rows(&mut self, types: &mut [Joined], rows: &[BodyRow], by: LinkRule) {
+        for (joined, links) in types.iter_mut().zip(&self.links) {
+            if !links.is_empty() {
+                joined.kind.link_rows(rows, by, self.system.rows());
+            }
         }
     }
 
@@ -151,20 +204,20 @@ impl Chains {
         [h, length_unit]: [f32; 2],
         stage: ChainStage,
     ) -> bool {
-        match stage {
-            ChainStage::Begin => self.system.begin_substep(rows, h),
-            ChainStage::Again => self.system.find_moved(rows),
-            ChainStage::Relax => {}
-        }
-        if stage != ChainStage::Begin && !self.system.any_moved() {
-            return false;
-        }
-        let by = LinkRule { inv_h: if stage == ChainStage::Relax { 0.0 } else { 1.0 / h }, length_unit };
-        for (joined, links) in types.iter_mut().zip(&self.links) {
-            if !links.is_empty() {
-                joined.kind.link_rows(rows, by, self.system.rows());
+        if stage != ChainStage::Begin {
+            self.system.find_moved(rows);
+            if !self.system.any_moved() {
+                return false;
             }
         }
+        if self.lends() {
+            self.system.push_masses(rows);
+        }
+        if stage == ChainStage::Begin {
+            self.system.begin_substep(rows, h);
+        }
+        let inv_h = if stage == ChainStage::Relax { 0.0 } else { 1.0 / h };
+        self.write_rows(types, rows, LinkRule { inv_h, length_unit });
         self.system.solve(rows, stage);
         true
     }
@@ -198,6 +251,9 @@ impl Chains {
             + held(places)
             + held(ends)
             + held(found)
+            + held(&self.loaded)
+            + held(&self.shares)
+            + self.masses.held_bytes()
     }
 }
 
