@@ -1,0 +1,216 @@
+//! Apparent masses: what contacts feel of a body that a beam holds.
+//!
+//! A push p on bodies of a chain changes their velocities by M⁻¹ p, and the next solve takes back what joints do not allow. A p is left. Contacts
+//! that expect M⁻¹ p find a plank of a stiff beam too light: each sweep stops a small part of a heavy box, the impulse goes on growing
+//! until the box has turned around, and then throws it. So they are solved with masses W⁻¹ in the place of M.
+//!
+//! # Answers
+//!
+//! A body of inverse mass W (3 × 3) answers pushes by W. Hung by a joint of rows J to what answers by S through its rows J_S, it answers by
+//!
+//! ```text
+//! W' = W − W Jᵀ (J W Jᵀ + J_S S J_Sᵀ)⁻¹ J W
+//! ```
+//!
+//! So one pass along a chain and one back give A_ii of all bodies (`featherstone1983`, with inverse inertias).
+//!
+//! # Shares
+//!
+//! Contacts take the share W_i = α_i M_i⁻¹. For n bodies of a chain that are loaded, and a push p = a + b on those with α = 1 and with α < 1,
+//!
+//! ```text
+//! pᵀ A p ≤ 2 aᵀ A a + 2 bᵀ A b,     aᵀ A a ≤ aᵀ M⁻¹ a,     bᵀ A b ≤ n Σ b_iᵀ A_ii b_i,     α_i = min(1, n ‖M_i^½ A_ii M_i^½‖)
+//! ```
+//!
+//! so A ≤ 2 W, which is what sweeps over W need to converge if A follows after each (2 W − A positive definite).
+//!
+//! A is that of the start of the step. Beams do not bend; a chain of hinges that is straight then, and stiff, may be slack a substep later, and
+//! what is too heavy by α diverges. So chains with two hinges or more keep α = 1.
+
+use super::{ChainSystem, GIVE, W, up};
+use crate::engine::constraints::kernels::frame::{VX, VY};
+use crate::engine::constraints::records::links::LINK_LANES;
+use crate::engine::lanes::{BodyRow, Lanes, held};
+use glam::{DMat3, DVec3};
+use std::ops::Range;
+use wide::f32x8;
+
+/// Least α. What contacts change in velocities is divided by it, and so are rounding errors.
+const LEAST: f64 = 1.0 / 64.0;
+
+/// The shares of all chains, and room to find them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Apparent {
+    /// α of bodies R. `[groups]`
+    shares: Vec<f32x8>,
+    /// Some is below 1.
+    pub(super) lends: bool,
+    /// Joints of one chain.
+    joints: Vec<LinkJoint>,
+    /// Answers of its bodies R, with all that hangs beyond them.
+    beyond: Vec<DMat3>,
+}
+
+/// The rows between two bodies.
+#[derive(Clone, Copy, Debug)]
+struct LinkJoint {
+    /// Jᵀ of L and R, with a column of zeros where there is no row.
+    rows: [DMat3; 2],
+    /// M⁻¹ of L and R.
+    masses: [DMat3; 2],
+    /// What is added to J W Jᵀ: γ J M⁻¹ Jᵀ, and 1 where there is no row.
+    gives: DMat3,
+}
+
+impl LinkJoint {
+    fn is_hinge(&self) -> bool {
+        self.rows[1].z_axis == DVec3::ZERO
+    }
+
+    /// The answer `own` of the body on `side`, hung to what answers by `other`.
+    fn hung(&self, side: usize, own: DMat3, other: DMat3) -> DMat3 {
+        let [near, far] = [self.rows[side], self.rows[1 - side]];
+        let k = near.transpose() * own * near + far.transpose() * other * far + self.gives;
+        let moved = own * near;
+        own - moved * k.inverse() * moved.transpose()
+    }
+}
+
+impl Apparent {
+    pub(super) fn begin(&mut self, groups: usize) {
+        self.shares.clear();
+        self.shares.resize(groups, f32x8::ONE);
+        self.lends = false;
+    }
+
+    pub(super) fn held_bytes(&self) -> usize {
+        held(&self.shares) + held(&self.joints) + held(&self.beyond)
+    }
+}
+
+impl ChainSystem {
+    /// Finds the shares of bodies, given which of them are `loaded`, from the rows as they are. Those of others are 1.
+    pub fn find_shares(&mut self, loaded: &[bool], shares: &mut Vec<f32>) {
+        self.apparent.begin(self.groups);
+        // Beams have three rows a joint.
+        let mut from = if self.size < 3 { self.links } else { 0 };
+        while from < self.links {
+            let chain = self.chains[self.slot(from)];
+            let to = (from..self.links).find(|&i| self.chains[self.slot(i)] != chain).unwrap_or(self.links);
+            let count = (from..to).filter(|&i| loaded[self.body(i)]).count();
+            if count > 0 {
+                self.find_shares_of(from..to, count as f64, loaded);
+            }
+            from = to;
+        }
+        shares.clear();
+        shares.resize(loaded.len(), 1.0);
+        if self.apparent.lends {
+            for (slot, &body) in self.bodies.iter().enumerate() {
+                let share = self.apparent.shares[slot / LINK_LANES].as_array()[slot % LINK_LANES];
+                shares[body as usize] = share;
+            }
+        }
+    }
+
+    /// Forgets all shares.
+    pub fn forget_shares(&mut self) {
+        self.apparent.lends = false;
+    }
+
+    /// Whether a body has less than all of its inverse mass for contacts.
+    pub fn lends(&self) -> bool {
+        self.apparent.lends
+    }
+
+    fn find_shares_of(&mut self, links: Range<usize>, count: f64, loaded: &[bool]) {
+        let Apparent { joints, beyond, .. } = &mut self.apparent;
+        let (mut joints, mut beyond) = (std::mem::take(joints), std::mem::take(beyond));
+        joints.clear();
+        joints.extend(links.clone().map(|i| self.joint(i)));
+        if joints.iter().filter(|joint| joint.is_hinge()).count() < 2 {
+            beyond.clear();
+            beyond.extend(joints.iter().map(|joint| joint.masses[1]));
+            for k in (1..joints.len()).rev() {
+                beyond[k - 1] = joints[k].hung(0, joints[k].masses[0], beyond[k]);
+            }
+            let mut before = DMat3::ZERO;
+            for ((i, joint), &beyond) in links.zip(&joints).zip(&beyond) {
+                let mass = joint.masses[1];
+                if loaded[self.body(i)] {
+                    let root = mass.diagonal().map(|w| if w > 0.0 { 1.0 / w.sqrt() } else { 0.0 });
+                    let root = DMat3::from_diagonal(root);
+                    let answer = root * joint.hung(1, beyond, before) * root;
+                    let norm = answer.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+                    self.set_share(i, (count * norm).clamp(LEAST, 1.0) as f32);
+                }
+                before = joint.hung(1, mass, before);
+            }
+        }
+        (self.apparent.joints, self.apparent.beyond) = (joints, beyond);
+    }
+
+    fn set_share(&mut self, link: usize, share: f32) {
+        let slot = self.slot(link);
+        self.apparent.shares[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = share;
+        self.apparent.lends |= share < 1.0;
+    }
+
+    /// Body R of a link.
+    fn body(&self, link: usize) -> usize {
+        self.bodies[self.slot(link)] as usize
+    }
+
+    fn joint(&self, link: usize) -> LinkJoint {
+        let (slot, size) = (self.slot(link), self.size);
+        let numbers = self.rows.group(slot / LINK_LANES);
+        let at = |k: usize| f64::from(numbers[k].as_array()[slot % LINK_LANES]);
+        let row = |side: usize, r: usize| {
+            let way = DVec3::new(at(5 * r), at(5 * r + 1), at(5 * r + 2 + side));
+            if side == 0 { -way } else { way }
+        };
+        let rows = [0, 1].map(|side| DMat3::from_cols(row(side, 0), row(side, 1), row(side, 2)));
+        let masses = [0, 1].map(|side| {
+            let mass = at(5 * size + side);
+            DMat3::from_diagonal(DVec3::new(mass, mass, at(5 * size + 2 + side)))
+        });
+        let k = rows[0].transpose() * masses[0] * rows[0] + rows[1].transpose() * masses[1] * rows[1];
+        let missing = k.diagonal().map(|k| if k > 0.0 { 0.0 } else { 1.0 });
+        LinkJoint { rows, masses, gives: f64::from(GIVE) * k + DMat3::from_diagonal(missing) }
+    }
+
+    /// Notes velocities before warm starts.
+    pub fn note(&mut self, rows: &[BodyRow]) {
+        for k in 0..self.groups {
+            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            self.velocities[k] = [velocity[VX], velocity[VY], velocity[W]];
+        }
+    }
+
+    /// Makes what contacts have changed in velocities M⁻¹ p instead of W p.
+    pub fn push_masses(&self, rows: &mut [BodyRow]) {
+        for (k, &share) in self.apparent.shares.iter().enumerate() {
+            if !share.simd_lt(f32x8::ONE).any() {
+                continue;
+            }
+            let bodies = self.bodies.list().batch(k);
+            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+            for (v, &before) in velocity[..3].iter_mut().zip(&self.velocities[k]) {
+                *v += (*v - before) * (f32x8::ONE / share - f32x8::ONE);
+            }
+            f32x8::scatter_velocity(rows, bodies, velocity);
+        }
+    }
+
+    /// Makes inverse masses in the rows those of whole bodies.
+    pub(super) fn take_whole_masses(&mut self) {
+        for k in 0..self.groups {
+            let right = self.apparent.shares[k];
+            // 1 where no lane is before.
+            let of_first = || f32x8::ONE + up::<1>(self.apparent.shares[self.groups - 1] - f32x8::ONE);
+            let left = if k == 0 { of_first() } else { self.apparent.shares[k - 1] };
+            let masses = &mut self.rows.group_mut(k)[5 * self.size..];
+            masses.iter_mut().zip([left, right, left, right]).for_each(|(mass, share)| *mass /= share);
+        }
+    }
+}
