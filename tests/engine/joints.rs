@@ -449,6 +449,67 @@ fn a_bridge_with_friction_in_its_hinges_catches_boxes() {
     assert!(speed < 0.05, "{speed} m/s");
 }
 
+/// A beam of welded planks, from `ground` at the origin to the right.
+fn beam(world: &mut World, ground: BodyHandle, planks: usize, [length, height]: [f32; 2]) {
+    let mut before = ground;
+    for i in 0..planks {
+        let plank = ShapeDef::rectangle(0.5 * length, 0.5 * height).unwrap();
+        let [from, middle] = [0.0, 0.5].map(|part| (i as f64 + part) * f64::from(length));
+        let body = world.add_body(&BodyDef::dynamic([middle, 0.0]).with(plank)).unwrap();
+        world.add_joint(&Joint::weld(before, body).anchor([from, 0.0])).unwrap();
+        before = body;
+    }
+}
+
+/// Most mechanical energy that comes in one of so many steps, as a share of what `loads`, which come last, have above the origin.
+fn most_energy_made(world: &mut World, loads: usize, steps: usize) -> f64 {
+    let energy = |world: &World, bodies: std::ops::Range<usize>| {
+        let of = |i: usize| {
+            let (v, w) = (world.bodies.velocity(i), world.bodies.angular_velocity[i]);
+            let [mass, inertia] = [1.0 / world.bodies.inv_mass[i], 1.0 / world.bodies.inv_inertia[i]];
+            let moving = 0.5 * (mass * v.length_squared() + inertia * w * w);
+            f64::from(moving) + 10.0 * f64::from(mass) * world.bodies.center(i)[1]
+        };
+        bodies.map(of).sum::<f64>()
+    };
+    let all = world.bodies.len();
+    let had = energy(world, all - loads..all);
+    let (mut before, mut most) = (energy(world, 1..all), 0.0_f64);
+    for _ in 0..steps {
+        world.step().unwrap();
+        let now = energy(world, 1..all);
+        most = most.max(now - before);
+        before = now;
+    }
+    most / had
+}
+
+/// A box of 48 times the mass of a plank. With the masses of planks for contacts it gets half of its energy from nowhere.
+#[test]
+fn a_beam_bears_a_heavy_box_that_falls_on_it() {
+    let (mut world, ground) = empty(find("shim").unwrap());
+    beam(&mut world, ground, 10, [1.0, 1.0 / 3.0]);
+    let heavy = ShapeDef::rectangle(0.5, 0.5).unwrap().with_density(16.0);
+    let heavy = BodyDef { angle: 0.8096, ..BodyDef::dynamic([3.8508, 4.6]).with(heavy) };
+    world.add_body(&heavy).unwrap();
+    let made = most_energy_made(&mut world, 1, 120);
+    assert!(made < 1e-3, "{made} of the energy of the box");
+}
+
+/// A light rod is driven between two planks. Were these two bodies to it, it would end up with thousands of rad/s.
+#[test]
+fn a_beam_is_one_body_to_what_is_caught_in_it() {
+    let (mut world, ground) = empty(find("shim").unwrap());
+    beam(&mut world, ground, 5, [0.9621, 0.2505]);
+    let rod = ShapeDef::capsule([-0.4175, 0.0], [0.4175, 0.0], 0.0816).unwrap().with_density(0.3267);
+    let ball = ShapeDef::circle(0.3933).unwrap().with_density(2.3655);
+    let rod = BodyDef { angle: 1.6932, ..BodyDef::dynamic([4.4011, 1.0]).with(rod) };
+    world.add_body(&rod).unwrap();
+    world.add_body(&BodyDef::dynamic([4.221, 4.8483]).with(ball)).unwrap();
+    let made = most_energy_made(&mut world, 2, 120);
+    assert!(made < 0.1, "{made} of the energy of rod and ball");
+}
+
 /// Under a ball of 378 links. Without implicit tension two substeps leave 1.9 m.
 #[test]
 fn a_heavy_chain_hangs_together_with_two_substeps() {
