@@ -277,7 +277,7 @@ impl ChainSearch {
             if (a == NONE) != (b == NONE) {
                 let from = self.found.len();
                 let last = self.follow(joint, if a == NONE { b } else { a }, chains);
-                if last.is_some_and(|last| self.found.len() > from + 1 && last >= joint) {
+                if last.is_some_and(|last| last >= joint) {
                     chains += 1;
                 } else {
                     self.found.truncate(from);
