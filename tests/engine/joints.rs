@@ -496,6 +496,28 @@ fn a_beam_bears_a_heavy_box_that_falls_on_it() {
     assert!(made < 1e-3, "{made} of the energy of the box");
 }
 
+/// Contacts of a beam have masses of their own, those of a pile 500 m away do not.
+#[test]
+fn a_loaded_beam_far_away_changes_no_bit() {
+    let run = |loaded: bool| {
+        let (mut world, ground) = empty(find("shim").unwrap());
+        beam(&mut world, ground, 6, [1.0, 0.25]);
+        let floor = ShapeDef::rectangle(10.0, 1.0).unwrap();
+        world.add_body(&BodyDef::fixed([500.0, -1.0]).with(floor)).unwrap();
+        let first = world.bodies.len();
+        for i in 0..10 {
+            let at = [500.0 + 0.1 * f64::from(i % 3), 0.5 + 1.1 * f64::from(i)];
+            world.add_body(&BodyDef::dynamic(at).with(ShapeDef::rectangle(0.5, 0.5).unwrap())).unwrap();
+        }
+        let x = if loaded { 3.0 } else { 30.0 };
+        let ball = ShapeDef::circle(0.5).unwrap().with_density(5.0);
+        world.add_body(&BodyDef::dynamic([x, 1.0]).with(ball)).unwrap();
+        (0..120).for_each(|_| world.step().unwrap());
+        (first..first + 10).map(|i| (world.bodies.center(i), world.bodies.angle(i))).collect::<Vec<_>>()
+    };
+    assert_eq!(run(false), run(true));
+}
+
 /// A light rod is driven between two planks. Were these two bodies to it, it would end up with thousands of rad/s.
 #[test]
 fn a_beam_is_one_body_to_what_is_caught_in_it() {

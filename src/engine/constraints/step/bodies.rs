@@ -79,7 +79,7 @@ impl Passes<'_> {
         }
         masses.scale(&mut self.work.rows, factor);
         self.book_rows([32.0, 32.0]);
-        self.over_batches(phase, &mut EffectiveMasses);
+        self.over_batches(phase, &mut EffectiveMasses { factors: &[] });
         self.clock.lap(phase);
     }
 

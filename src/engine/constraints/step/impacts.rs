@@ -3,7 +3,7 @@
 use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::spread::{self, Find, SpreadInput};
+use crate::engine::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
 use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::engine::constraints::kernels::pass::PassMode;
 use crate::engine::constraints::records::batches::Part;
@@ -20,12 +20,14 @@ pub(crate) struct Spreading<'a> {
     pub stops: Option<&'a [bool]>,
     /// Points that an impact releases have borne their body until then.
     pub releases: bool,
+    /// Most visits for each of the first points of an island; [`VISITS`] where time does not matter.
+    pub visits: usize,
 }
 
 impl Passes<'_> {
     /// Lets what comes in bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
-        let Spreading { timed, stops, releases } = spreading;
+        let Spreading { timed, stops, releases, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -54,6 +56,7 @@ impl Passes<'_> {
             timed,
             joined: stops.unwrap_or_default(),
             releases,
+            visits,
             record_impulses: self.input.record_impulses,
             bounces,
         });
@@ -77,7 +80,7 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(Spreading { timed: false, stops: None, releases: true });
+                self.spread_impacts(Spreading { timed: false, stops: None, releases: true, visits: VISITS });
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
 use crate::engine::constraints::kernels::position::PositionSweep;
 use crate::engine::constraints::kernels::velocity::block::BlockSweep;
 use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::engine::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
 use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
 use crate::engine::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
 use crate::engine::constraints::kernels::velocity::warm_start::WarmStart;
@@ -62,9 +62,11 @@ impl Passes<'_> {
         if !chains.is_empty() && !self.contacts.is_empty() && self.input.phases.runs(Phase::Prepare) {
             let pairs = self.contacts.iter().map(|contact| [contact.body_a, contact.body_b]);
             let shared = chains.share_masses(types, rows, self.input.length_unit, pairs);
-            if let Some((masses, shares)) = shared {
-                self.scale_masses(Phase::Prepare, masses, |body| shares[body]);
+            if let Some((masses, factors)) = shared {
+                masses.scale(rows, |body| factors[body]);
+                self.over_batches(Phase::Prepare, &mut EffectiveMasses { factors });
             }
+            self.clock.lap(Phase::Prepare);
         }
     }
 

@@ -72,9 +72,11 @@ const BOUNCES: f32 = 0.1;
 /// Greatest number of waves of an island, and how many of the last ones only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: so many for each of its first points, and how many points are first. Each of
-/// the others adds one.
-const VISITS: [usize; 2] = [18, 8];
+/// Greatest number of visits of an island: so many for each of its first points. Each of the others adds one.
+pub(crate) const VISITS: usize = 18;
+
+/// How many points are first.
+const FIRST: usize = 8;
 
 /// How much deeper a point of an island that reached its bound may end, as a share of the slop (1): bodies that touch
 /// end in each other by what is left of their approach.
@@ -333,8 +335,8 @@ impl Spread {
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
-            let (points, [each, first]) = (self.points.len() - self.first, VISITS);
-            is_done = self.visits <= each * points.min(first) + points.saturating_sub(first);
+            let points = self.points.len() - self.first;
+            is_done = self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
         }
         is_done
     }

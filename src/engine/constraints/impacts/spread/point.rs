@@ -110,6 +110,8 @@ pub(crate) struct SpreadInput<'a> {
     pub joined: &'a [bool],
     /// Points that an impact releases have borne their body until then.
     pub releases: bool,
+    /// Most visits for each of the first points of an island.
+    pub visits: usize,
     pub record_impulses: bool,
     /// Contacts may bounce.
     pub bounces: bool,

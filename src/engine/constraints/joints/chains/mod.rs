@@ -1,4 +1,4 @@
-//! Chains of joints that hang from what does not move, solved at once: ropes, bridges, pendulums.
+//! Chains of joints that hang from what does not move, solved at once: pendulums, ropes, bridges, beams.
 //!
 //! # Problem
 //!
@@ -15,7 +15,7 @@
 //! Sweeps of contacts, motors and limits move the links after that. Chains that they have moved are solved again, before positions
 //! follow; and once more without errors, K λ' = −J v, after the relaxing sweeps. Otherwise the next substep finds as errors what sweeps
 //! did in this one, and removes them at the rate 1/h, against the same contacts and motors. A chain that the first sweeps have not moved,
-//! to the bit, is solved once.
+//! to the bit, is solved once. Contacts of beams do not feel the mass of one plank but what the beam lends to it, see `system/apparent.rs`.
 //!
 //! # Chains
 //!
@@ -43,7 +43,7 @@
 //! A straight chain between two pins has a row more along it than its bodies have coordinates, so K has no inverse. Joints of all chains
 //! give way, C = −γ K_ii λ h with γ = 3·10⁻⁵: K_ii is multiplied by 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
 //!
-//! Chains have two links or more, and no body of theirs has a third rigid joint. All else is left to sweeps: the bodies of ragdolls
+//! No body of a chain has a third rigid joint; one joint to what does not move is a chain. All else is left to sweeps: the bodies of ragdolls
 //! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.
 
 pub(super) mod records;

@@ -12,7 +12,7 @@ use crate::engine::constraints::records::batches::{Batches, Segment};
 use crate::engine::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes, held};
+use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, held};
 
 /// Inverse masses and inertias of bodies while they are scaled.
 #[derive(Clone, Debug, Default)]
@@ -50,10 +50,30 @@ impl ScaledMasses {
     }
 }
 
-/// Recomputes the effective masses of all records from the rows.
-pub(crate) struct EffectiveMasses;
+/// Recomputes effective masses in the records from the rows.
+pub(crate) struct EffectiveMasses<'a> {
+    /// Factors of bodies: records of pairs that have 1 both keep what they have to the bit. Empty: all are recomputed. `[bodies]`
+    pub factors: &'a [f32],
+}
 
-impl Pass for EffectiveMasses {
+impl EffectiveMasses<'_> {
+    /// 1 in lanes that are recomputed.
+    #[inline(always)]
+    fn changed<L: Lanes>(&self, [a, b]: [LaneIndex<L::Index>; 2]) -> L {
+        if self.factors.is_empty() {
+            return L::splat(1.0);
+        }
+        let mut changed = L::zero();
+        let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut changed));
+        for (lane, (&a, &b)) in lanes.iter_mut().zip(a.entries().iter().zip(b.entries())) {
+            let is_whole = self.factors[a as usize] == 1.0 && self.factors[b as usize] == 1.0;
+            *lane = if is_whole { 0.0 } else { 1.0 };
+        }
+        changed
+    }
+}
+
+impl Pass for EffectiveMasses<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let masses = layout.points * if layout.has_friction { 2 } else { 1 };
         let read = layout.points * layout.arms() + masses;
@@ -66,7 +86,7 @@ impl Pass for EffectiveMasses {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        over_segments!(segment, L, F; on.rows, on.batches);
+        over_segments!(segment, L, F; on.rows, on.batches, self);
     }
 }
 
@@ -75,9 +95,14 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
+    masses: &EffectiveMasses<'_>,
 ) {
     let layout = const { Layout::of::<N, O>() };
     for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+        let changed: L = masses.changed([row_a, row_b]);
+        if !changed.any_positive() {
+            return;
+        }
         let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         for p in 0..N::POINTS {
@@ -95,7 +120,8 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 }
                 // A point that is not there has no mass, and keeps none.
                 let at = layout.at(p, at);
-                record[at] = record[at].select_positive(L::splat(1.0) / k, L::zero());
+                let mass = record[at].select_positive(L::splat(1.0) / k, L::zero());
+                record[at] = changed.select_positive(mass, record[at]);
             }
         }
     });
