@@ -142,8 +142,7 @@ impl Chains {
     }
 
     /// Says to types which joints are links, which sweeps leave alone.
-    pub fn set_aside(&mut self, types: &mut [Joined], poses: &[PoseRow]) {
-        self.system.forget_shares();
+    pub fn set_aside(&self, types: &mut [Joined], poses: &[PoseRow]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             joined.kind.link(links, poses);
         }
@@ -157,6 +156,9 @@ impl Chains {
         length_unit: f32,
         pairs: impl Iterator<Item = [u32; 2]>,
     ) -> Option<(&mut ScaledMasses, &[f32])> {
+        if !self.system.may_have_beams() {
+            return None;
+        }
         self.loaded.clear();
         self.loaded.resize(rows.len(), false);
         let others =
@@ -184,6 +186,7 @@ impl Chains {
         if self.lends() {
             self.masses.scale(rows, |_| 1.0);
             self.masses.forget();
+            self.system.forget_shares();
         }
     }
 

@@ -93,8 +93,7 @@ impl ChainSystem {
     /// Finds the shares of bodies, given which of them are `loaded`, from the rows as they are. Those of others are 1.
     pub fn find_shares(&mut self, loaded: &[bool], shares: &mut Vec<f32>) {
         self.apparent.begin(self.groups);
-        // Beams have three rows a joint.
-        let mut from = if self.size < 3 { self.links } else { 0 };
+        let mut from = 0;
         while from < self.links {
             let chain = self.chains[self.slot(from)];
             let to = (from..self.links).find(|&i| self.chains[self.slot(i)] != chain).unwrap_or(self.links);
@@ -112,6 +111,11 @@ impl ChainSystem {
                 shares[body as usize] = share;
             }
         }
+    }
+
+    /// Whether some joint has three rows, as those of beams do.
+    pub fn may_have_beams(&self) -> bool {
+        self.size == 3
     }
 
     /// Forgets all shares.
@@ -144,7 +148,9 @@ impl ChainSystem {
                     let root = DMat3::from_diagonal(root);
                     let answer = root * joint.hung(1, beyond, before) * root;
                     let norm = answer.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-                    self.set_share(i, (count * norm).clamp(LEAST, 1.0) as f32);
+                    // What cannot be told is whole.
+                    let share = (count * norm).min(1.0);
+                    self.set_share(i, share.max(LEAST) as f32);
                 }
                 before = joint.hung(1, mass, before);
             }
