@@ -518,6 +518,23 @@ fn a_loaded_beam_far_away_changes_no_bit() {
     assert_eq!(run(false), run(true));
 }
 
+/// Two planks of a frame overlap the wall that it is welded to, from both sides: one body, and no jam of two.
+#[test]
+fn a_frame_that_overlaps_its_own_wall_is_left_alone() {
+    let (mut world, _) = empty(find("shim").unwrap());
+    let square = || ShapeDef::rectangle(0.5, 0.5).unwrap();
+    let wall = world.add_body(&BodyDef::fixed([0.0, 0.0]).with(square())).unwrap();
+    for side in [-1.0, 1.0] {
+        let [far, near] = [[5.0 * side, 0.0], [0.9 * side, 0.0]]
+            .map(|at| world.add_body(&BodyDef::dynamic(at).with(square())).unwrap());
+        world.add_joint(&Joint::weld(wall, far).anchor([5.0 * side, 0.0])).unwrap();
+        world.add_joint(&Joint::weld(far, near).anchor([0.9 * side, 0.0])).unwrap();
+    }
+    (0..60).for_each(|_| world.step().unwrap());
+    let speed = (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max);
+    assert!(speed < 0.1, "{speed} m/s");
+}
+
 /// A light rod is driven between two planks. Were these two bodies to it, it would end up with thousands of rad/s.
 #[test]
 fn a_beam_is_one_body_to_what_is_caught_in_it() {

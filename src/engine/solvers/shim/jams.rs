@@ -42,8 +42,10 @@
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
+use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::step::CollisionScene;
 use crate::engine::contacts::{Contact, ManifoldPoint};
+use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 use crate::engine::narrowphase::Margins;
 
@@ -61,7 +63,9 @@ pub(super) struct Jams {
     squeezed: Vec<f32>,
     /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s).
     jammed: Vec<(u32, f32)>,
-    /// What welds hold each body to, if that does not move, else a body of its tree; empty without welds. `[bodies]`
+    /// Bodies that welds hold together.
+    welded: DisjointSets,
+    /// Of such a set, at its least body: one that does not move, if there is one. `[bodies]`
     holders: Vec<u32>,
 }
 
@@ -69,25 +73,22 @@ impl Jams {
     /// Zeroes the impulses of contacts that push against each other, and finds bodies in a jam. `push_speed`: m/s.
     pub fn release(&mut self, scene: &mut CollisionScene<'_>, push_speed: f32) {
         let slop = Margins::of(scene.length_unit).slop;
-        self.find_holders(scene);
-        let (contacts, bodies) = (&mut *scene.contacts, scene.bodies);
+        let (contacts, bodies, types) = (&mut *scene.contacts, scene.bodies, scene.types);
         self.deep.clear();
         self.pressed.clear();
         self.jammed.clear();
         for (i, contact) in contacts.iter().enumerate() {
             if contact.manifold.points().iter().any(|point| point.separation < -slop) {
-                let holder = |body: u32| match self.holders.get(body as usize) {
-                    Some(&holder) if !bodies.is_dynamic(holder as usize) => holder,
-                    _ => body,
-                };
-                let [a, b] = [contact.body_a, contact.body_b].map(holder);
-                self.deep.push(([a.min(b), a.max(b)], i as u32, a < b));
+                self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
             }
             for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
                 if bodies.kind[by as usize] == BodyKind::Kinematic {
                     self.pressed.push((of, surface_speed(bodies, contact, by)));
                 }
             }
+        }
+        if !self.deep.is_empty() {
+            self.hold(types, bodies);
         }
         self.squeeze(&bodies.kind);
         self.deep.sort_unstable();
@@ -122,26 +123,29 @@ impl Jams {
         }
     }
 
-    /// Finds what holds each body: the root of the tree that welds make, where that does not move.
-    fn find_holders(&mut self, scene: &CollisionScene<'_>) {
-        let (holders, bodies) = (&mut self.holders, scene.bodies);
-        holders.clear();
-        for joined in scene.types.iter().filter(|joined| joined.kind.rigid_size() == 3) {
-            if holders.is_empty() {
-                holders.extend(0..bodies.len() as u32);
-            }
-            for pair in joined.kind.ends() {
-                let [a, b] = pair.map(|body| root_of(holders, body));
-                let [root, other] = if bodies.is_dynamic(a as usize) { [b, a] } else { [a, b] };
-                if bodies.is_dynamic(other as usize) {
-                    holders[other as usize] = root;
-                }
-            }
+    /// Bodies of deep contacts that welds hold to what does not move count as that, but not among themselves.
+    fn hold(&mut self, types: &[Joined], bodies: &Bodies) {
+        let welds =
+            || types.iter().filter(|joined| joined.kind.rigid_size() == 3).flat_map(|j| j.kind.ends());
+        if welds().next().is_none() {
+            return;
         }
-        for body in 0..holders.len() as u32 {
-            let root = root_of(holders, body);
-            if !bodies.is_dynamic(root as usize) {
-                holders[body as usize] = root;
+        let Jams { deep, welded, holders, .. } = self;
+        welded.begin(bodies.len());
+        welds().for_each(|&[a, b]| welded.join(a, b));
+        holders.clear();
+        holders.extend(0..bodies.len() as u32);
+        for &body in welds().flatten().filter(|&&body| !bodies.is_dynamic(body as usize)) {
+            holders[welded.least(body) as usize] = body;
+        }
+        for (pair, _, is_own) in deep {
+            let [a, b] = pair.map(|body| {
+                let holder = holders[welded.least(body) as usize];
+                let is_held = bodies.is_dynamic(body as usize) && !bodies.is_dynamic(holder as usize);
+                if is_held { holder } else { body }
+            });
+            if a != b {
+                (*pair, *is_own) = ([a.min(b), a.max(b)], a < b);
             }
         }
     }
@@ -208,18 +212,9 @@ impl Jams {
             + held(&self.pressed)
             + held(&self.squeezed)
             + held(&self.jammed)
+            + self.welded.bytes()
             + held(&self.holders)
     }
-}
-
-/// Root of the tree that a body is in, whose branches get shorter.
-fn root_of(holders: &mut [u32], mut body: u32) -> u32 {
-    while holders[body as usize] != body {
-        let above = holders[body as usize];
-        holders[body as usize] = holders[above as usize];
-        body = above;
-    }
-    body
 }
 
 /// √(v² + ρ²ω²), with ρ² as `gyration` (m²); that of a body that cannot turn is infinite and its spin zero.
