@@ -260,7 +260,10 @@ impl<'a> Passes<'a> {
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
         let passes_by = is_sweep(phase) || phase == Phase::Store;
         if self.work.types.is_empty() || passes_by && self.types_are_idle() {
-            return self.over_contacts(pass);
+            if !passes_by || !self.contacts.is_empty() {
+                self.over_contacts(pass);
+            }
+            return;
         }
         for part in self.parts_in_order() {
             let order = self.order;

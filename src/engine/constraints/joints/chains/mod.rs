@@ -58,6 +58,9 @@ use crate::engine::narrowphase::lanes::PoseRow;
 pub use system::ChainStage;
 use system::ChainSystem;
 
+/// Share of its error of the second order that a link alone foresees (1).
+const FORESEEN: f32 = 0.5;
+
 /// No body.
 const NONE: u32 = u32::MAX;
 
@@ -130,7 +133,9 @@ impl Chains {
             if right != NONE {
                 bodies[slot] = right;
             }
-            links[t as usize].push(ChainLink { joint: number, slot: slot as u32, forward });
+            let is_other = |i: usize| search.found.get(i).is_none_or(|&(.., other)| other != chain);
+            let alone = is_other(i.wrapping_sub(1)) && is_other(i + 1);
+            links[t as usize].push(ChainLink { joint: number, slot: slot as u32, forward, alone });
         }
         system.set_bodies(&bodies);
         links.iter_mut().for_each(|links| links.sort_unstable_by_key(|link| link.slot));
@@ -164,7 +169,7 @@ impl Chains {
         let others =
             types.iter().filter(|joined| !joined.kind.is_idle()).flat_map(|joined| joined.kind.ends());
         pairs.chain(others.copied()).flatten().for_each(|body| self.loaded[body as usize] = true);
-        self.write_rows(types, rows, LinkRule { inv_h: 0.0, length_unit });
+        self.write_rows(types, rows, LinkRule { inv_h: 0.0, foreseen: 0.0, length_unit });
         self.system.find_shares(&self.loaded, &mut self.shares);
         self.lends().then_some((&mut self.masses, &self.shares))
     }
@@ -219,8 +224,11 @@ impl Chains {
         if stage == ChainStage::Begin {
             self.system.begin_substep(rows, h);
         }
-        let inv_h = if stage == ChainStage::Relax { 0.0 } else { 1.0 / h };
-        self.write_rows(types, rows, LinkRule { inv_h, length_unit });
+        let by = match stage {
+            ChainStage::Relax => LinkRule { inv_h: 0.0, foreseen: 0.0, length_unit },
+            _ => LinkRule { inv_h: 1.0 / h, foreseen: FORESEEN * 0.5 * h * h, length_unit },
+        };
+        self.write_rows(types, rows, by);
         self.system.solve(rows, stage);
         true
     }

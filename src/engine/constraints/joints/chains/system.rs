@@ -65,6 +65,8 @@ pub struct ChainSystem {
     /// Whether something has moved a chain since it was solved. `[chains]`
     moved: Vec<bool>,
     any_moved: bool,
+    /// Some chain has two links or more.
+    any_coupled: bool,
     /// 1 for links that are solved now, 0 for others. `[groups]`
     taken: Vec<f32x8>,
     /// X, Y and z: 2 size² + size numbers.
@@ -107,6 +109,7 @@ impl ChainSystem {
         self.chains.clear();
         self.chains.resize(groups * LINK_LANES, 0);
         self.moved.clear();
+        self.any_coupled = false;
         self.eliminated.begin(2 * size * size + size, groups);
     }
 
@@ -115,8 +118,9 @@ impl ChainSystem {
         i % self.groups * LINK_LANES + i / self.groups
     }
 
-    /// Says which chain a slot is of, counted from 0.
+    /// Says which chain a slot is of, counted from 0: the same as the one before, or the next.
     pub fn set_chain(&mut self, slot: usize, chain: usize) {
+        self.any_coupled |= chain < self.moved.len();
         self.chains[slot] = chain as u32;
         self.moved.resize(self.moved.len().max(chain + 1), false);
     }
@@ -243,6 +247,16 @@ impl ChainSystem {
         if self.any_slowed {
             self.slow::<N>();
         }
+        if !self.any_coupled {
+            for k in 0..self.groups {
+                let here = Link::<N>::of(self.rows.group(k));
+                let (matrix, b) = self.diagonal(k, &here, stage);
+                let impulse = Factor::of(matrix).solve(b);
+                self.impulses.add(k, &impulse);
+                self.give(k, [&here, &Link::none()], [&impulse, &[f32x8::ZERO; N]], rows);
+            }
+            return;
+        }
         let last = self.groups - 1;
         let first = Link::<N>::of(self.rows.group(0));
         let end = Link::<N>::of(self.rows.group(last));
@@ -362,15 +376,14 @@ struct Link<const N: usize> {
 
 impl<const N: usize> Link<N> {
     #[inline(always)]
+    fn none() -> Self {
+        let (zero, none) = ([f32x8::ZERO; N], [f32x8::ZERO; 2]);
+        Link { axis: [none; N], arms: [zero; 2], b: zero, mass: none, inertia: none }
+    }
+
+    #[inline(always)]
     fn of(numbers: &[f32x8]) -> Self {
-        let zero = [f32x8::ZERO; N];
-        let mut link = Link {
-            axis: [[f32x8::ZERO; 2]; N],
-            arms: [zero; 2],
-            b: zero,
-            mass: [f32x8::ZERO; 2],
-            inertia: [f32x8::ZERO; 2],
-        };
+        let mut link = Self::none();
         for r in 0..N {
             let at = |i: usize| numbers[5 * r + i];
             link.axis[r] = [at(0), at(1)];
