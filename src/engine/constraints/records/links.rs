@@ -16,8 +16,6 @@ pub struct ChainLink {
     pub slot: u32,
     /// The second of the joint's ends is the body away from where the chain hangs.
     pub forward: bool,
-    /// Its chain has no other.
-    pub alone: bool,
 }
 
 /// How errors of links are removed.
@@ -25,8 +23,6 @@ pub struct ChainLink {
 pub struct LinkRule {
     /// 1/h (1/s); 0 if errors are left.
     pub inv_h: f32,
-    /// Share of their errors of the second order that links alone foresee, times h²/2 (s²).
-    pub foreseen: f32,
     /// Size of typical bodies (m).
     pub length_unit: f32,
 }

@@ -58,9 +58,6 @@ use crate::engine::narrowphase::lanes::PoseRow;
 pub use system::ChainStage;
 use system::ChainSystem;
 
-/// Share of its error of the second order that a link alone foresees (1).
-const FORESEEN: f32 = 0.5;
-
 /// No body.
 const NONE: u32 = u32::MAX;
 
@@ -129,13 +126,12 @@ impl Chains {
             let [t, number] = search.places[joint as usize];
             let slot = system.slot(i);
             let forward = search.ends[joint as usize][1] == right;
-            system.set_chain(slot, chain);
+            let is_other = |i: usize| search.found.get(i).is_none_or(|&(.., other)| other != chain);
+            system.set_chain(slot, chain, is_other(i.wrapping_sub(1)) && is_other(i + 1));
             if right != NONE {
                 bodies[slot] = right;
             }
-            let is_other = |i: usize| search.found.get(i).is_none_or(|&(.., other)| other != chain);
-            let alone = is_other(i.wrapping_sub(1)) && is_other(i + 1);
-            links[t as usize].push(ChainLink { joint: number, slot: slot as u32, forward, alone });
+            links[t as usize].push(ChainLink { joint: number, slot: slot as u32, forward });
         }
         system.set_bodies(&bodies);
         links.iter_mut().for_each(|links| links.sort_unstable_by_key(|link| link.slot));
@@ -169,7 +165,7 @@ impl Chains {
         let others =
             types.iter().filter(|joined| !joined.kind.is_idle()).flat_map(|joined| joined.kind.ends());
         pairs.chain(others.copied()).flatten().for_each(|body| self.loaded[body as usize] = true);
-        self.write_rows(types, rows, LinkRule { inv_h: 0.0, foreseen: 0.0, length_unit });
+        self.write_rows(types, rows, LinkRule { inv_h: 0.0, length_unit });
         self.system.find_shares(&self.loaded, &mut self.shares);
         self.lends().then_some((&mut self.masses, &self.shares))
     }
@@ -224,11 +220,8 @@ impl Chains {
         if stage == ChainStage::Begin {
             self.system.begin_substep(rows, h);
         }
-        let by = match stage {
-            ChainStage::Relax => LinkRule { inv_h: 0.0, foreseen: 0.0, length_unit },
-            _ => LinkRule { inv_h: 1.0 / h, foreseen: FORESEEN * 0.5 * h * h, length_unit },
-        };
-        self.write_rows(types, rows, by);
+        let inv_h = if stage == ChainStage::Relax { 0.0 } else { 1.0 / h };
+        self.write_rows(types, rows, LinkRule { inv_h, length_unit });
         self.system.solve(rows, stage);
         true
     }

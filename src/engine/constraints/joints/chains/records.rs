@@ -2,7 +2,7 @@
 
 use crate::engine::constraints::joints::rows::{Besides, Jacobian, JointPair, JointPass, RowLaw};
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, W};
+use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
 use crate::engine::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore, held};
@@ -30,8 +30,6 @@ pub(crate) struct Linked {
     bodies: [Indices; 2],
     /// 1 if b is away from where the chain hangs, −1 if a is; 0 where there is no link. `[batches]`
     ways: Vec<f32x8>,
-    /// 1 for links alone, else 0. `[batches]`
-    alone: Vec<f32x8>,
     /// Anchors at the start of the step, and numbers. `[batches × (ANCHORS + numbers)]`
     records: Vec<f32x8>,
     /// Impulses: zeros, for passes that read none. `[kept]`
@@ -58,10 +56,10 @@ impl Linked {
     }
 
     pub(crate) fn held_bytes(&self) -> usize {
-        let Linked { active: _, inert: _, links, groups, joints, bodies, ways, alone, records, kept, aside } = self;
+        let Linked { active: _, inert: _, links, groups, joints, bodies, ways, records, kept, aside } = self;
         let indices = bodies.iter().chain([joints]).map(Indices::held_bytes).sum::<usize>();
         let lists = held(links) + held(groups) + held(aside);
-        indices + lists + held(ways) + held(alone) + held(records) + held(kept)
+        indices + lists + held(ways) + held(records) + held(kept)
     }
 }
 
@@ -96,26 +94,24 @@ impl<T: JointType> Joints<T> {
     /// Lists links in batches. `inert`: the row of no body.
     fn list_links(&mut self, links: &[ChainLink], inert: u32) {
         self.linked = Linked { active: true, inert, links: links.to_vec(), ..Linked::default() };
-        let Linked { groups, joints, bodies, ways, alone, records, kept, aside, .. } = &mut self.linked;
+        let Linked { groups, joints, bodies, ways, records, kept, aside, .. } = &mut self.linked;
         aside.resize(self.joints.len(), false);
         kept.resize(T::kept(self.form), f32x8::ZERO);
         let group_of = |link: &ChainLink| link.slot / LINK_LANES as u32;
         for links in links.chunk_by(|one, other| group_of(one) == group_of(other)) {
             let (mut of, mut at) = ([links[0].joint; LINK_LANES], [[inert; LINK_LANES]; 2]);
-            let (mut way, mut is_alone) = ([0.0; LINK_LANES], [0.0; LINK_LANES]);
-            for &ChainLink { joint, slot, forward, alone } in links {
+            let mut way = [0.0; LINK_LANES];
+            for &ChainLink { joint, slot, forward } in links {
                 let lane = slot as usize % LINK_LANES;
                 let [a, b] = self.ends[joint as usize];
                 of[lane] = joint;
                 (at[0][lane], at[1][lane]) = if self.swapped { (b, a) } else { (a, b) };
                 way[lane] = if forward != self.swapped { 1.0 } else { -1.0 };
-                is_alone[lane] = if alone { 1.0 } else { 0.0 };
                 aside[joint as usize] = true;
             }
             groups.push(group_of(&links[0]));
             joints.extend(&of);
             ways.push(f32x8::new(way));
-            alone.push(f32x8::new(is_alone));
             bodies.iter_mut().zip(at).for_each(|(bodies, at)| bodies.extend(&at));
         }
         records.resize(groups.len() * (ANCHORS + T::numbers(self.form)), f32x8::ZERO);
@@ -123,15 +119,14 @@ impl<T: JointType> Joints<T> {
 
     /// Writes the rows of the links as bodies are now.
     pub(crate) fn write_links(&mut self, rows: &[BodyRow], by: LinkRule, to: &mut LinkRows) {
-        let Linked { groups, bodies: [a, b], ways, alone, records, kept, .. } = &mut self.linked;
+        let Linked { groups, bodies: [a, b], ways, records, kept, .. } = &mut self.linked;
         let bodies = batches(a).zip(batches(b));
         let records = records.chunks_exact(ANCHORS + T::numbers(self.form));
-        let ways = ways.iter().zip(&*alone);
-        for (((&group, (&way, &alone)), record), (a, b)) in groups.iter().zip(ways).zip(records).zip(bodies) {
+        for (((&group, &way), record), (a, b)) in groups.iter().zip(&*ways).zip(records).zip(bodies) {
             let bodies = [f32x8::gather(rows, a), f32x8::gather(rows, b)];
             let (anchors, numbers) = record.split_at(ANCHORS);
             let pair = JointPair::new(bodies, anchors);
-            let mut pass = LinkPass { pair, way, foreseen: alone * by.foreseen, by, to: to.group_mut(group as usize) };
+            let mut pass = LinkPass { pair, way, by, to: to.group_mut(group as usize) };
             T::rows(self.form, numbers, kept, &mut pass);
         }
     }
@@ -236,7 +231,6 @@ fn links_of<'a>(joints: &'a [u32; LINK_LANES], way: &'a f32x8) -> impl Iterator<
 struct LinkPass<'a> {
     pair: JointPair<f32x8>,
     way: f32x8,
-    foreseen: f32x8,
     by: LinkRule,
     to: &'a mut [f32x8],
 }
@@ -254,21 +248,14 @@ impl JointPass<f32x8> for LinkPass<'_> {
     fn block<const N: usize>(
         &mut self,
         j: [Jacobian<f32x8>; N],
-        mut error: [f32x8; N],
+        error: [f32x8; N],
         law: RowLaw<f32x8>,
         _: &mut [f32x8],
     ) {
         if !matches!(law, RowLaw::Rigid) {
             return;
         }
-        let LinkPass { pair, way, foreseen, by, to } = self;
-        if N > 1 && by.foreseen > 0.0 {
-            let [a, b] = pair.bodies.map(|body| *foreseen * body[W] * body[W]);
-            let [d, e] = [j[0].axis, j[1].axis];
-            let across = Lanes::mul_add(d[0], e[1], -(d[1] * e[0]));
-            let shorter = |r: usize| across * Lanes::mul_add(b, j[r].arms[1], -(a * j[r].arms[0]));
-            (error[0], error[1]) = (error[0] - shorter(1), error[1] + shorter(0));
-        }
+        let LinkPass { pair, way, by, to } = self;
         let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
         let most = f32x8::splat(MOST_SPEED) * unit;
         let is_link = way * way;

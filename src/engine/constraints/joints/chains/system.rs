@@ -67,6 +67,10 @@ pub struct ChainSystem {
     any_moved: bool,
     /// Some chain has two links or more.
     any_coupled: bool,
+    /// 1 for links that are all of their chain, else 0. `[groups]`
+    alone: Vec<f32x8>,
+    /// ¼ h ω² of their bodies R (1/s), else 0. `[groups]`
+    turning: Vec<f32x8>,
     /// 1 for links that are solved now, 0 for others. `[groups]`
     taken: Vec<f32x8>,
     /// X, Y and z: 2 size² + size numbers.
@@ -102,7 +106,9 @@ impl ChainSystem {
         self.impulses.begin(size, groups);
         self.velocities.clear();
         self.velocities.resize(groups, [f32x8::ZERO; 3]);
-        for (list, value) in [(&mut self.pulls, 0.0), (&mut self.slowing, 1.0), (&mut self.taken, 1.0)] {
+        let zeros = [&mut self.pulls, &mut self.alone, &mut self.turning].map(|list| (list, 0.0));
+        let ones = [&mut self.slowing, &mut self.taken].map(|list| (list, 1.0));
+        for (list, value) in zeros.into_iter().chain(ones) {
             list.clear();
             list.resize(groups, f32x8::splat(value));
         }
@@ -118,9 +124,10 @@ impl ChainSystem {
         i % self.groups * LINK_LANES + i / self.groups
     }
 
-    /// Says which chain a slot is of, counted from 0: the same as the one before, or the next.
-    pub fn set_chain(&mut self, slot: usize, chain: usize) {
-        self.any_coupled |= chain < self.moved.len();
+    /// Says which chain a slot is of, counted from 0, and whether it is all of it.
+    pub fn set_chain(&mut self, slot: usize, chain: usize, alone: bool) {
+        self.any_coupled |= !alone;
+        self.alone[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = if alone { 1.0 } else { 0.0 };
         self.chains[slot] = chain as u32;
         self.moved.resize(self.moved.len().max(chain + 1), false);
     }
@@ -162,12 +169,15 @@ impl ChainSystem {
         for k in 0..self.groups {
             let x = f32x8::splat(h) * std::mem::replace(&mut self.pulls[k], f32x8::ZERO);
             self.slowing[k] = x.max(f32x8::ONE);
+            let bodies = self.bodies.list().batch(k);
+            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+            // What contacts or the user have stopped since does not turn.
+            let slower = self.velocities[k][2].abs().min(velocity[W].abs());
+            self.turning[k] = self.alone[k] * f32x8::splat(0.25 * h) * slower * slower;
             if !x.simd_gt(f32x8::ONE).any() {
                 continue;
             }
             self.any_slowed = true;
-            let bodies = self.bodies.list().batch(k);
-            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
             velocity[W] /= self.slowing[k];
             f32x8::scatter_velocity(rows, bodies, velocity);
         }
@@ -228,6 +238,10 @@ impl ChainSystem {
         stage: ChainStage,
     ) -> (LaneMatrix<N>, LaneVector<N>) {
         let (matrix, mut b) = link.diagonal();
+        if stage != ChainStage::Relax {
+            let [x, y] = link.arm(1);
+            (b[0], b[1]) = (self.turning[k].mul_add(x, b[0]), self.turning[k].mul_add(y, b[1]));
+        }
         if stage == ChainStage::Again {
             // γ K_ii λ; the block is (1 + γ) K_ii.
             let share = f32x8::splat(GIVE / (1.0 + GIVE));
@@ -354,6 +368,8 @@ impl ChainSystem {
             + held(&self.velocities)
             + held(&self.pulls)
             + held(&self.slowing)
+            + held(&self.alone)
+            + held(&self.turning)
             + held(&self.chains)
             + held(&self.moved)
             + held(&self.taken)
@@ -428,12 +444,18 @@ impl<const N: usize> Link<N> {
         (k, b)
     }
 
-    /// r·λ of a side, with the arms r = (s_2, −s_1) in the frame of two rows across each other; 0 without these.
+    /// The arm r = (s_2, −s_1) of a side, in the frame of two rows across each other; 0 without these.
     #[inline(always)]
-    fn pull(&self, side: usize, given: &LaneVector<N>) -> f32x8 {
+    fn arm(&self, side: usize) -> [f32x8; 2] {
         let ([d, e], arms) = ([self.axis[0], self.axis[1]], &self.arms[side]);
         let across = d[0].mul_add(e[1], -(d[1] * e[0]));
-        across * arms[1].mul_add(given[0], -(arms[0] * given[1]))
+        [across * arms[1], -(across * arms[0])]
+    }
+
+    /// r·λ of a side.
+    #[inline(always)]
+    fn pull(&self, side: usize, given: &LaneVector<N>) -> f32x8 {
+        along(self.arm(side), [given[0], given[1]])
     }
 
     /// C, to the next link.
