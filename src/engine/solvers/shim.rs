@@ -192,6 +192,7 @@ const MECHANISMS: [Mechanism; 12] = [
             + lines_of(include_str!("../constraints/joints/chains/records.rs"))
             + lines_of(include_str!("../constraints/joints/chains/system.rs"))
             + lines_of(include_str!("../constraints/joints/chains/system/apparent.rs"))
+            + lines_of(include_str!("../constraints/joints/chains/system/blocks.rs"))
             + lines_of(include_str!("../constraints/records/links.rs")),
     },
     Mechanism {

@@ -192,6 +192,9 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return false;
         }
+        if is_sweep(phase) && self.contacts.is_empty() && self.types_are_idle() {
+            return true;
+        }
         if matches!(phase, Phase::Prepare | Phase::Store) {
             // Other types have their records already.
             self.over_contacts(pass);
@@ -260,10 +263,7 @@ impl<'a> Passes<'a> {
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
         let passes_by = is_sweep(phase) || phase == Phase::Store;
         if self.work.types.is_empty() || passes_by && self.types_are_idle() {
-            if !passes_by || !self.contacts.is_empty() {
-                self.over_contacts(pass);
-            }
-            return;
+            return self.over_contacts(pass);
         }
         for part in self.parts_in_order() {
             let order = self.order;

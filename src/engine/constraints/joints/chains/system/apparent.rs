@@ -267,7 +267,7 @@ mod tests {
                 fill(&mut system, i, [[0.0; 3]; 2]);
             }
             system.set_bodies(&bodies);
-            (0..links).for_each(|i| system.set_chain(system.slot(i), 0));
+            system.set_chains([links].into_iter());
             let (is_loaded, mut shares) = ((0..=links).map(|i| i == loaded).collect::<Vec<_>>(), vec![]);
             system.find_shares(&is_loaded, &mut shares);
             system.forget_shares();
