@@ -1,8 +1,8 @@
 //! Tuning constants with their units, and the budget of a step.
 //!
 //! Lengths and speeds are for bodies of about a meter. A world of others has a
-//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied; not so
-//! [`DIVERGED_SPEED`], gravity and density.
+//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied, but for gravity and
+//! density.
 
 /// Overlap that position correction leaves alone (m), so that resting contacts stay contacts.
 /// Larger: visible overlap. Smaller: contacts flicker.
@@ -60,7 +60,7 @@ pub const DEFAULT_DT: f64 = 1.0 / 60.0;
 /// Approach speed above which a contact reports a hit (m/s).
 pub const HIT_SPEED: f32 = 1.0;
 
-/// Bodies faster than this (m/s) or, in rad/s, spinning faster than this, have diverged.
+/// Bodies faster than this (length units per second) or, in rad/s, spinning faster than this, have diverged.
 pub const DIVERGED_SPEED: f32 = 1.0e5;
 
 /// The work of one step.

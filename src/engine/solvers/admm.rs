@@ -88,7 +88,7 @@ pub static SOLVER: Variant = Variant {
     ],
     breaks: &[(Law::Converges, "to the law of `pgs`, but its multipliers begin at the wrong contacts")],
     impacts: ImpactLaw::None,
-    make: || Box::new(Admm::default()),
+    make: Variant::made_by(|| Box::new(Admm::default())),
     ..Variant::BASE
 };
 

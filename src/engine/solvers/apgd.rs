@@ -51,7 +51,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "gradients spread a load more slowly than sweeps"),
     ],
     impacts: ImpactLaw::None,
-    make: || Box::new(Apgd::default()),
+    make: Variant::made_by(|| Box::new(Apgd::default())),
     ..Variant::BASE
 };
 

@@ -105,7 +105,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Converges, "the law that it solves is one of positions"),
     ],
     impacts: ImpactLaw::None,
-    make: || Box::new(Avbd::default()),
+    make: Variant::made_by(|| Box::new(Avbd::default())),
     ..Variant::BASE
 };
 

@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::BAUMGARTE],
     breaks: &[(Law::Converges, "to the convex relaxation, which is another law")],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -51,7 +51,7 @@ pub static SOLVER: Variant = Variant {
     ],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
-    make: || Box::new(Box2d::default()),
+    make: Variant::made_by(|| Box::new(Box2d::default())),
     ..Variant::BASE
 };
 

@@ -93,7 +93,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
     ],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

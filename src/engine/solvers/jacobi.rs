@@ -54,7 +54,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "diverges where a body has three contacts or more"),
     ],
     impacts: ImpactLaw::BOX2D,
-    make: || Box::new(Jacobi::default()),
+    make: Variant::made_by(|| Box::new(Jacobi::default())),
     ..Variant::BASE
 };
 

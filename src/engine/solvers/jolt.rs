@@ -61,7 +61,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Converges, "one friction row a contact, which is another law"),
         (Law::Rest, "10 sweeps are too few for tall stacks and large mass ratios"),
     ],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -52,7 +52,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "12 slow sweeps are too few for stacks"),
     ],
     impacts: ImpactLaw::BOX2D,
-    make: || Box::new(MassSplitting::default()),
+    make: Variant::made_by(|| Box::new(MassSplitting::default())),
     ..Variant::BASE
 };
 

@@ -40,7 +40,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

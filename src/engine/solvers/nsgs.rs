@@ -61,7 +61,7 @@ pub static SOLVER: Variant = Variant {
     summary: "block Gauss–Seidel: load and friction of each point solved together, exactly",
     parameters: &[Parameter::BAUMGARTE],
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -33,7 +33,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
     breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

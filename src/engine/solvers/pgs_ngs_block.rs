@@ -36,7 +36,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
         (Law::Rest, "4 sweeps are too few for stacks"),
     ],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

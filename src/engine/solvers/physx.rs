@@ -67,7 +67,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Converges, "friction holds positions, which is another law"),
         (Law::Rest, "no warm start"),
     ],
-    make: || Box::new(PhysX::default()),
+    make: Variant::made_by(|| Box::new(PhysX::default())),
     ..Variant::BASE
 };
 

@@ -32,7 +32,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     breaks: &[(Law::Rest, "no friction and no warm starting")],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -43,7 +43,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

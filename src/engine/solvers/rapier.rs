@@ -38,7 +38,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::RAPIER,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

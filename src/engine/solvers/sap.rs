@@ -66,7 +66,7 @@ pub static SOLVER: Variant = Variant {
         (Law::NoAllocation, "matrices are as large as the scene"),
     ],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -84,7 +84,7 @@ pub static SOLVER: Variant = Variant {
     kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     continuous: true,
-    make: || Box::new(Shim::default()),
+    make: Variant::made_by(|| Box::new(Shim::default())),
     ..Variant::BASE
 };
 

@@ -45,7 +45,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Converges, "the last sweep solves another problem"),
         (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not react when its load leans"),
     ],
-    make: || Box::new(Shock::default()),
+    make: Variant::made_by(|| Box::new(Shock::default())),
     ..Variant::BASE
 };
 

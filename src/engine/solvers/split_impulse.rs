@@ -37,7 +37,7 @@ pub static SOLVER: Variant = Variant {
         ..Parameter::CORRECTION
     }],
     breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    make: || Box::new(SplitImpulse::default()),
+    make: Variant::made_by(|| Box::new(SplitImpulse::default())),
     ..Variant::BASE
 };
 

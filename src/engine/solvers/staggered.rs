@@ -60,7 +60,7 @@ pub static SOLVER: Variant = Variant {
         "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations",
     )],
     impacts: ImpactLaw::None,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

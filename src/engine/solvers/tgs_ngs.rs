@@ -34,7 +34,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CORRECTION],
     breaks: &[(Law::Rest, "jitters at its standard budget")],
     impacts: ImpactLaw::BOX2D,
-    make: || Schedule::boxed(step),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
 

@@ -64,7 +64,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::BOX2D,
-    make: || Box::new(TgsSticky::default()),
+    make: Variant::made_by(|| Box::new(TgsSticky::default())),
     ..Variant::BASE
 };
 

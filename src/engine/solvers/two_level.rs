@@ -35,7 +35,7 @@ pub static SOLVER: Variant = Variant {
     summary: "sweeps, and before each what every level of the contact graph carries, exactly",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    make: || Box::new(TwoLevel::default()),
+    make: Variant::made_by(|| Box::new(TwoLevel::default())),
     ..Variant::BASE
 };
 

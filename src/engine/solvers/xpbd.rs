@@ -56,7 +56,7 @@ pub static SOLVER: Variant = Variant {
         (Law::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 2 },
-    make: || Box::new(Xpbd::default()),
+    make: Variant::made_by(|| Box::new(Xpbd::default())),
     ..Variant::BASE
 };
 

@@ -110,7 +110,8 @@ impl std::fmt::Display for Divergence {
             Quantity::Angle => write!(f, "has no finite angle"),
         }?;
         if *criterion == Criterion::Bounds && speed.is_finite() {
-            write!(f, ", more than {DIVERGED_SPEED:e}")?;
+            let unit = if *quantity == Quantity::Speed { " length units per second" } else { "" };
+            write!(f, ", more than {DIVERGED_SPEED:e}{unit}")?;
         }
         write!(f, "; try more substeps, a shorter step or another solver")
     }

@@ -353,10 +353,11 @@ impl World {
         let arrays = [&b.velocity_x, &b.velocity_y, &b.angular_velocity, &b.position_x, &b.position_y];
         let [vx, vy, w, x, y] = arrays.map(|array| &array[..b.len()]);
         let [cos, sin] = [&b.rotation_cos, &b.rotation_sin].map(|array| &array[..b.len()]);
+        let fastest = DIVERGED_SPEED * self.settings.length_unit;
         let bad = |i: usize| {
             // NaN is bad, too. A spin that was out of bounds within the step, and is not any more,
             // leaves one in the rotation.
-            !((vx[i] * vx[i] + vy[i] * vy[i] <= DIVERGED_SPEED * DIVERGED_SPEED)
+            !((vx[i] * vx[i] + vy[i] * vy[i] <= fastest * fastest)
                 & (w[i].abs() <= DIVERGED_SPEED)
                 & ((x[i] + y[i]).abs() < f32::INFINITY)
                 & ((cos[i] + sin[i]).abs() < f32::INFINITY))
@@ -366,10 +367,9 @@ impl World {
         }
         let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
         let (speed, spin) = (b.velocity(body).length(), w[body].abs());
-        let is_bounded = |speed: f32| (0.0..=DIVERGED_SPEED).contains(&speed);
-        let (quantity, speed) = if !is_bounded(speed) {
+        let (quantity, speed) = if !(0.0..=fastest).contains(&speed) {
             (Quantity::Speed, speed)
-        } else if !is_bounded(spin) {
+        } else if !(0.0..=DIVERGED_SPEED).contains(&spin) {
             (Quantity::Spin, spin)
         } else if !(x[body] + y[body]).is_finite() {
             (Quantity::Position, f32::NAN)

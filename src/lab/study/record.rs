@@ -428,7 +428,10 @@ pub(crate) mod tests {
         let cure = "; try more substeps, a shorter step or another solver";
         let expected = [
             (bounds(Quantity::Speed, f32::NAN), "body 1 has no finite speed"),
-            (bounds(Quantity::Speed, 2e5), "body 1 moves at 2.000e5 m/s, more than 1e5"),
+            (
+                bounds(Quantity::Speed, 2e5),
+                "body 1 moves at 2.000e5 m/s, more than 1e5 length units per second",
+            ),
             (bounds(Quantity::Spin, 2e5), "body 1 spins at 2.000e5 rad/s, more than 1e5"),
             (bounds(Quantity::Position, f32::NAN), "body 1 has no finite position"),
             (
