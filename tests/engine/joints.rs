@@ -156,27 +156,32 @@ fn a_joint_is_changed_between_steps() {
     }
 }
 
+/// Beside a chain of six links, and beside a ball on one.
 #[test]
-fn a_joint_far_away_that_comes_and_goes_changes_no_bit() {
-    let run = |disturbed: bool| {
+fn joints_far_away_that_come_and_go_change_no_bit() {
+    let run = |links: usize, disturbed: bool| {
         let (mut world, ground) = empty(find("shim").unwrap());
-        chain(&mut world, ground, 5, 0.5);
-        let far = BodyDef::dynamic([500.0, 0.0]).with(ShapeDef::circle(0.5).unwrap());
-        let far = world.add_body(&far).unwrap();
-        let mut joint = None;
+        chain(&mut world, ground, links, 0.5);
+        let ball = |x: f64| BodyDef::dynamic([x, 0.0]).with(ShapeDef::circle(0.5).unwrap());
+        let far = [500.0, 502.0].map(|x| world.add_body(&ball(x)).unwrap());
+        let mut joints = vec![];
         for step in 0..60 {
             if disturbed && step == 20 {
-                joint = Some(world.add_joint(&Joint::revolute(ground, far).anchor([500.0, 1.0])).unwrap());
+                let hinges =
+                    [Joint::revolute(ground, far[0]).anchor([500.0, 1.0]), Joint::revolute(far[0], far[1])];
+                joints.extend(hinges.iter().map(|hinge| world.add_joint(hinge).unwrap()));
             }
             if disturbed && step == 40 {
-                world.remove_joint(joint.unwrap()).unwrap();
-                assert!(world.joint_state(joint.unwrap()).is_err());
+                joints.iter().for_each(|&joint| world.remove_joint(joint).unwrap());
+                assert!(world.joint_state(joints[0]).is_err());
             }
             world.step().unwrap();
         }
-        (1..7).map(|i| (world.bodies.center(i), world.bodies.angle(i))).collect::<Vec<_>>()
+        (1..links + 2).map(|i| (world.bodies.center(i), world.bodies.angle(i))).collect::<Vec<_>>()
     };
-    assert_eq!(run(false), run(true));
+    for links in [5, 0] {
+        assert_eq!(run(links, false), run(links, true), "{links}");
+    }
 }
 
 #[test]
@@ -300,6 +305,9 @@ fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     let (mut world, ground) = empty(find("shim").unwrap());
     let joints = chain(&mut world, ground, 5, 0.5);
     world.remove_joint(joints[4]).unwrap();
+    let ball = BodyDef::dynamic([31.0, 0.0]).with(ShapeDef::circle(0.5).unwrap());
+    let ball = world.add_body(&ball).unwrap();
+    world.add_joint(&Joint::revolute(ground, ball).anchor([30.0, 0.0])).unwrap();
     for _ in 0..30 {
         world.step().unwrap();
     }

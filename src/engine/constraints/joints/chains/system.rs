@@ -145,6 +145,14 @@ impl ChainSystem {
         self.bodies.extend(bodies);
     }
 
+    /// Takes the velocities of bodies for those that a solve has left.
+    pub fn take_velocities(&mut self, rows: &[BodyRow]) {
+        for k in 0..self.groups {
+            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            self.velocities[k] = [velocity[VX], velocity[VY], velocity[W]];
+        }
+    }
+
     /// Slots: links, and lanes without one.
     pub fn slots(&self) -> usize {
         self.groups * LINK_LANES
