@@ -192,7 +192,7 @@ impl<'a> Passes<'a> {
         if !self.input.phases.runs(phase) {
             return false;
         }
-        if is_sweep(phase) && self.contacts.is_empty() && self.types_are_idle() {
+        if is_sweep(phase) && self.has_no_sweeps() {
             return true;
         }
         if matches!(phase, Phase::Prepare | Phase::Store) {
@@ -280,6 +280,11 @@ impl<'a> Passes<'a> {
             }
             self.all(part).for_each(|batches| batches.arrange(order));
         }
+    }
+
+    /// Whether sweeps have nothing to do: there are no contacts, and all rows of other types are those of links.
+    fn has_no_sweeps(&self) -> bool {
+        self.contacts.is_empty() && self.types_are_idle()
     }
 
     /// Whether all rows of other types are those of links.

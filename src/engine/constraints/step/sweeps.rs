@@ -86,7 +86,7 @@ impl Passes<'_> {
     pub fn solve_chains(&mut self, chains: &mut Chains, stage: ChainStage) {
         let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
         // Nothing has moved them since.
-        let is_done = stage != ChainStage::Begin && self.contacts.is_empty() && self.types_are_idle();
+        let is_done = stage != ChainStage::Begin && self.has_no_sweeps();
         if self.has_chains(chains) && self.input.phases.runs(phase) && !is_done {
             let Workspace { rows, types, .. } = &mut *self.work;
             let solved = chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);

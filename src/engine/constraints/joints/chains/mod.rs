@@ -124,7 +124,7 @@ impl Chains {
         self.search.list(types, &self.moves);
         self.search.find();
         self.lay_out(types);
-        self.system.take_velocities(rows);
+        self.system.note(rows);
     }
 
     /// Gives links their places in the system.

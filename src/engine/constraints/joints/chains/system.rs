@@ -33,11 +33,12 @@
 mod apparent;
 mod blocks;
 
+use crate::engine::constraints::joints::rows::dot;
 use crate::engine::constraints::kernels::frame::{VX, VY, W};
 use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
 use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
 use apparent::Apparent;
-use blocks::{Factor, LaneMatrix, LaneVector, along, down, each, each_of, less, minus, transposed, up};
+use blocks::{Factor, LaneMatrix, LaneVector, down, each, less, minus, reduce, transposed, up};
 use wide::f32x8;
 
 /// The links of all chains.
@@ -67,8 +68,6 @@ pub struct ChainSystem {
     /// Whether something has moved a chain since it was solved. `[chains]`
     moved: Vec<bool>,
     any_moved: bool,
-    /// Some chain has two links or more.
-    any_coupled: bool,
     /// 1 for links that are all of their chain, else 0. `[groups]`
     alone: Vec<f32x8>,
     /// ¼ h ω² of their bodies R (1/s), else 0. `[groups]`
@@ -114,7 +113,6 @@ impl ChainSystem {
         self.chains.clear();
         self.chains.resize(groups * LINK_LANES, 0);
         self.moved.clear();
-        self.any_coupled = false;
         self.eliminated.begin(2 * size * size + size, groups);
     }
 
@@ -134,7 +132,6 @@ impl ChainSystem {
                 self.alone[slot / LINK_LANES].as_mut_array()[slot % LINK_LANES] = alone;
                 i += 1;
             }
-            self.any_coupled |= count > 1;
             self.moved.push(false);
         }
     }
@@ -145,10 +142,10 @@ impl ChainSystem {
         self.bodies.extend(bodies);
     }
 
-    /// Takes the velocities of bodies for those that a solve has left.
-    pub fn take_velocities(&mut self, rows: &[BodyRow]) {
+    /// Takes velocities as they are for those that a solve has left.
+    pub fn note(&mut self, rows: &[BodyRow]) {
         for k in 0..self.groups {
-            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            let velocity = velocity_of(rows, self.bodies_of(k));
             self.velocities[k] = [velocity[VX], velocity[VY], velocity[W]];
         }
     }
@@ -184,12 +181,17 @@ impl ChainSystem {
         for k in 0..self.groups {
             let x = f32x8::splat(h) * std::mem::replace(&mut self.pulls[k], f32x8::ZERO);
             self.slowing[k] = x.max(f32x8::ONE);
+            let (is_slowed, alone) = (x.simd_gt(f32x8::ONE).any(), self.alone[k]);
+            if !is_slowed && !alone.simd_gt(f32x8::ZERO).any() {
+                continue;
+            }
             let bodies = self.bodies.list().batch(k);
-            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+            let mut velocity = velocity_of(rows, bodies);
             // What contacts or callers have stopped since does not turn.
-            let slower = self.velocities[k][2].abs().min(velocity[W].abs());
-            self.turning[k] = self.alone[k] * f32x8::splat(0.25 * h) * slower * slower;
-            if !x.simd_gt(f32x8::ONE).any() {
+            let [.., before] = self.velocities[k];
+            let slower = before.abs().min(velocity[W].abs());
+            self.turning[k] = alone * f32x8::splat(0.25 * h) * slower * slower;
+            if !is_slowed {
                 continue;
             }
             self.any_slowed = true;
@@ -201,7 +203,7 @@ impl ChainSystem {
     /// Finds the chains with a body that has changed its velocity since they were solved. These are solved from now on in this substep.
     pub fn find_moved(&mut self, rows: &[BodyRow]) {
         for k in 0..self.groups {
-            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
+            let velocity = velocity_of(rows, self.bodies_of(k));
             let [x, y, w] = self.velocities[k];
             let same = velocity[VX].simd_eq(x) & velocity[VY].simd_eq(y) & velocity[W].simd_eq(w);
             if same.all() {
@@ -253,9 +255,10 @@ impl ChainSystem {
         stage: ChainStage,
     ) -> (LaneMatrix<N>, LaneVector<N>) {
         let (matrix, mut b) = link.diagonal();
-        if stage != ChainStage::Relax {
+        let turning = self.turning[k];
+        if stage != ChainStage::Relax && turning.simd_gt(f32x8::ZERO).any() {
             let [x, y] = link.arm(1);
-            (b[0], b[1]) = (self.turning[k].mul_add(x, b[0]), self.turning[k].mul_add(y, b[1]));
+            (b[0], b[1]) = (turning.mul_add(x, b[0]), turning.mul_add(y, b[1]));
         }
         if stage == ChainStage::Again {
             // γ K_ii λ; the block is (1 + γ) K_ii.
@@ -276,7 +279,8 @@ impl ChainSystem {
         if self.any_slowed {
             self.slow::<N>();
         }
-        if !self.any_coupled {
+        // No chain has a second link.
+        if self.moved.len() == self.links {
             for k in 0..self.groups {
                 let here = Link::<N>::of(self.rows.group(k));
                 let (matrix, b) = self.diagonal(k, &here, stage);
@@ -449,7 +453,7 @@ impl<const N: usize> Link<N> {
             for c in 0..=r {
                 let turning =
                     (self.inertia[0] * left[r]).mul_add(left[c], (self.inertia[1] * right[r]) * right[c]);
-                k[r][c] = gives * mass.mul_add(along(self.axis[r], self.axis[c]), turning);
+                k[r][c] = gives * mass.mul_add(dot(self.axis[r], self.axis[c]), turning);
                 k[c][r] = k[r][c];
             }
             let moves = k[r][r].simd_gt(f32x8::ZERO);
@@ -470,7 +474,7 @@ impl<const N: usize> Link<N> {
     /// r·λ of a side.
     #[inline(always)]
     fn pull(&self, side: usize, given: &LaneVector<N>) -> f32x8 {
-        along(self.arm(side), [given[0], given[1]])
+        dot(self.arm(side), [given[0], given[1]])
     }
 
     /// C, to the next link.
@@ -481,11 +485,17 @@ impl<const N: usize> Link<N> {
             let turn = -(next.inertia[0] * self.arms[1][r]);
             for (c, entry) in row.iter_mut().enumerate() {
                 let turning = turn * next.arms[0][c];
-                *entry = next.mass[0].mul_neg_add(along(self.axis[r], next.axis[c]), turning);
+                *entry = next.mass[0].mul_neg_add(dot(self.axis[r], next.axis[c]), turning);
             }
         }
         block
     }
+}
+
+/// Velocities and inverse masses of bodies.
+#[inline(always)]
+fn velocity_of(rows: &[BodyRow], bodies: LaneIndex<[u32; LINK_LANES]>) -> [f32x8; 4] {
+    f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies)
 }
 
 /// Gives impulses to the bodies R of links: of these links, and of the next ones that hang from R. Returns their velocities.
@@ -509,31 +519,13 @@ fn push<const N: usize>(
     }
     let of_side = |link: &Link<N>, side: usize| [link.mass[side], link.mass[side], link.inertia[side]];
     let (here, next) = (of_side(here, 1), of_side(next, 0));
-    let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+    let mut velocity = velocity_of(rows, bodies);
     for (k, v) in velocity[..3].iter_mut().enumerate() {
         let more = here[k] * of_own[k] - next[k] * of_others[k];
         *v += more;
     }
     f32x8::scatter_velocity(rows, bodies, velocity);
     [velocity[VX], velocity[VY], velocity[W]]
-}
-
-/// One step of cyclic reduction, between lanes `D` apart.
-#[inline(always)]
-fn reduce<const D: usize, const N: usize>(
-    d: &mut LaneMatrix<N>,
-    e: &mut LaneMatrix<N>,
-    b: &mut LaneVector<N>,
-) {
-    let factor = Factor::of(*d);
-    let z = factor.solve(*b);
-    let (f, e_p) = (transposed(each_of(*e, down::<D>)), each_of(*e, up::<D>));
-    // D is symmetric.
-    let to_p = transposed(factor.shifted(up::<D>).solve_each(transposed(*e)));
-    let to_q = transposed(factor.shifted(down::<D>).solve_each(transposed(f)));
-    *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
-    *b = less(less(*b, e, &each(z, up::<D>)), &f, &each(z, down::<D>));
-    *e = minus([[f32x8::ZERO; N]; N], &to_p, &e_p);
 }
 
 #[cfg(test)]

@@ -28,8 +28,7 @@
 //! what is too heavy by α diverges. So α = 1 where bodies of a chain can move against each other: with two hinges or more, or with three if
 //! it hangs at both ends.
 
-use super::{ChainSystem, GIVE, W, up};
-use crate::engine::constraints::kernels::frame::{VX, VY};
+use super::{ChainSystem, GIVE, up, velocity_of};
 use crate::engine::constraints::records::links::LINK_LANES;
 use crate::engine::lanes::{BodyRow, Lanes, held};
 use glam::{DMat3, DVec3};
@@ -187,14 +186,6 @@ impl ChainSystem {
         LinkJoint { rows, masses, gives: f64::from(GIVE) * k + DMat3::from_diagonal(missing) }
     }
 
-    /// Notes velocities before warm starts.
-    pub fn note(&mut self, rows: &[BodyRow]) {
-        for k in 0..self.groups {
-            let velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), self.bodies_of(k));
-            self.velocities[k] = [velocity[VX], velocity[VY], velocity[W]];
-        }
-    }
-
     /// Makes what contacts have changed in velocities M⁻¹ p instead of W p.
     pub fn push_masses(&self, rows: &mut [BodyRow]) {
         for (k, &share) in self.apparent.shares.iter().enumerate() {
@@ -202,7 +193,7 @@ impl ChainSystem {
                 continue;
             }
             let bodies = self.bodies.list().batch(k);
-            let mut velocity = f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies);
+            let mut velocity = velocity_of(rows, bodies);
             for (v, &before) in velocity[..3].iter_mut().zip(&self.velocities[k]) {
                 *v += (*v - before) * (f32x8::ONE / share - f32x8::ONE);
             }

@@ -23,11 +23,6 @@ pub(super) fn down<const D: usize>(x: f32x8) -> f32x8 {
 }
 
 #[inline(always)]
-pub(super) fn along(u: [f32x8; 2], v: [f32x8; 2]) -> f32x8 {
-    u[0].mul_add(v[0], u[1] * v[1])
-}
-
-#[inline(always)]
 pub(super) fn transposed<const N: usize>(m: LaneMatrix<N>) -> LaneMatrix<N> {
     let mut to = m;
     for r in 0..N {
@@ -77,9 +72,27 @@ pub(super) fn each<const N: usize>(mut x: LaneVector<N>, by: impl Fn(f32x8) -> f
 }
 
 #[inline(always)]
-pub(super) fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f32x8) -> f32x8) -> LaneMatrix<N> {
+fn each_of<const N: usize>(mut m: LaneMatrix<N>, by: impl Fn(f32x8) -> f32x8) -> LaneMatrix<N> {
     m.as_flattened_mut().iter_mut().for_each(|x| *x = by(*x));
     m
+}
+
+/// One step of cyclic reduction, between lanes `D` apart.
+#[inline(always)]
+pub(super) fn reduce<const D: usize, const N: usize>(
+    d: &mut LaneMatrix<N>,
+    e: &mut LaneMatrix<N>,
+    b: &mut LaneVector<N>,
+) {
+    let factor = Factor::of(*d);
+    let z = factor.solve(*b);
+    let (f, e_p) = (transposed(each_of(*e, down::<D>)), each_of(*e, up::<D>));
+    // D is symmetric.
+    let to_p = transposed(factor.shifted(up::<D>).solve_each(transposed(*e)));
+    let to_q = transposed(factor.shifted(down::<D>).solve_each(transposed(f)));
+    *d = minus(minus(*d, &to_p, &transposed(*e)), &to_q, &transposed(f));
+    *b = less(less(*b, e, &each(z, up::<D>)), &f, &each(z, down::<D>));
+    *e = minus([[f32x8::ZERO; N]; N], &to_p, &e_p);
 }
 
 /// L D Lᵀ of a symmetric, positive definite matrix. Unlike with its inverse, rounding errors do not grow with its condition.
@@ -133,7 +146,7 @@ impl<const N: usize> Factor<N> {
 
     /// Of the lane before, or the one after.
     #[inline(always)]
-    pub(super) fn shifted(self, by: impl Fn(f32x8) -> f32x8) -> Self {
+    fn shifted(self, by: impl Fn(f32x8) -> f32x8) -> Self {
         Factor { lower: each_of(self.lower, &by), inverse: each(self.inverse, &by) }
     }
 }
