@@ -112,6 +112,7 @@ impl FatBoxes {
     /// `dt` (s) is the step over which velocities are thought to last.
     pub fn update(&mut self, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) -> &[u32] {
         self.moved.clear();
+        self.moved.reserve(self.outlines.len());
         self.find_failed(bodies);
         for i in 0..self.failed.len() {
             self.look_at(self.failed[i] as usize, bodies, [dt, unit], proxies);
@@ -123,6 +124,7 @@ impl FatBoxes {
     fn find_failed(&mut self, bodies: &Bodies) {
         self.failed.clear();
         let count = self.first_shape.len();
+        self.failed.reserve(count);
         let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
         let [x0, y0, cos0, sin0, reach, slack] = columns.map(|c| c.lanes::<f32x16>());
         let columns = [&bodies.position_x, &bodies.position_y, &bodies.rotation_cos, &bodies.rotation_sin];

@@ -1,4 +1,4 @@
-//! Hilbert's curve, and sorting along it.
+//! Hilbert's curve.
 
 /// Bits of a coordinate on the curve.
 pub const BITS: u32 = 10;
@@ -20,25 +20,6 @@ pub fn hilbert(mut x: u32, mut y: u32) -> u32 {
         }
     }
     along
-}
-
-/// Stable counting sort by [`BITS`] + 1 bits of the first number from bit `shift` on.
-pub fn sort_digit(from: &[[u32; 2]], to: &mut Vec<[u32; 2]>, shift: u32) {
-    let digit = |pair: &[u32; 2]| (pair[0] >> shift) as usize & ((2 << BITS) - 1);
-    let mut next = [0u32; (2 << BITS) + 1];
-    for pair in from {
-        next[digit(pair) + 1] += 1;
-    }
-    for i in 1..next.len() {
-        next[i] += next[i - 1];
-    }
-    to.clear();
-    to.resize(from.len(), [0; 2]);
-    for pair in from {
-        let next = &mut next[digit(pair)];
-        to[*next as usize] = *pair;
-        *next += 1;
-    }
 }
 
 #[cfg(test)]

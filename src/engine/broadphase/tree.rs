@@ -26,7 +26,7 @@
 //! tree is worn, Lauterbach et al. 2006 (`lauterbach2006`).
 
 use super::Proxy;
-use super::curve::{BITS, hilbert, sort_digit};
+use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::PairSort;
 use crate::engine::lanes::held;
@@ -49,9 +49,8 @@ pub struct Tree {
     place: Vec<u32>,
     /// Perimeters of the leaves when the order was made (m).
     cost_of_order: f32,
-    /// Position on the curve and proxy, to be sorted.
-    keys: Vec<[u32; 2]>,
-    sorted: Vec<[u32; 2]>,
+    /// Position on the curve and proxy, the former in the upper half.
+    keys: Vec<u64>,
     /// Whether a proxy moved in this call, `[proxies]`.
     moved: Vec<bool>,
     /// Pairs as they are met, where many proxies moved; only a prefix is in use.
@@ -68,9 +67,8 @@ impl Tree {
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
         let nodes: usize = self.levels.iter().map(held).sum();
-        let pairs = [&self.keys, &self.sorted, &self.found, &self.fresh, &self.merged, &self.stack];
-        let lists: usize = pairs.into_iter().map(held).sum();
-        nodes + lists + held(&self.order) + held(&self.place) + held(&self.moved) + self.sort.bytes()
+        let lists: usize = [&self.found, &self.fresh, &self.merged, &self.stack].into_iter().map(held).sum();
+        nodes + lists + held(&self.keys) + held(&self.order) + held(&self.place) + held(&self.moved) + self.sort.bytes()
     }
 
     /// An empty tree.
@@ -119,6 +117,7 @@ impl Tree {
     /// Sorts the proxies along the curve and builds the levels.
     fn make_order(&mut self, proxies: &[Proxy]) {
         self.keys.clear();
+        self.keys.reserve(proxies.len());
         let exponent = |p: &Proxy| {
             let extent = (p.aabb.max - p.aabb.min).abs().max_element();
             extent.to_bits() >> 23
@@ -141,22 +140,18 @@ impl Tree {
             let cell = (center(proxy) - low) * scale;
             let along = hilbert(cell.x.min(cells) as u32, cell.y.min(cells) as u32);
             let key = if exponent(proxy) > large { 0 } else { 1 + along };
-            self.keys.push([key, i as u32]);
+            self.keys.push(u64::from(key) << 32 | i as u64);
         }
-        // A key has one bit more than the curve.
-        for shift in [0, BITS + 1] {
-            sort_digit(&self.keys, &mut self.sorted, shift);
-            std::mem::swap(&mut self.keys, &mut self.sorted);
-        }
+        self.keys.sort_unstable();
 
         let leaves = proxies.len().div_ceil(FAN);
         self.order.clear();
-        self.order.extend(self.keys.iter().map(|key| key[1]));
+        self.order.extend(self.keys.iter().map(|&key| key as u32));
         self.order.resize(leaves * FAN, 0);
         self.place.clear();
         self.place.resize(proxies.len(), 0);
-        for (place, key) in self.keys.iter().enumerate() {
-            self.place[key[1] as usize] = place as u32;
+        for (place, &key) in self.keys.iter().enumerate() {
+            self.place[key as u32 as usize] = place as u32;
         }
         let mut count = leaves.max(1);
         for level in 0.. {

@@ -87,6 +87,9 @@ impl Continuous {
         self.first_shape.clear();
         self.kinematic.clear();
         self.first_shape.push(0);
+        let count = bodies.size_hint().0;
+        self.safe_squared.reserve(count);
+        self.first_shape.reserve(count);
         for (kind, own) in bodies {
             let half = shapes[own.start as usize..own.end as usize].iter().map(Shape::min_half_extent);
             let half = half.fold(f32::INFINITY, f32::min);

@@ -81,6 +81,8 @@ impl Motion {
         self.velocity_increment.clear();
         self.damp.clear();
         self.round.clear();
+        rows.reserve(count + 1);
+        self.velocity_increment.reserve(count + 1);
         for i in 0..count {
             if bodies.round[i] && bodies.kind[i] != BodyKind::Static {
                 self.round.push((i as u32, 0.0));
