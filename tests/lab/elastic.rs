@@ -108,9 +108,7 @@ fn corners_between_walls_make_no_energy() {
     );
     let wall = SceneShape::rectangle(20.0, 0.5).friction(friction).restitution(e);
     bodies.extend([-2.0, 2.0].map(|y| SceneBody::fixed([0.0, y], wall.clone())));
-    let whole = most_made(bodies.clone());
     let [made, of_bound] = most_made_by_waves(bodies, friction);
-    println!("XX walls {made} {of_bound} {whole}");
     assert!(of_bound < 1.0, "{made} of the energy in one step, {of_bound} of the bound");
 }
 
@@ -251,9 +249,7 @@ proptest! {
         e in 0.3f64..1.0,
     ) {
         let bodies = row(&angles, &slenderness, &densities, &velocities, &spins, [friction, e]);
-        let whole = most_made(bodies.clone());
         let [made, of_bound] = most_made_by_waves(bodies, friction);
-        println!("XX row {made} {of_bound} {whole}");
         prop_assert!(of_bound < 1.0, "{made} of the energy in one step, {of_bound} of the bound");
     }
 }

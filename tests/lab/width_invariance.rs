@@ -18,7 +18,7 @@ const SCENES: [&str; 8] = [
     "oblique_collision",
     "crowded_plate",
 ];
-const STEPS: u32 = 300;
+const STEPS: u32 = 150;
 
 #[test]
 fn all_widths_give_the_same_bits() {

@@ -68,7 +68,13 @@ impl Tree {
     pub fn held_bytes(&self) -> usize {
         let nodes: usize = self.levels.iter().map(held).sum();
         let lists: usize = [&self.found, &self.fresh, &self.merged, &self.stack].into_iter().map(held).sum();
-        nodes + lists + held(&self.keys) + held(&self.order) + held(&self.place) + held(&self.moved) + self.sort.bytes()
+        nodes
+            + lists
+            + held(&self.keys)
+            + held(&self.order)
+            + held(&self.place)
+            + held(&self.moved)
+            + self.sort.bytes()
     }
 
     /// An empty tree.
