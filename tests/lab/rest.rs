@@ -10,6 +10,7 @@ use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Wi
 use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
+use simpulse::lab::torture;
 
 /// Piles of a few boxes: a stack, a pyramid, and one box held by friction.
 const PILES: [&str; 3] = ["stack:10", "pyramid:4", "incline_stick"];
@@ -254,6 +255,41 @@ fn speeds_at_rest_with_positions_in_f32() {
                  rounded {substeps:.5}"
             );
         }
+    }
+}
+
+/// A box that rolls on the round end of a capsule, as `shim` has left it after nine seconds, under other solvers: the fastest body of
+/// one second, right away and ten seconds later. What rolls without slipping is not worked on by its contact.
+#[test]
+#[ignore = "prints figures of papers/peers.md"]
+fn what_rolls_keeps_its_speed_with_more_substeps() {
+    let case = torture::family("drops").unwrap().case(1, 31);
+    for (solver, substeps) in [
+        ("shim", 14),
+        ("soft_step", 4),
+        ("soft_step", 14),
+        ("soft_step", 56),
+        ("soft_step", 224),
+        ("box2d", 4),
+        ("rapier", 4),
+    ] {
+        let settings = |solver: &str| Settings {
+            dt: case.scene.dt as f32,
+            ..crate::common::settings(find(solver).unwrap())
+        };
+        let mut world = crate::common::run(&case.scene, settings("shim"), case.scene.steps);
+        let gravity = world.settings.gravity;
+        world.settings = Settings { gravity, ..settings(solver) };
+        world.settings.budget.substeps = substeps;
+        let mut fastest = [0.0_f32; 11];
+        for most in &mut fastest {
+            for _ in 0..60 {
+                world.step().unwrap();
+                let speed = |i: usize| world.bodies.velocity(i).length();
+                *most = (0..world.bodies.len()).map(speed).fold(*most, f32::max);
+            }
+        }
+        println!("{solver}, {substeps} substeps: {:.1} and {:.1} mm/s", 1e3 * fastest[0], 1e3 * fastest[10]);
     }
 }
 
