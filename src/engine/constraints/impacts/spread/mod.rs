@@ -37,8 +37,8 @@
 //! # A bound for each island
 //!
 //! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
-//! island has at most 32 waves, and a number of visits that grows with its points ([`VISITS`]). The
-//! sweeps stop what still approaches then. Bodies of such an island that would end deeper in another one than they began are not moved.
+//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
+//! solver stops what still approaches then. Bodies of such an island that would end deeper in another one than they began are not moved.
 //! So the time of a step has a bound: `simpulse torture --pace 3` measures how many times the median it is.
 
 mod find;
@@ -69,8 +69,8 @@ const AHEAD: f32 = 1.1;
 /// Slowest rebound, as a multiple of the speed that forces give a resting body in a step (1).
 const BOUNCES: f32 = 0.1;
 
-/// Greatest number of waves of an island.
-const WAVES: u32 = 32;
+/// Greatest number of waves of an island, and how many of the last ones only stop.
+const WAVES: [u32; 2] = [32, 4];
 
 /// Greatest number of visits of an island: so many for each of its first points. Each of the others adds one.
 pub(crate) const VISITS: usize = 18;
@@ -177,12 +177,13 @@ impl Spread {
         }
         let arrived = self.points.len();
         let mut is_done = false;
-        for wave in 0..WAVES {
+        for wave in 0..WAVES[0] {
+            let bounces = wave + WAVES[1] < WAVES[0];
             if wave == 0 {
                 let speeds = self.points[self.first..].iter().map(|p| -p.velocity(on.rows)[0]);
                 self.slowest = TOLERANCE * speeds.fold(0.0, f32::max);
             }
-            let any = self.begin_wave(on, wave == 0);
+            let any = self.begin_wave(on, wave == 0, bounces);
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                 self.slowest *= FINER;
             }
@@ -192,9 +193,9 @@ impl Spread {
             }
             let known = if wave == 0 { arrived } else { self.points.len() };
             for place in self.first..known {
-                self.visit(on, place);
+                self.visit(on, place, bounces);
             }
-            let is_solved = self.spread(on);
+            let is_solved = self.spread(on, bounces);
             self.end_wave();
             if !is_solved {
                 break;
@@ -233,7 +234,7 @@ impl Spread {
     }
 
     /// Finds the points that bounce in this wave; whether there are any.
-    fn begin_wave(&mut self, on: &mut SpreadInput<'_>, is_first: bool) -> bool {
+    fn begin_wave(&mut self, on: &mut SpreadInput<'_>, is_first: bool, bounces: bool) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = &mut self.points[place];
@@ -245,6 +246,11 @@ impl Spread {
                 continue;
             }
             let Some(mut target) = rebounds(point, on, is_first) else { continue };
+            if !bounces {
+                // It is stopped when it is visited.
+                any = true;
+                continue;
+            }
             if let Some(round) = point.round.filter(|_| on.timed) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
                 if let Some(frame) = round.frame(ends, [-AHEAD * on.dt, on.dt]) {
@@ -313,7 +319,7 @@ impl Spread {
     }
 
     /// Visits the points of bodies that were pushed, until none is left or the bound is reached; whether none is left.
-    fn spread(&mut self, on: &mut SpreadInput<'_>) -> bool {
+    fn spread(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
         let mut is_done = true;
         while let Some(body) = self.queue.pop_front() {
             self.bodies[body as usize].is_queued = false;
@@ -326,8 +332,8 @@ impl Spread {
                 end = self.next[end as usize];
                 let first = self.list(on, lane);
                 self.visit_both(on, first);
-                self.visit(on, first);
-                self.visit(on, first + 1);
+                self.visit(on, first, bounces);
+                self.visit(on, first + 1, bounces);
             }
             let points = self.points.len() - self.first;
             is_done = self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
@@ -371,15 +377,15 @@ impl Spread {
     }
 
     /// Solves a point, if it approaches fast enough or was hit before.
-    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize) {
+    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
-        if point.mass <= 0.0 || point.role == Role::Left {
+        if point.mass <= 0.0 || point.role == Role::Left && bounces {
             return;
         }
         let mut touch = None;
-        if point.role == Role::Open {
+        if matches!(point.role, Role::Open | Role::Left) {
             let Some(mut time) = arrival(point, on, self.slowest) else { return };
-            if will_bounce(point, on) {
+            if bounces && will_bounce(point, on) {
                 // In the next wave.
                 return;
             }
