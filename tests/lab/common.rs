@@ -59,3 +59,8 @@ pub fn totals(world: &World) -> [f64; 4] {
         ]
     })
 }
+
+/// Greatest speed of a body (m/s).
+pub fn fastest(world: &World) -> f32 {
+    (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max)
+}

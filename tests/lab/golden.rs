@@ -30,7 +30,7 @@ fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
     }
     let mut settings = settings(variant);
     // What takes long in large scenes is cut short.
-    let work = 50_000 / scene.bodies.len().max(1);
+    let work = 100_000 / scene.bodies.len().max(1);
     settings.budget.velocity_iterations = settings.budget.velocity_iterations.min(work.max(8) as u32);
     let mut world = scene.build(settings).unwrap();
     let steps = (work / 5).clamp(3, 100);

@@ -1,5 +1,6 @@
 //! The law of rest: piles of a few boxes stay where they are at the standard budget.
 
+use crate::common::fastest;
 use simpulse::engine::clock::Phase;
 use simpulse::engine::constraints::kernels::velocity::rules::{
     Frictionless, NormalRule, Soft, angular_frequencies,
@@ -281,15 +282,14 @@ fn what_rolls_keeps_its_speed_with_more_substeps() {
         let gravity = world.settings.gravity;
         world.settings = Settings { gravity, ..settings(solver) };
         world.settings.budget.substeps = substeps;
-        let mut fastest = [0.0_f32; 11];
-        for most in &mut fastest {
+        let mut most = [0.0_f32; 11];
+        for most in &mut most {
             for _ in 0..60 {
                 world.step().unwrap();
-                let speed = |i: usize| world.bodies.velocity(i).length();
-                *most = (0..world.bodies.len()).map(speed).fold(*most, f32::max);
+                *most = most.max(fastest(&world));
             }
         }
-        println!("{solver}, {substeps} substeps: {:.1} and {:.1} mm/s", 1e3 * fastest[0], 1e3 * fastest[10]);
+        println!("{solver}, {substeps} substeps: {:.1} and {:.1} mm/s", 1e3 * most[0], 1e3 * most[10]);
     }
 }
 
@@ -300,7 +300,7 @@ fn what_rolls_keeps_its_speed_with_more_substeps() {
 fn heavy_boxes_on_pyramids_come_to_rest() {
     let scene = crate::common::scene("high_mass_ratio_1");
     let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 1500);
-    let fastest = (0..world.bodies.len()).map(|b| world.bodies.velocity(b).length()).fold(0.0, f32::max);
+    let fastest = fastest(&world);
     // Where speed is an average over a second and over mass, the target is 1e-3: this is the fastest body of one step.
     assert!(fastest < 5e-3, "{fastest} m/s");
 }
@@ -312,8 +312,7 @@ fn most_piles_of_ragdolls_come_to_rest() {
     let moves = |humans: u32| {
         let scene = crate::common::scene(&format!("ragdolls:{humans}"));
         let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 800);
-        let fastest = (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max);
-        fastest > 0.01
+        fastest(&world) > 0.01
     };
     let restless: Vec<u32> = (3..11).filter(|&humans| moves(humans)).collect();
     assert!(restless.len() <= 2, "{restless:?} humans");

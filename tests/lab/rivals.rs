@@ -1,5 +1,6 @@
 //! Law: rivals are as good as their sources.
 
+use crate::common::fastest;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
 
@@ -8,11 +9,6 @@ fn run(scene: &str, solver: &str, substeps: Option<u32>, steps: u32) -> World {
     let mut settings = crate::common::settings(find(solver).unwrap());
     settings.budget.substeps = substeps.unwrap_or(settings.budget.substeps);
     crate::common::run(&crate::common::scene(scene), settings, steps)
-}
-
-/// Greatest speed of a body (m/s).
-fn fastest(world: &World) -> f32 {
-    (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max)
 }
 
 /// A box slides down an incline of 0.25 rad with µ = 0.24: 297 mm in two seconds. Solver2D slides 13.8 % too far with 4

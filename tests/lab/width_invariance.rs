@@ -18,7 +18,7 @@ const SCENES: [&str; 8] = [
     "oblique_collision",
     "crowded_plate",
 ];
-const STEPS: u32 = 150;
+const STEPS: u32 = 300;
 
 #[test]
 fn all_widths_give_the_same_bits() {
@@ -58,7 +58,7 @@ fn the_same_run_twice_gives_the_same_bits() {
                     settings.width = LaneWidth::W1;
                 }
                 let scene = crate::common::scene(name);
-                let (a, b) = (run(&scene, settings.clone(), 100), run(&scene, settings, 100));
+                let (a, b) = (run(&scene, settings.clone(), 200), run(&scene, settings, 200));
                 assert_eq!(a.state_hash(), b.state_hash(), "{name} {} {order:?}", variant.name);
             }
         }
