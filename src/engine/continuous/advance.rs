@@ -8,12 +8,23 @@
 //! s c,   c = max(−v·n, 0) + |Δθ| r                                               (1)
 //! ```
 //!
-//! with r its farthest point from the center of mass. So t may advance by (d − δ)/c without passing the distance δ
-//! (conservative advancement). The middle of b is at least its half width w farther along n than its surface is, and it
+//! with r its distance from the center of mass (conservative advancement). A vertex at r has the gap g = d + n·r − min n·r, which
+//! changes at first by ġ = v·n + Δθ n·r⊥, and no point that turns about the center is accelerated by more than Δθ² |r|. So it
+//! keeps the distance δ over at least
+//!
+//! ```text
+//! s = max((g − δ)/c,  2 (g − δ)/(−ġ + √(ġ² + 2 Δθ² |r| (g − δ))))               (2)
+//! ```
+//!
+//! and t may advance by the least of all vertices. Near the surface the second bound is a Newton step. Along one axis such steps cost
+//! a few products each; then the distance is found again. A tip that turns away is met after two axes. With the first
+//! bound alone it took 32, in eight bodies at once three times as long as the rest of the step.
+//!
+//! The middle of b is at least its half width w farther along n than its surface is, and it
 //! moves along n by no more than −v·n for the rest of the step, however b turns. So where
 //!
 //! ```text
-//! (1 − t)(−v·n) − d ≤ w                                                           (2)
+//! (1 − t)(−v·n) − d ≤ w                                                           (3)
 //! ```
 //!
 //! it does not get through, and the rest is a matter of contacts: a body that slides along a floor does not stop where
@@ -23,7 +34,7 @@
 //! Where a recedes, b may go on as far as a does in the rest of the step: with its own way w it takes
 //!
 //! ```text
-//! t + (1 − t) r,   r = 1 − (v·n)/(w·n)   if both are negative and r positive,       (3)
+//! t + (1 − t) r,   r = 1 − (v·n)/(w·n)   if both are negative and r positive,       (4)
 //! ```
 //!
 //! else t. Otherwise it would never reach a wall that recedes, and gravity would add to its speed in every step. Where a comes in, b keeps
@@ -35,18 +46,21 @@
 //!
 //! ```text
 //! t = max(s + w/2, 0)/u   if u > w + max(s, −w/2), the least of all points
-//! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (4)
+//! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (5)
 //! ```
 //!
 //! So a rod whose tip stands on a floor tips over: its tip does not get in, and its middle and its other end have far to go.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
-use crate::engine::narrowphase::collide;
+use crate::engine::narrowphase::Collider;
 use crate::engine::shapes::{Pose, Shape};
 use glam::Vec2;
 
-/// Advances of one pair at most; those of a face are two or three.
-const MOST_ADVANCES: u32 = 32;
+/// Most axes along which a pair advances. In 3600 random scenes none takes more than five.
+const MOST_AXES: u32 = 8;
+
+/// Most steps along one axis. Most take fewer than six; a pair that reaches its bounds stops early.
+const MOST_STEPS: u32 = 16;
 
 /// Distances looked at (m): beyond any way of a step.
 const FAR: f32 = 1e9;
@@ -86,17 +100,17 @@ pub fn reach(shape: &Shape) -> f32 {
     reach + shape.radius()
 }
 
-/// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (4) if
-/// it is so at the start, if its middle would get through it afterward, and by (3) later if the first recedes; at most `limit`.
+/// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (5) if
+/// it is so at the start, if its middle would get through it afterward, and by (4) later if the first recedes; at most `limit`.
 pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> f32 {
     let (own, reach) = (b.against(a), reach(shape_b));
     let width = shape_b.min_half_extent().min(reach);
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
     let near = slop.min(0.1 * width);
-    let swing = own.turn.abs() * reach;
-    let mut part = 0.0_f32;
-    for _ in 0..MOST_ADVANCES {
-        let manifold = collide(shape_a, &a.pose, shape_b, &own.at(part), FAR);
+    let Some(pair) = Collider::new(shape_a, shape_b) else { return limit };
+    let (mut part, mut pose) = (0.0_f32, own.pose);
+    for _ in 0..MOST_AXES {
+        let manifold = pair.collide([&a.pose, &pose], FAR);
         let separations = manifold.points().iter().map(|p| p.separation);
         let distance = separations.fold(f32::INFINITY, f32::min);
         let approach = -own.way.dot(manifold.normal);
@@ -112,15 +126,48 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
             let recedes = if total > approach { 1.0 - approach / total } else { 0.0 };
             return limit.min((1.0 - part).mul_add(recedes, part));
         }
-        part += (distance - 0.5 * near) / (approach.max(0.0) + swing);
+        part = free_until(&own, shape_b, part, manifold.normal, [distance - 0.5 * near, 0.25 * near]);
         if part >= limit {
             return limit;
+        }
+        pose = own.at(part);
+    }
+    part
+}
+
+/// The part of the step, from `start` on, until which no point of b gets nearer than δ along `n`, from which it is `gap` away at the
+/// start (m): steps of (2), until no more than `enough` of the gap is left.
+fn free_until(b: &Mover, shape: &Shape, start: f32, n: Vec2, [gap, enough]: [f32; 2]) -> f32 {
+    let (rises, turn) = (b.way.dot(n), b.turn.abs());
+    let (mut part, mut lowest_at_start) = (start, None);
+    for _ in 0..MOST_STEPS {
+        // n in the frame of the body.
+        let rotation = b.at(part).rotation;
+        let up = Vec2::new(rotation.x, -rotation.y).rotate(n);
+        let mut lowest = f32::INFINITY;
+        shape.for_each_vertex(|r| lowest = lowest.min(up.dot(r)));
+        let lowered = *lowest_at_start.get_or_insert(lowest) - lowest;
+        let gap = rises.mul_add(part - start, gap) - lowered;
+        if gap <= enough {
+            break;
+        }
+        let mut free = f32::INFINITY;
+        shape.for_each_vertex(|r| {
+            let (gap, reach) = (gap + up.dot(r) - lowest, r.length());
+            let changes = b.turn.mul_add(up.dot(r.perp()), rises);
+            let bend = 2.0 * turn * turn * reach * gap;
+            let newton = 2.0 * gap / (changes.mul_add(changes, bend).sqrt() - changes);
+            free = free.min(newton.max(gap / turn.mul_add(reach, (-rises).max(0.0))));
+        });
+        part += free;
+        if part >= 1.0 {
+            break;
         }
     }
     part
 }
 
-/// (4): the part of the step that b takes against a, which it touches and which is at rest.
+/// (5): the part of the step that b takes against a, which it touches and which is at rest.
 fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
     let n = manifold.normal;
     let (mut part, mut middle) = (1.0_f32, f32::INFINITY);
@@ -141,6 +188,7 @@ fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::narrowphase::collide;
     use crate::engine::params::LINEAR_SLOP;
 
     /// A shape and its way.

@@ -106,9 +106,9 @@ impl<L: Lanes> Hulls<L> {
 
 impl Hulls<f32> {
     /// A single pair, which stands at `poses`.
-    pub fn new(poses: &Poses<f32>, rows: [HullRow; 2]) -> Self {
+    pub fn new(poses: &Poses<f32>, rows: &[HullRow; 2]) -> Self {
         let mut hulls = Self::empty();
-        hulls.gather(poses, &rows, [LaneIndex::new(&[0; MOST_LANES]), LaneIndex::new(&[1; MOST_LANES])]);
+        hulls.gather(poses, rows, [LaneIndex::new(&[0; MOST_LANES]), LaneIndex::new(&[1; MOST_LANES])]);
         hulls
     }
 }

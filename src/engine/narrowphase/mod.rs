@@ -106,39 +106,73 @@ impl Margins {
 /// The result of [`collide_in_step`], including grazes; none for two segments.
 fn touch(
     [a, b]: [&Shape; 2],
-    [pose_a, pose_b]: [&Pose; 2],
+    poses: [&Pose; 2],
     ways: [[f32; 4]; 2],
     a_is_held: bool,
     margins: Margins,
 ) -> Option<Touch<f32>> {
-    // What lanes do in a step is done here with one lane: the same bits.
-    let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
-    let kind = PairKind::of(class_a, class_b)?;
-    let poses = Poses::<f32>::new(pose_a, pose_b);
-    let held = f32::from(u8::from(a_is_held));
-    let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
-    let touch = match kind {
-        PairKind::Rectangles => rectangles::collide(&pair, margins).on_held(held),
-        PairKind::Circles => {
-            let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
-            circles::in_step(&pair, ways, None, margins).0
+    Some(Collider::new(a, b)?.touch(poses, ways, a_is_held, margins))
+}
+
+/// Two shapes as kernels read them, to be collided at several poses.
+pub(crate) struct Collider {
+    kind: PairKind,
+    rows: [ShapeRow; 2],
+    /// Of what is neither rectangle nor circle.
+    hulls: [HullRow; 2],
+}
+
+impl Collider {
+    /// None for two segments.
+    pub(crate) fn new(a: &Shape, b: &Shape) -> Option<Self> {
+        let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
+        let kind = PairKind::of(class_a, class_b)?;
+        let none = HullRow::default();
+        let hulls = match kind {
+            PairKind::Rectangles | PairKind::Circles => [none; 2],
+            PairKind::Hulls => [HullRow::new(a), HullRow::new(b)],
+            PairKind::HullCircle => [HullRow::new(a), none],
+            PairKind::CircleHull => [none, HullRow::new(b)],
+        };
+        Some(Collider { kind, rows: [row_a, row_b], hulls })
+    }
+
+    /// As [`collide`].
+    pub(crate) fn collide(&self, poses: [&Pose; 2], speculative_distance: f32) -> Manifold {
+        self.touch(poses, [[0.0; 4]; 2], false, Margins::within(speculative_distance)).manifold()
+    }
+
+    /// What lanes do in a step is done here with one lane: the same bits.
+    fn touch(
+        &self,
+        [pose_a, pose_b]: [&Pose; 2],
+        ways: [[f32; 4]; 2],
+        a_is_held: bool,
+        margins: Margins,
+    ) -> Touch<f32> {
+        let [row_a, row_b] = self.rows;
+        let poses = Poses::<f32>::new(pose_a, pose_b);
+        let held = f32::from(u8::from(a_is_held));
+        let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
+        match self.kind {
+            PairKind::Rectangles => rectangles::collide(&pair, margins).on_held(held),
+            PairKind::Circles => {
+                let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
+                circles::in_step(&pair, ways, None, margins).0
+            }
+            PairKind::Hulls => Hulls::new(&poses, &self.hulls).collide(&poses, margins).on_held(held),
+            PairKind::HullCircle => {
+                let (touch, gap, _) =
+                    HullCircle::new(self.hulls[0], row_b).in_step(&poses, ways, None, margins);
+                touch.on_held(held).with_gap(gap)
+            }
+            PairKind::CircleHull => {
+                let (pair, poses) = (HullCircle::new(self.hulls[1], row_a), poses.swapped());
+                let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, margins);
+                touch.swapped().on_held(held).with_gap(gap)
+            }
         }
-        PairKind::Hulls => {
-            let mut hulls = Hulls::new(&poses, [HullRow::new(a), HullRow::new(b)]);
-            hulls.collide(&poses, margins).on_held(held)
-        }
-        PairKind::HullCircle => {
-            let pair = HullCircle::new(HullRow::new(a), row_b);
-            let (touch, gap, _) = pair.in_step(&poses, ways, None, margins);
-            touch.on_held(held).with_gap(gap)
-        }
-        PairKind::CircleHull => {
-            let (pair, poses) = (HullCircle::new(HullRow::new(b), row_a), poses.swapped());
-            let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, margins);
-            touch.swapped().on_held(held).with_gap(gap)
-        }
-    };
-    Some(touch)
+    }
 }
 
 impl Manifold {
