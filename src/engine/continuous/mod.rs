@@ -80,9 +80,13 @@ pub struct Moving<'w> {
 }
 
 impl Continuous {
-    /// Takes in all bodies of a world, each by its kind and the shapes that it has, none if it was removed. `shapes`: those of
-    /// all bodies, in their order.
-    pub fn build(&mut self, bodies: impl Iterator<Item = (BodyKind, Range<u32>)>, shapes: &[Shape]) {
+    /// Takes in all bodies of a world, each by its kind and the shapes that it has, none if it was removed. `half_width`: half
+    /// the smallest width of a shape (m).
+    pub fn build(
+        &mut self,
+        bodies: impl Iterator<Item = (BodyKind, Range<u32>)>,
+        half_width: impl Fn(usize) -> f32,
+    ) {
         self.safe_squared.clear();
         self.first_shape.clear();
         self.kinematic.clear();
@@ -91,8 +95,7 @@ impl Continuous {
         self.safe_squared.reserve(count);
         self.first_shape.reserve(count);
         for (kind, own) in bodies {
-            let half = shapes[own.start as usize..own.end as usize].iter().map(Shape::min_half_extent);
-            let half = half.fold(f32::INFINITY, f32::min);
+            let half = own.clone().map(|shape| half_width(shape as usize)).fold(f32::INFINITY, f32::min);
             self.safe_squared.push(if kind == BodyKind::Dynamic { half * half } else { f32::INFINITY });
             self.first_shape.push(own.end);
             if kind == BodyKind::Kinematic {

@@ -118,7 +118,14 @@ impl World {
         shape.for_each_vertex(|v| reach = reach.max(v.length()));
         let (class, number) = self.narrow.shapes.push(&shape);
         self.shapes[i] = shape;
-        self.surfaces[i] = Surface { friction, restitution, reach: reach + shape.radius(), class, number };
+        self.surfaces[i] = Surface {
+            friction,
+            restitution,
+            reach: reach + shape.radius(),
+            half_width: shape.min_half_extent(),
+            class,
+            number,
+        };
         let (group, dynamic) = (self.bodies.group[body], self.bodies.is_dynamic(body));
         self.proxies[i] = Proxy { aabb, body: body as u32, group, dynamic };
     }

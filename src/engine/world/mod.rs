@@ -57,6 +57,8 @@ struct Surface {
     restitution: f32,
     /// Farthest point from the body's center of mass (m).
     reach: f32,
+    /// [`Shape::min_half_extent`] (m).
+    half_width: f32,
     /// Its index in the narrow phase.
     class: Class,
     /// What the narrow phase calls it.
@@ -212,14 +214,24 @@ impl World {
         self.work.motion.finish(&mut self.work.rows);
         if self.settings.continuous {
             let World {
-                bodies, shapes, proxies, contacts, slots, joints, broadphase, work, settings, ..
+                bodies,
+                shapes,
+                surfaces,
+                proxies,
+                contacts,
+                slots,
+                joints,
+                broadphase,
+                work,
+                settings,
+                ..
             } = self;
             if std::mem::take(&mut self.continuous_is_stale) {
                 let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes);
                 let each = lives.zip(&bodies.kind).map(|(((&lives, &first), &count), &kind)| {
                     (kind, first..first + if lives { count } else { 0 })
                 });
-                self.continuous.build(each, shapes);
+                self.continuous.build(each, |shape| surfaces[shape].half_width);
             }
             let Workspace { types, rows, .. } = work;
             let moving = Moving {
