@@ -264,8 +264,8 @@ mod tests {
     fn nothing_is_passed_on_any_way_however_it_turns() {
         let wall = rectangle(0.005, 3.0);
         let needle = rectangle(0.4, 0.01);
-        for k in 0..200 {
-            let (y, turn) = (-2.0 + 0.02 * k as f32, 0.1 * k as f32 - 10.0);
+        for k in 0..400 {
+            let (y, turn) = (-2.0 + 0.01 * k as f32, 0.1 * k as f32 - 20.0);
             let fixed = mover(&wall, 2.0, 0.0, [0.0; 2], 0.0);
             let thrown = mover(&needle, 0.0, y, [5.0, 0.1], turn);
             let part = impact(&fixed, &thrown, 1.0);
