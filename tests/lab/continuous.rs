@@ -32,18 +32,26 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
     for variant in &VARIANTS {
         let mut through = 0;
         for (shape, k) in shapes.iter().flat_map(|shape| (0..30).map(move |k| (shape, f64::from(k)))) {
-            let body = SceneBody::dynamic([-7.3 + 0.02 * k, 0.1], shape.clone());
-            let body = body.moving([300.0, 0.0], 20.0 - 2.0 * k);
-            let scene = Scene::new("shot", vec![wall(), body]).weightless();
-            // Diverging counts as going through.
-            let goes_through = |settings| {
+            let mut scene = shot(shape.clone(), wall(), false);
+            scene.bodies[1].position[0] += 0.02 * k;
+            scene.bodies[1].angular_velocity -= 2.0 * k;
+            // Not a number where the solver diverges.
+            let x = |settings| {
                 let mut world = scene.build(settings).unwrap();
-                !(0..60).all(|_| world.step().is_ok()) || world.bodies.center(1)[0] >= 0.0
+                let ends = (0..60).all(|_| world.step().is_ok());
+                if ends { world.bodies.center(1)[0] } else { f64::NAN }
             };
-            through += u32::from(goes_through(on(variant)));
+            let stops = x(on(variant)) < 0.0;
+            through += u32::from(!stops);
             if k == 0.0 {
+                assert!(stops || KNOWN_AT_FIRST.contains(&variant.name), "{} {shape:?}", variant.name);
                 let off = Settings { continuous: false, ..settings(variant) };
-                assert!(goes_through(off), "{} {shape:?}: 5 m in a step", variant.name);
+                let passes = x(off) > 0.0;
+                assert!(
+                    passes || KNOWN_AT_FIRST.contains(&variant.name),
+                    "{} {shape:?}: 5 m in a step",
+                    variant.name
+                );
             }
         }
         let known = KNOWN.iter().find(|(name, _)| *name == variant.name).map_or(0, |(_, most)| *most);
@@ -51,7 +59,10 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
     }
 }
 
-/// Solvers under which something gets through in the end, or that diverge, and how many of 90: what stops deep in the contact and
+/// Solvers under which the first shot gets through in the end, or that diverge.
+const KNOWN_AT_FIRST: [&str; 6] = ["pgs_soft", "jacobi", "mass_splitting", "tgs_soft", "tgs_sticky", "physx"];
+
+/// The same of all shots, and how many of 90: what stops deep in the contact and
 /// spins may go on through in the steps that follow, since rotation is not traced.
 const KNOWN: [(&str, u32); 12] = [
     ("projection", 6),

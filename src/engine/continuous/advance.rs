@@ -93,17 +93,10 @@ impl Mover {
     }
 }
 
-/// Farthest point of a shape from its body's center of mass (m).
-pub fn reach(shape: &Shape) -> f32 {
-    let mut reach = 0.0_f32;
-    shape.for_each_vertex(|v| reach = reach.max(v.length()));
-    reach + shape.radius()
-}
-
 /// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (5) if
 /// it is so at the start, if its middle would get through it afterward, and by (4) later if the first recedes; at most `limit`.
 pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> f32 {
-    let (own, reach) = (b.against(a), reach(shape_b));
+    let (own, reach) = (b.against(a), shape_b.reach());
     let width = shape_b.min_half_extent().min(reach);
     // The next step has to see it as a contact, and small bodies are to come near by their own measure.
     let near = slop.min(0.1 * width);

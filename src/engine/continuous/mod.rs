@@ -225,7 +225,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
 /// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.
 fn swept(moving: Moving<'_>, rows: &[BodyRow], shape: usize) -> Aabb {
     let body = moving.proxies[shape].body as usize;
-    let reach = advance::reach(&moving.shapes[shape]);
+    let reach = moving.shapes[shape].reach();
     let start = moving.bodies.pose(body).position;
     let end = start + Vec2::new(rows[body].delta[0], rows[body].delta[1]);
     Aabb { min: start.min(end), max: start.max(end) }.grown(reach)

@@ -64,8 +64,8 @@ use lanes::{Poses, ShapePair, ShapeRow, Touch};
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
-    touch([a, b], [pose_a, pose_b], [[0.0; 4]; 2], false, Margins::within(speculative_distance))
-        .map_or_else(Manifold::default, |touch| touch.manifold())
+    Collider::new(a, b)
+        .map_or_else(Manifold::default, |pair| pair.collide([pose_a, pose_b], speculative_distance))
 }
 
 /// As [`collide`], for the coming step, in which bodies move by `ways` if nothing hinders them (`[x, y, θ, 0]`, m and
@@ -73,13 +73,14 @@ pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_d
 /// slide over.
 pub fn collide_in_step(
     [a, b]: [&Shape; 2],
-    [pose_a, pose_b]: [&Pose; 2],
+    poses: [&Pose; 2],
     ways: [[f32; 4]; 2],
     a_is_held: bool,
     margins: Margins,
 ) -> Manifold {
-    touch([a, b], [pose_a, pose_b], ways, a_is_held, margins)
-        .map_or_else(Manifold::default, |touch| touch.without_grazes().manifold())
+    Collider::new(a, b).map_or_else(Manifold::default, |pair| {
+        pair.touch(poses, ways, a_is_held, margins).without_grazes().manifold()
+    })
 }
 
 /// Small distances of a collision.
@@ -101,17 +102,6 @@ impl Margins {
     pub fn within(speculative: f32) -> Self {
         Margins { speculative, slop: LINEAR_SLOP }
     }
-}
-
-/// The result of [`collide_in_step`], including grazes; none for two segments.
-fn touch(
-    [a, b]: [&Shape; 2],
-    poses: [&Pose; 2],
-    ways: [[f32; 4]; 2],
-    a_is_held: bool,
-    margins: Margins,
-) -> Option<Touch<f32>> {
-    Some(Collider::new(a, b)?.touch(poses, ways, a_is_held, margins))
 }
 
 /// Two shapes as kernels read them, to be collided at several poses.
@@ -142,7 +132,7 @@ impl Collider {
         self.touch(poses, [[0.0; 4]; 2], false, Margins::within(speculative_distance)).manifold()
     }
 
-    /// What lanes do in a step is done here with one lane: the same bits.
+    /// As [`collide_in_step`], including grazes. What lanes do in a step is done here with one lane: the same bits.
     fn touch(
         &self,
         [pose_a, pose_b]: [&Pose; 2],

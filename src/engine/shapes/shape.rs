@@ -277,6 +277,13 @@ impl Shape {
         best + self.radius() * direction.normalize_or_zero()
     }
 
+    /// Distance of its farthest point from the origin, the center of mass of its body in a world (m).
+    pub fn reach(&self) -> f32 {
+        let mut reach = 0.0_f32;
+        self.for_each_vertex(|v| reach = reach.max(v.length()));
+        reach + self.radius()
+    }
+
     /// Half the smallest width of the shape (m); deeper overlap is past its middle. Infinite for a segment, which has
     /// no inside, so the minimum over a pair is that of the other shape.
     pub fn min_half_extent(&self) -> f32 {

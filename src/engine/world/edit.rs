@@ -114,14 +114,12 @@ impl World {
     ) {
         // Fat boxes are made at the next step.
         let aabb = shape.aabb(&self.bodies.pose(body));
-        let mut reach = 0.0_f32;
-        shape.for_each_vertex(|v| reach = reach.max(v.length()));
         let (class, number) = self.narrow.shapes.push(&shape);
         self.shapes[i] = shape;
         self.surfaces[i] = Surface {
             friction,
             restitution,
-            reach: reach + shape.radius(),
+            reach: shape.reach(),
             half_width: shape.min_half_extent(),
             class,
             number,
