@@ -18,7 +18,8 @@
 //!
 //! and t may advance by the least of all vertices. Near the surface the second bound is a Newton step. Along one axis such steps cost
 //! a few products each; then the distance is found again. A tip that turns away is met after two axes. With the first
-//! bound alone it took 32, in eight bodies at once three times as long as the rest of the step.
+//! bound alone it took 32: the longest step of `simpulse torture --seed 4 --only fast:49 --pace 60`, in which eight bodies come to walls,
+//! was 4.3 medians instead of 1.4.
 //!
 //! The middle of b is at least its half width w farther along n than its surface is, and it
 //! moves along n by no more than −v·n for the rest of the step, however b turns. So where
@@ -56,10 +57,10 @@ use crate::engine::narrowphase::Collider;
 use crate::engine::shapes::{Pose, Shape};
 use glam::Vec2;
 
-/// Most axes along which a pair advances. In 3600 random scenes none takes more than five.
+/// Most axes along which a pair advances; one that reaches this or the next bound stops early.
 const MOST_AXES: u32 = 8;
 
-/// Most steps along one axis. Most take fewer than six; a pair that reaches its bounds stops early.
+/// Most steps along one axis.
 const MOST_STEPS: u32 = 16;
 
 /// Distances looked at (m): beyond any way of a step.
