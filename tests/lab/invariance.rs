@@ -251,9 +251,6 @@ fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
     (0..SCENES).filter(apart).count() as u32
 }
 
-/// Solvers whose norms add up meters and radians where joints hold angles.
-const MIXING: [&str; 4] = ["nncg", "two_level", "anderson", "sap"];
-
 /// A power of two rounds nothing, so a scene of another size moves to the same bits, if its length unit goes along. Not under `avbd`, whose
 /// penalties begin at 1 N/m.
 #[test]
@@ -262,9 +259,7 @@ fn a_scene_of_another_size_moves_to_the_same_bits() {
     let chains = ["hanging_chain", "ball_and_chain", "cantilever"].map(|name| load(name).unwrap().scene);
     let scenes: Vec<Scene> = cases.chain(chains).collect();
     for variant in VARIANTS.iter().filter(|v| v.name != "avbd") {
-        let holds_angles = |joint: &SceneJoint| matches!(joint.kind, JointKind::Weld(_));
-        let mixes = |scene: &Scene| MIXING.contains(&variant.name) && scene.joints.iter().any(holds_angles);
-        for scene in scenes.iter().filter(|scene| scene.runs_on(variant).is_ok() && !mixes(scene)) {
+        for scene in scenes.iter().filter(|scene| scene.runs_on(variant).is_ok()) {
             for factor in [2.0, 1.0 / 32.0] {
                 let image = scaled(scene, factor);
                 let [mut a, mut b] = [scene, &image].map(|s| s.build(settings(variant)).unwrap());

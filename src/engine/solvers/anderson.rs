@@ -1,10 +1,10 @@
-//! Anderson acceleration of Gauss–Seidel: it takes the combination of the last few sweeps that would have changed
-//! least.
+//! Anderson acceleration of Gauss–Seidel: the next iterate is the combination of the last few sweeps with the smallest change.
 //!
 //! **Source.** `walker2011`, section 2; the sweeps are those of [`super::pgs`].
 //!
-//! **Departures.** A sweep that changes more than twice as much as the last one forgets all before it. The
-//! last sweep is not extrapolated, so that impulses end within their bounds.
+//! **Departures.** If a sweep changes impulses by more than twice the change of the previous one, the history is discarded. The
+//! last sweep is not extrapolated, so that impulses end within their bounds. With joints, products of impulses are sums of
+//! energies, Σ x y/m with the effective mass m of each row, since N·s and N·m·s cannot be added.
 //!
 //! **Agreement.** The source at its best: until a residual is reached, depth by problem. Here: 8 iterations,
 //! baumgarte 0.3, depth 3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -14,26 +14,25 @@
 //! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
 //! of a step request 3830 B per contact.
 //!
-//! **Fails when** iterations are few, or contacts open and close: the combination is right for a
-//! linear sweep, and a clamp is a corner in it.
+//! **Fails when** iterations are few, or contacts open and close: the combination is exact for linear sweeps only, and clamping
+//! is not linear.
 //!
 //! # The method
 //!
-//! With g_k = sweep(λ_k) and f_k = g_k − λ_k, the γ that makes |f_k − ΔF γ| least, ΔF being the last
-//! differences of f and ΔG of g, gives
+//! Let g_k = sweep(λ_k) and f_k = g_k − λ_k. ΔF and ΔG are the last few differences of f and g. With the γ that minimizes
+//! |f_k − ΔF γ|,
 //!
 //! ```text
 //! λ_{k+1} = g_k − ΔG γ
 //! ```
 //!
-//! γ comes from the normal equations of at most 5 unknowns in `f64`, their diagonal raised by a
-//! billionth.
+//! γ is found from the normal equations in `f64`, with at most 5 unknowns. 10⁻⁹ of the trace is added to their diagonal.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
 use crate::engine::constraints::numerics::matrix::solve_in_place;
-use crate::engine::constraints::records::point_vector::{difference, dot, plus_scaled, update};
+use crate::engine::constraints::records::point_vector::{difference, energy, plus_scaled, update};
 use crate::engine::constraints::{Passes, Schedule};
 use crate::engine::params::{Budget, Parameter};
 
@@ -59,11 +58,11 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Most earlier sweeps.
+/// Maximum number of earlier sweeps.
 const DEPTH: usize = 5;
-/// Part of the trace that is added to the diagonal of the normal equations (1).
+/// Fraction of the trace that is added to the diagonal of the normal equations (1).
 const RIDGE: f64 = 1e-9;
-/// Growth of |f|² at which history is forgotten (1).
+/// Growth of |f|² at which the history is discarded (1).
 const GROWTH: f64 = 4.0;
 
 fn step(passes: &mut Passes<'_>) {
@@ -77,6 +76,7 @@ fn step(passes: &mut Passes<'_>) {
         let mut changes: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
         let mut images: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| system.lane_impulses(&mut begin));
+        let masses = passes.energy_masses(Phase::Solve);
         // Sweeps seen since the last start, and |f|² of the last one.
         let (mut seen, mut last) = (0_usize, f64::INFINITY);
         for k in 0..budget.velocity_iterations {
@@ -98,7 +98,7 @@ fn step(passes: &mut Passes<'_>) {
                         [difference(f, last_f), difference(g, last_g), f, g, g]
                     },
                 );
-                let square = dot(&change, &change);
+                let square = energy(&change, &change, masses.as_ref());
                 let is_first = seen == 0 || square > GROWTH * last;
                 (seen, last) = (if is_first { 1 } else { seen + 1 }, square);
                 // The first sweep has nothing to be a difference of: its place is taken again.
@@ -111,9 +111,9 @@ fn step(passes: &mut Passes<'_>) {
                 let mut gram = [0.0; DEPTH * DEPTH];
                 let mut right = [0.0; DEPTH];
                 for i in 0..columns {
-                    right[i] = dot(&changes[place(i)], &change);
+                    right[i] = energy(&changes[place(i)], &change, masses.as_ref());
                     for j in 0..=i {
-                        let product = dot(&changes[place(i)], &changes[place(j)]);
+                        let product = energy(&changes[place(i)], &changes[place(j)], masses.as_ref());
                         (gram[i * columns + j], gram[j * columns + i]) = (product, product);
                     }
                 }
@@ -131,6 +131,7 @@ fn step(passes: &mut Passes<'_>) {
                 system.push_lanes(&mut swept);
             });
         }
+        passes.give_back(masses);
         passes.give_back(images);
         passes.give_back(changes);
         passes.give_back([begin, swept, change, last_swept]);

@@ -55,7 +55,8 @@ impl Solver for TwoLevel {
         for substep in 0..budget.substeps {
             passes.integrate_velocities();
             passes.warm_start();
-            let mut conjugate = Conjugate::new([(); 3].map(|_| passes.vector()));
+            let vectors = [(); 3].map(|_| passes.vector());
+            let mut conjugate = Conjugate::new(vectors, passes.energy_masses(Phase::Solve));
             passes.with_system(Phase::Solve, |system| {
                 conjugate.begin(system);
                 levels.begin(system, graph, |separation| rule.bias(separation));
@@ -68,7 +69,9 @@ impl Solver for TwoLevel {
                     passes.with_system(Phase::Solve, |system| conjugate.go_on(system));
                 }
             }
-            passes.give_back(conjugate.vectors());
+            let (vectors, masses) = conjugate.vectors();
+            passes.give_back(masses);
+            passes.give_back(vectors);
             passes.integrate_positions();
             passes.end_substep(substep);
         }

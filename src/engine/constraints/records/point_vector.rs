@@ -117,6 +117,14 @@ pub fn dot(x: &PointVector, y: &PointVector) -> f64 {
     sum_of_products([x, y], |both| both)
 }
 
+/// Σ x y/m, which adds N·s and N·m·s as energies; x·y without masses.
+pub fn energy(x: &PointVector, y: &PointVector, masses: Option<&PointVector>) -> f64 {
+    match masses {
+        Some(masses) => sum_of_products([x, y, masses], |[x, y, m]| [x, quotient(y, m)]),
+        None => dot(x, y),
+    }
+}
+
 /// Sum over all entries of the product of the two that `f` makes of those of `from`.
 ///
 /// # Panics

@@ -48,8 +48,19 @@ impl Passes<'_> {
         }
     }
 
+    /// Effective masses of all rows (kg, kg·m²), for [`energy`](crate::engine::constraints::records::point_vector::energy); `None` in a
+    /// scene without joints, whose rows have one unit.
+    pub fn energy_masses(&mut self, phase: Phase) -> Option<PointVector> {
+        let mut masses = self.system().has_joints().then(|| self.vector())?;
+        self.with_system(phase, |system| system.lane_masses(&mut masses));
+        Some(masses)
+    }
+
     /// Takes vectors back.
-    pub fn give_back<const N: usize>(&mut self, vectors: [PointVector; N]) {
+    pub fn give_back<I: IntoIterator<Item = PointVector, IntoIter: DoubleEndedIterator>>(
+        &mut self,
+        vectors: I,
+    ) {
         // The last one out is the first one in, so that each finds its own length again.
         self.work.vectors.extend(vectors.into_iter().rev());
     }

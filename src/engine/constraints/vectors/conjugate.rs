@@ -1,38 +1,43 @@
-//! Nonlinear conjugate gradients around whatever makes impulses better: the change that it makes is the gradient.
+//! Nonlinear conjugate gradients around any iteration on impulses. The change of the impulses in one iteration serves as the
+//! gradient.
 //!
 //! Source: `silcowitz2010`, algorithm 1: r = λ⁺ − λ, β = |r|²/|r⁻|² with a restart where it is above one, p = β p + r, and
-//! the next iteration begins at λ⁺ + β p.
+//! the next iteration starts from λ⁺ + β p. In scenes with joints, |r|² = Σ r²/m with the effective mass m of each row: their rows
+//! are in N·s and N·m·s, whose squares cannot be added.
 
-use crate::engine::constraints::records::point_vector::{PointVector, difference, dot, scaled, sum, update};
+use crate::engine::constraints::records::point_vector::{
+    PointVector, difference, energy, scaled, sum, update,
+};
 use crate::engine::constraints::vectors::system::System;
 
-/// Directions of a substep, with vectors of the workspace.
+/// State within a substep. Its vectors belong to the workspace.
 #[derive(Debug)]
 pub struct Conjugate {
     last: PointVector,
     swept: PointVector,
     direction: PointVector,
+    masses: Option<PointVector>,
     previous: f64,
 }
 
 impl Conjugate {
-    /// With vectors of zeros.
-    pub fn new([last, swept, direction]: [PointVector; 3]) -> Self {
-        Conjugate { last, swept, direction, previous: f64::INFINITY }
+    /// From vectors of zeros, and the masses of [`energy`].
+    pub fn new([last, swept, direction]: [PointVector; 3], masses: Option<PointVector>) -> Self {
+        Conjugate { last, swept, direction, masses, previous: f64::INFINITY }
     }
 
-    /// Begins at the impulses that are there.
+    /// Starts from the current impulses.
     pub fn begin(&mut self, system: &mut System<'_>) {
         system.lane_impulses(&mut self.last);
     }
 
-    /// Goes on along the direction; impulses and velocities follow.
+    /// Extrapolates along the search direction, and updates impulses and velocities.
     pub fn go_on(&mut self, system: &mut System<'_>) {
-        let Conjugate { last, swept, direction, previous } = self;
+        let Conjugate { last, swept, direction, masses, previous } = self;
         system.lane_impulses(swept);
-        // From here on `last` is r, then what is added to λ.
+        // `last` becomes r, then the increment of λ.
         update([last], [&*swept], |[last], [swept]| [difference(swept, last)]);
-        let square = dot(last, last);
+        let square = energy(last, last, masses.as_ref());
         let beta = if square <= *previous && square > 0.0 { (square / *previous) as f32 } else { 0.0 };
         *previous = square;
         update([&mut *last, direction, &mut *swept], [], |[r, p, swept], []| {
@@ -44,8 +49,8 @@ impl Conjugate {
         std::mem::swap(last, swept);
     }
 
-    /// The vectors, for the workspace.
-    pub fn vectors(self) -> [PointVector; 3] {
-        [self.last, self.swept, self.direction]
+    /// The vectors and the masses, for the workspace.
+    pub fn vectors(self) -> ([PointVector; 3], Option<PointVector>) {
+        ([self.last, self.swept, self.direction], self.masses)
     }
 }

@@ -355,8 +355,9 @@ impl Convex {
             for c in 0..joint.size {
                 block.softness[r][c] = scale * f64::from(joint.response[r][c]);
             }
-            // K of rows that say the same has no inverse.
-            block.softness[r][r] += 1e-6 * scale * largest;
+            // K of equal rows has no inverse. Rows of lengths and of angles differ in units, so each is raised by a part of its own.
+            let own = f64::from(joint.response[r][r]);
+            block.softness[r][r] += 1e-6 * scale * if own > 0.0 { own } else { largest };
         }
         if largest > 0.0 {
             block.inverse = inverse(&block.softness, joint.size);
